@@ -45,7 +45,8 @@ class CauseTable:
         """The alarms that now explain this one away."""
         if not self._gone_at_s:
             return ()
-        return tuple(name for name in self._closure[alarm_id] if self._holds(name, now_s))
+        held = [name for name in self._gone_at_s if self._holds(name, now_s)]  # few, and asked for all alarms
+        return tuple(name for name in self._closure[alarm_id] if name in held) if held else ()
 
     def remembers(self, alarm_id: str) -> bool:
         """Whether this alarm has ever held, so that `note` has something to follow even when it is at rest."""
@@ -55,8 +56,6 @@ class CauseTable:
         self._gone_at_s.clear()
 
     def _holds(self, name: str, now_s: float) -> bool:
-        if name not in self._gone_at_s:
-            return False
         gone_at_s = self._gone_at_s[name]
         return gone_at_s is None or now_s - gone_at_s < self._grace_s.get(name, 0.0)
 

@@ -26,6 +26,7 @@ class Mounting:
     tilt_rad: float = 0.0  # of the scan's plane against the horizontal
     why_unknown: str | None = None  # the transforms contradict each other: where the laser looks is not known
     note: str | None = None  # what is to be known of it, once
+    gap_from: str | None = None  # what gaps are counted from where no bumper is set: "the laser"
 
     @property
     def why_not(self) -> str | None:
@@ -44,6 +45,17 @@ class Mounting:
         if self.tilt_rad > WORTH_A_WORD_RAD:
             return f"laser tilted by {math.degrees(self.tilt_rad):.0f}°"
         return None
+
+    @property
+    def gap_words(self) -> str | None:
+        """What gaps are counted from, in few words; None: from the front bumper, as one expects."""
+        return f"gap from {self.gap_from}: no bumper set" if self.gap_from else None
+
+    @property
+    def notes(self) -> list[str]:
+        """What is to be known of it, in few words each; where all is assumed, that alone."""
+        gap = None if self.origin == "assumed" else self.gap_words
+        return [note for note in (gap, self.note) if note]
 
 
 def within_half_turn(bearing_rad: float) -> float:

@@ -58,6 +58,8 @@ def by_laser(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Fi
         return unknown(why_not, short="no view")  # what is seen is far enough, and something nearer may be unseen
     if mounting is not None and mounting.reservation is not None:
         found = found._replace(text=f"{found.text} ({mounting.reservation})")
+    if mounting is not None and mounting.gap_words is not None:
+        found = found._replace(text=f"{found.text}; {mounting.gap_words}")
     if tyre_angle_rad(snapshot) is None:
         found = found._replace(text=f"{found.text}; steering unknown, checked straight ahead")
     return found

@@ -210,8 +210,8 @@ def _note(run: Rehearsed, name: str) -> str | None:
         if tally is None or unit != tally.why_not_measured:
             notes.append(unit)
     scan = run.snapshot.get("scan") if name == "scan" else None
-    if scan is not None and scan.value.mounting is not None and scan.value.mounting.note is not None:
-        notes.append(scan.value.mounting.note)
+    if scan is not None and scan.value.mounting is not None:
+        notes += scan.value.mounting.notes
     if name == "scan" and (habit := habit_words(run.snapshot.scan_habit)) is not None:
         notes.append(habit)
     return "; ".join(notes) or None

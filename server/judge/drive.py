@@ -52,7 +52,8 @@ class MessageSource(Protocol):
     def topics(self) -> Mapping[str, HasType]: ...
 
     def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
-        """From `start_s` after the beginning on, in time order; messages of topics not named may be empty."""
+        """From `start_s` after the beginning on, in time order; messages of topics not named may be empty, and with a
+        mapping, those that hold none of the words of their topic (None: any)."""
         ...
 
     def only(self, topics: Collection[str]) -> Iterator[Row]:
@@ -160,15 +161,8 @@ class Drive:
                 self._recorded_epoch(event.toml) for _, event in recorded.events if isinstance(event, NewSettings)
             ]
         listened = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
-        scans = {
-            topic: one.topic
-            for epoch in self.epochs
-            for topic, sources in epoch.listeners.items()
-            for one in sources
-            if one.signal == "scan"
-        }
-        # Topics of transforms to be followed: a laser is placed by them.
-        self.moving_transforms = self._transforms.follow(scans)
+        # Topics of transforms to be followed: what is measured is placed by them.
+        self.moving_transforms = self._transforms.follow({topic: self._names[topic] for topic in sorted(listened)})
         self.frames = self._transforms.frames
         self.notes += self.frames.notes
         self.topics = listened | self.moving_transforms

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+import re
+from dataclasses import dataclass, replace
 from typing import Any
 
 from monitor.catalog import AllLimits
@@ -11,11 +12,23 @@ from monitor.mounting import Mounting
 from monitor.values import LaserScan
 from server.judge.signals.scan import LOOKS_AHEAD
 from server.judge.topics import plain_type
-from server.judge.transforms import TYPES, Contradiction, FrameTree, Pose, Rotation, frame_name, rotated
+from server.judge.transforms import (
+    TYPES,
+    Contradiction,
+    FrameTree,
+    Pose,
+    Rotation,
+    frame_name,
+    is_body,
+    is_world,
+    rotated,
+)
 
 MAX_SENSORS = 64  # topics and frames whose mounting is kept
 MAX_TREES = 8  # namespaces with transforms of their own
 _DEFAULTS = AllLimits()
+PLAIN = re.compile(r"[\w./-]+", re.ASCII)  # a name that is the same in every encoding but for its slashes
+NOTHING = b"\x00no frame\x00"  # of no message
 AHEAD_RAD = math.radians(60.0)
 ROAD_RAD = math.radians(15.0)  # on either side of ahead: the corridor from 5 m on
 
@@ -30,6 +43,21 @@ def is_static(topic: str) -> bool:
     return topic.endswith("tf_static")
 
 
+BY_NAME, BY_TRANSFORMS = "by its name", "by transforms"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axes:
+    """Of a frame in which a sensor gives vectors."""
+
+    turn: Rotation | None = None  # in the body frame; None: not turned, or no transform says
+    ground: str | None = None  # BY_NAME or BY_TRANSFORMS: it is fixed to the ground, and not to the car
+    why_unknown: str | None = None
+
+
+AS_THE_BODY = Axes()
+
+
 class Frames:
     """What is known of the frames of one car; small, so that it can be kept with the state of a run."""
 
@@ -37,15 +65,19 @@ class Frames:
         self._trees: dict[str, FrameTree] = {}  # by namespace
         self._changes = 0  # of all trees: what is kept is worked out anew with each
         self._kept: dict[tuple[str, str], tuple[int, Any, Mounting]] = {}  # by topic and frame
-        self._turns: dict[tuple[str, str], tuple[int, Rotation | str | None]] = {}  # by topic and frame
+        self._axes: dict[tuple[str, str], tuple[int, Axes]] = {}  # by topic and frame
         self._located: dict[str, str] = {}  # topic → the frame whose place its transforms gave
+        self._asked: set[tuple[str, str]] = set()  # topics and frames that were asked for
+        self._noted = (0, 0)  # of how many frames and sensors the needed names were noted
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"_trees": self._trees, "_changes": self._changes, "_kept": {}, "_turns": {}, "_located": self._located}
+        kept = ("_trees", "_changes", "_located", "_asked")
+        return {"_kept": {}, "_axes": {}, "_noted": (0, 0)} | {name: getattr(self, name) for name in kept}
 
     def forget(self) -> None:
         """The link opens again: what is latched is sent again, and may be of another calibration by now."""
         self._trees.clear()
+        self._asked.clear()
         self._changes += 1
 
     def receive(self, topic: str, message: Any) -> None:
@@ -82,30 +114,74 @@ class Frames:
         pose = None if body is None else tree.pose(frame, body)
         return None if body is None or pose is None else (body, pose)
 
-    def turn(self, topic: str, frame: str) -> Rotation | str | None:
-        """How a sensor's axes are turned in the body frame; None: not at all, or no transform says; a text: why that
-        cannot be known."""
-        if not self._trees:
-            return None
-        kept = self._turns.get((topic, frame))
+    def is_settled(self, topic: str, frame: str) -> bool:
+        """Whether static transforms alone place a sensor's frame, so that those that move can change nothing there."""
+        try:
+            return not frame_name(frame) or (self.tree_of(topic) or FrameTree()).is_settled(frame)
+        except Contradiction:
+            return False
+
+    @property
+    def needs_moving(self) -> bool:
+        """Whether transforms that move may place a sensor that was asked for."""
+        return not all(self.is_settled(topic, frame) for topic, frame in self._asked)
+
+    def note_needed(self, names: set[bytes]) -> None:
+        """Change `names` to those of which a serialized message of transforms that may count holds one, if it is not of
+        the same frames as before; of all where a name may be spelled in another way there."""
+        known = (sum(tree.size for tree in self._trees.values()), len(self._asked))
+        if names and known == self._noted:
+            return
+        self._noted = known
+        asked = [one for one in self._asked if not self.is_settled(*one)]
+        needed = {name for topic, frame in asked for name in (self.tree_of(topic) or FrameTree()).needed(frame)}
+        found = {name.rpartition("/")[2].encode() if PLAIN.fullmatch(name) else b"" for name in needed}
+        names.clear()
+        names.update(found or {NOTHING})
+
+    def ask(self, topic: str, frame: str) -> None:
+        """A sensor's frame is to be placed."""
+        self._ask(topic, frame_name(frame))
+
+    def _ask(self, topic: str, frame: str) -> None:
+        if len(self._asked) < MAX_SENSORS:
+            self._asked.add((topic, frame))
+
+    def axes(self, topic: str, frame: str) -> Axes:
+        """What is known of the axes of a frame in which a topic gives vectors."""
+        kept = self._axes.get((topic, frame))
         if kept is None or kept[0] != self._changes:
-            if len(self._turns) >= MAX_SENSORS:
-                self._turns.clear()
-            kept = self._turns[topic, frame] = self._changes, self._turn(topic, frame_name(frame))
+            if len(self._axes) >= MAX_SENSORS:
+                self._axes.clear()
+            name = frame_name(frame)
+            self._ask(topic, name)
+            try:
+                found = self._find_axes(topic, name)
+            except Contradiction as why:
+                found = Axes(why_unknown=f"its axes are not known: {why}")
+            kept = self._axes[topic, frame] = self._changes, found
         return kept[1]
 
-    def _turn(self, topic: str, frame: str) -> Rotation | str | None:
-        try:
-            located = self.locate(topic, frame) if frame else None
-        except Contradiction as why:
-            return f"its axes are not known: {why}"
-        if located is None or not Pose(rotation=located[1].rotation).differs(Pose()):
-            return None  # how far a sensor is from the axle does not matter here
-        return located[1].rotation
+    def _find_axes(self, topic: str, frame: str) -> Axes:
+        """Raises Contradiction."""
+        if not frame:
+            return AS_THE_BODY
+        tree = self.tree_of(topic)
+        body = None if tree is None else tree.body_of(frame)
+        if tree is None or body is None:
+            return Axes(ground=BY_NAME) if is_world(frame) else AS_THE_BODY
+        is_on_car = is_body(frame) or tree.is_on_car(frame, body)
+        if is_on_car is False or (is_on_car is None and is_world(frame)):
+            return Axes(ground=BY_TRANSFORMS)
+        pose = tree.pose(frame, body)
+        if pose is None or not Pose(rotation=pose.rotation).differs(Pose()):
+            return AS_THE_BODY  # how far a sensor is from the axle does not matter here
+        return Axes(turn=pose.rotation)
 
     def looks_ahead(self, topic: str, scan: LaserScan) -> bool | None:
         """Whether the laser of a topic looks ahead, see the function; None: no transform says."""
         tree = self.tree_of(topic)
+        self._ask(topic, frame_name(scan.frame_id))
         return None if tree is None else looks_ahead(tree, frame_name(scan.frame_id), scan)
 
     def mounted(self, topic: str, scan: LaserScan, limits: AllLimits) -> LaserScan:
@@ -115,6 +191,7 @@ class Frames:
         if kept is None or kept[0] != self._changes or kept[1] is not limits:
             if len(self._kept) >= MAX_SENSORS:
                 self._kept.clear()
+            self._ask(topic, frame_name(scan.frame_id))
             kept = self._kept[key] = self._changes, limits, self._mounting(topic, frame_name(scan.frame_id), limits)
         return mounted(scan, kept[2])
 
@@ -131,7 +208,7 @@ class Frames:
                 found = _by_pose(*located)
             else:
                 found = self._without(topic, frame)
-        return _by_settings(found, limits)
+        return _from_bumper(_by_settings(found, limits), limits)
 
     def _without(self, topic: str, frame: str) -> Mounting:
         """Of a frame whose place no transform gives."""
@@ -189,6 +266,14 @@ def _by_settings(found: Mounting, limits: AllLimits) -> Mounting:
     )
     words = f"mounted by the settings, {turn_words(mounting)}"
     return replace(mounting, note=f"{words}, not by the car's transforms" if by_transforms else words)
+
+
+def _from_bumper(found: Mounting, limits: AllLimits) -> Mounting:
+    """With what gaps are counted from, where it is not the bumper: no transform names that."""
+    if limits.obstacle.bumper_ahead_m > 0.0 or found.origin == "profile" or found.why_unknown is not None:
+        return found
+    is_behind = found.x_m is not None and found.x_m < 0.0
+    return replace(found, gap_from="the rear axle" if is_behind else "the laser")
 
 
 def place_words(mounting: Mounting) -> str:

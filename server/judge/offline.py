@@ -93,6 +93,8 @@ class OfflineRun:
         self.run_state = self._begin(from_s) if run_state is None else run_state
         self._epoch = drive.epochs[self.run_state.epoch]
         self._frames = drive.frames if self.run_state.frames is None else self.run_state.frames
+        self._names: set[bytes] = set()  # of frames whose transforms count
+        self._frames.note_needed(self._names)
         self._rows = self._read()
         self._next: Row | None = next(self._rows, None)
         if is_new:
@@ -172,7 +174,8 @@ class OfflineRun:
         """What has not been taken yet. The same sum decides as while reading on, so no message is taken twice."""
         at_s, start_s = self.run_state.at_s, self.drive.start_s
         is_begun = self.run_state.ticks > 0 or self.run_state.reception.received > 0
-        for row in self._source.rows(max(0.0, at_s - 0.001), self.drive.topics):
+        topics = dict.fromkeys(self.drive.topics) | dict.fromkeys(self.drive.moving_transforms, self._names)
+        for row in self._source.rows(max(0.0, at_s - 0.001), topics):
             behind_s = row[0] - start_s
             if behind_s > at_s or (behind_s == at_s and not is_begun):
                 yield row
@@ -202,7 +205,9 @@ class OfflineRun:
         _, topic, _, message = row
         self._observer.message_received(topic, now_s)
         if topic in self.drive.moving_transforms:
-            self._frames.receive(topic, message)
+            if message:
+                self._frames.receive(topic, message)
+            self._frames.note_needed(self._names)
             return
         sources = self._epoch.listeners.get(topic)
         if sources is None:

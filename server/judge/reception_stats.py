@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from server.judge.message_fields import NotMeasured, Rejected
+from server.judge.message_fields import NotMeasured, Rejected, has_fields
 from server.judge.profiles import Profile
 from server.judge.topics import Source
 from server.judge.unit_watch import UnitBasis, UnitWatch, read
@@ -59,8 +58,8 @@ class Reception:
 
     def note_frame(self, topic: str, message: Any) -> None:
         """Keep the frame that the header of a message names, at most its first 100 characters."""
-        header = message.get("header") if isinstance(message, Mapping) else None
-        frame_id = header.get("frame_id") if isinstance(header, Mapping) else None
+        header = message.get("header") if has_fields(message) else None
+        frame_id = header.get("frame_id") if has_fields(header) else None
         if isinstance(frame_id, str) and self.frame_ids.get(topic) != frame_id[:100]:
             self.frame_ids[topic] = frame_id[:100]
 

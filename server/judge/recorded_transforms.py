@@ -11,12 +11,12 @@ from typing import Any, Protocol
 from monitor.values import LaserScan
 from server.judge.body_axes import TYPES
 from server.judge.frames import Frames, is_static, is_transforms
-from server.judge.message_fields import text
+from server.judge.message_fields import has_fields, text
 from server.judge.topics import plain_type
-from server.judge.transforms import Contradiction
 
 MOST_STATIC = 1_000  # messages: a static transform that is sent again and again is read so often
 FIRST_MOVING = 200  # messages of those that move, from which a run knows where the laser is when it begins
+FIRST_MEASURED = 20  # messages of each topic: the parts of a sweep may come from several lasers
 PLACED = {plain_type(kind) for kind in TYPES} | {"sensor_msgs/LaserScan"}  # types of what has a place on the car
 
 
@@ -33,6 +33,7 @@ class RecordedTransforms:
         """`names`: topic as the recording spells it → as a bridge would offer it; `types`: that → type."""
         self._source = source
         self._names = names
+        self._types = types
         found = {topic for topic, name in names.items() if is_transforms(name, types[name])}
         if not any(plain_type(kind) in PLACED for kind in types.values()):
             found = set()
@@ -45,12 +46,19 @@ class RecordedTransforms:
         found = self.frames.looks_ahead(topic, scan)
         return self._with_moving.looks_ahead(topic, scan) if found is None and self._moving else found
 
-    def follow(self, scans: Mapping[str, str]) -> frozenset[str]:
-        """The topics of transforms that move if the laser of one of `scans` (topic as the recording spells it → as a
-        bridge would) is placed by them alone: a run has to follow them; `frames` then has their first messages."""
-        if not self._moving or all(self._is_placed(topic, name) for topic, name in scans.items()):
+    def follow(self, listened: Mapping[str, str]) -> frozenset[str]:
+        """The topics of transforms that move if what is placed on the car, of the topics `listened` to (as the
+        recording spells one → as a bridge would), may be placed by them: a run has to follow them; `frames` then has
+        their first messages."""
+        measured = [(name, frame) for topic, name in listened.items() for frame in self._frames_of(topic, name)]
+        # Those that move may contradict the static ones, or be of a nearer namespace.
+        if not self._moving or all(
+            frames.is_settled(*one) for one in measured for frames in (self.frames, self._with_moving)
+        ):
             return frozenset()
         self.frames = self._with_moving
+        for name, frame in measured:
+            self.frames.ask(name, frame)
         return self._moving
 
     @cached_property
@@ -63,11 +71,15 @@ class RecordedTransforms:
         for _, topic, _, message in islice(self._source.only(topics) if topics else (), most):
             frames.receive(self._names[topic], message)
 
-    def _is_placed(self, topic: str, name: str) -> bool:
-        """Whether the static transforms place the laser of a topic, by the frame of its first message."""
-        for _, _, _, message in self._source.only({topic}):
-            try:
-                return self.frames.locate(name, text(message, "header", "frame_id")) is not None
-            except Contradiction:
-                return True  # moving ones do not resolve it
-        return True
+    def _frames_of(self, topic: str, name: str) -> set[str]:
+        """The frames of what a topic measures, by its first messages; none of what has no place on the car."""
+        if plain_type(self._types[name]) not in PLACED or not self._moving:
+            return set()
+        return {_frame(message) for _, _, _, message in islice(self._source.only({topic}), FIRST_MEASURED)}
+
+
+def _frame(message: Any) -> str:
+    """The frame whose place counts: of an Odometry the one below."""
+    if has_fields(message) and "child_frame_id" in message:
+        return text(message, "child_frame_id")
+    return text(message, "header", "frame_id")

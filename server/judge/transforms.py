@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
+from server.judge.frame_words import words
 from server.judge.message_fields import Rejected, finite
 from server.system.clean_text import clean
 
@@ -21,6 +23,10 @@ SAME = 0.002  # m, and of each part of a rotation: no contradiction, but roundin
 
 BODIES = ("base_link", "base_footprint")  # REP-105, REP-120; the first that there is
 ROOTS = ("base", "body", "chassis", "vehicle", "car", "ego_vehicle", "base_frame", "vehicle_frame", "robot")
+
+BODY_WORDS = frozenset({"base", "footprint", "chassis", "body"})
+WORLD_WORDS = frozenset({"odom", "odometry", "map", "world", "earth", "utm", "ecef"})
+WORLDS = ("enu", "ned", "global", "local", "origin", "local_origin")  # as words they are in names of sensors too
 
 Rotation = tuple[float, float, float, float]  # unit quaternion x, y, z, w
 
@@ -98,6 +104,8 @@ class _Link:
     pose: Pose | None  # None: what was sent is no pose
     is_static: bool
     fault: str | None = None  # why it cannot be used; stays, for who is right cannot be known
+    first: Pose | None = None  # as it was sent first
+    has_moved: bool = False
 
 
 def frame_name(name: Any) -> str:
@@ -106,6 +114,19 @@ def frame_name(name: Any) -> str:
         return ""
     name = name.strip().lstrip("/")
     return clean(name) if len(name) <= MAX_NAME else ""
+
+
+@lru_cache(maxsize=1000)
+def is_body(frame: str) -> bool:
+    """Whether a frame is one of the car's body, by its name."""
+    return _last(frame) in (*BODIES, *ROOTS) or not BODY_WORDS.isdisjoint(words(_last(frame)))
+
+
+@lru_cache(maxsize=1000)
+def is_world(frame: str) -> bool:
+    """Whether a frame is fixed to the ground, by its name: odom, map_frame, robot1/world; see REP-105."""
+    last = _last(frame)
+    return not is_body(frame) and (last in WORLDS or not WORLD_WORDS.isdisjoint(words(last)))
 
 
 class FrameTree:
@@ -143,7 +164,7 @@ class FrameTree:
         except Rejected as why:
             pose, fault = None, f"the transform of {child} is not usable, {why}"
         if known is None:
-            self._links[child] = _Link(parent, pose, is_static, fault)
+            self._links[child] = _Link(parent, pose, is_static, fault, pose)
         else:
             if known.fault is not None or (
                 parent == known.parent and is_static == known.is_static and pose == known.pose and fault is None
@@ -154,6 +175,7 @@ class FrameTree:
                 known.fault = fault
             elif is_static == known.is_static:
                 known.pose = pose
+                known.has_moved = known.has_moved or _differ(pose, known.first)
             else:
                 return  # the same, by another topic
         if fault is not None:
@@ -184,6 +206,44 @@ class FrameTree:
             raise Contradiction(f"{frame_name(frame)} is more than {FARTHEST_M:.0f} m from {frame_name(body)}")
         return found
 
+    def is_settled(self, frame: str) -> bool:
+        """Whether static transforms place a frame below base_link. Raises Contradiction."""
+        chain = self._chain(frame_name(frame))
+        body = next((name for name in chain if _last(name) == BODIES[0]), None)
+        if body is None or not all(self._links[name].is_static for name in chain[: chain.index(body)]):
+            return False
+        self._down(chain, body)
+        return True
+
+    @property
+    def size(self) -> int:
+        """How many frames are known below others."""
+        return len(self._links)
+
+    def needed(self, frame: str) -> set[str]:
+        """Frames of which each transform that counts for the place of this one names at least one."""
+        found: list[str] = []
+        for name in self._above(frame):
+            if _last(name) == BODIES[0]:
+                return set(found)
+            found.append(name)
+        is_connected = len(found) > 1 or any(link.parent == frame for link in self._links.values())
+        return {*found, *(BODIES if is_connected else ())}  # a body may be beside it
+
+    def is_on_car(self, frame: str, body: str) -> bool | None:
+        """Whether a frame is fixed to the car, and not to the ground that it drives on, as `odom` is; None: what was
+        sent does not show it. Raises Contradiction."""
+        to_body, to_frame = self._chain(frame_name(body)), self._chain(frame_name(frame))
+        common = next((name for name in to_frame if name in to_body), None)
+        if common is None:
+            return None
+        ours = [self._links[name] for name in to_body[: to_body.index(common)]]
+        theirs = [self._links[name] for name in to_frame[: to_frame.index(common)]]
+        if all(link.is_static for link in (*ours, *theirs)):
+            return True
+        is_car_seen_from = any(link.has_moved for link in ours) and not any(link.has_moved for link in theirs)
+        return False if is_car_seen_from and not is_body(common) else None
+
     def _above(self, frame: str) -> Iterator[str]:
         """A frame and all above it, as far as there is no loop."""
         for _ in range(MAX_DEPTH):
@@ -213,6 +273,10 @@ class FrameTree:
     def _note(self, sentence: str) -> None:
         if sentence not in self.notes and len(self.notes) < MAX_NOTES:
             self.notes.append(sentence)
+
+
+def _differ(pose: Pose | None, first: Pose | None) -> bool:
+    return pose is not None and first is not None and pose.differs(first)
 
 
 def _contradiction(child: str, known: _Link, parent: str, pose: Pose | None, is_static: bool) -> str | None:

@@ -15,7 +15,7 @@ from monitor.alarm import Alarm, Transition
 from monitor.alarm_spec import AlarmSpec
 from monitor.check import Finding, Quantity, Verdict
 from monitor.load import AlarmLoad
-from monitor.mounting import within_half_turn
+from monitor.mounting import Mounting, within_half_turn
 from monitor.obstacle_view import ANGLE_STEP_RAD
 from monitor.runner import Tile
 from monitor.scan import usable
@@ -118,8 +118,13 @@ def _scan_summary(scan: values.LaserScan) -> ScanValue:
         "frame_id": scan.frame_id,
         "laser_ahead_m": plain(scan.mounting.x_m, 3) if scan.mounting is not None else None,
         "laser_left_m": plain(scan.mounting.y_m, 3) if scan.mounting is not None else 0.0,
-        "mounting": (scan.mounting.why_not or scan.mounting.reservation) if scan.mounting is not None else None,
+        "mounting": None if scan.mounting is None else _mounting(scan.mounting),
     }
+
+
+def _mounting(of: Mounting) -> str | None:
+    """What limits what the laser says of the road."""
+    return of.why_not or " · ".join(words for words in (of.reservation, of.gap_words) if words) or None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

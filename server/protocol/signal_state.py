@@ -77,7 +77,12 @@ class ScanValue(TypedDict):
     ]
     laser_left_m: NotRequired[Annotated[float | None, doc("of the centre line")]]
     mounting: NotRequired[
-        Annotated[str | None, doc("*laser assumed to look ahead*: what limits what it says of the road; null: nothing")]
+        Annotated[
+            str | None,
+            doc(
+                "*laser assumed to look ahead*, *gap from the laser: no bumper set*: what limits its words on the road"
+            ),
+        ]
     ]
 
 

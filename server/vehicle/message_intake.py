@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -20,8 +19,8 @@ from server.vehicle.judgement import Judgement
 from server.vehicle.marks import Marks
 from server.vehicle.scan_feed import ScanFeed
 from server.vehicle.sent_again import Arrival, SentAgain
-from server.vehicle.subscription_table import TRANSFORMS_MS
 from server.vehicle.tick_parts import TickParts
+from server.vehicle.transform_pace import TransformPace
 from server.vehicle.undelivered import CLIENT_COUNT
 
 RECORDING = "recording of messages"  # its name where it fails
@@ -65,7 +64,7 @@ class MessageIntake:
     def reset(self) -> None:
         """Another car's messages come."""
         self._scans = ScanFeed(self._vehicle, self._bus)
-        self._transforms_s = -math.inf  # when transforms that move were parsed last
+        self._pace = TransformPace()
         self._sent_again = SentAgain(self._read_s)
 
     def subscribed(self, topic: str) -> None:
@@ -75,6 +74,7 @@ class MessageIntake:
     def link_opened(self) -> None:
         """The car's messages come from the beginning, also those that are sent once."""
         self._judgement.frames.forget()
+        self._pace = TransformPace()
         self._recording.release()
 
     def junk_received(self, why: str) -> None:
@@ -95,15 +95,16 @@ class MessageIntake:
         if connection is None or frame.topic in (GUARD_STATE, CLIENT_COUNT):
             return False
         topics = connection.subscriptions
-        if frame.topic not in topics.others:
+        is_recorded, is_transforms = frame.topic in topics.others, frame.topic in topics.table.transforms
+        if not (is_recorded or is_transforms):
             return False
         now_s, size = self._now(), len(frame.payload)
-        if frame.topic in topics.table.transforms and self._places_sensors(frame.topic, now_s):
+        if is_transforms and (is_static(frame.topic) or self._pace.is_due(frame, now_s)):
             return False
         arrival = self._arrived(connection, frame.topic, frame, size, now_s)
-        if plain_type(topics.others[frame.topic]) not in OF_ANY_NODE and not (arrival and arrival.is_repeat):
+        if plain_type(topics.others.get(frame.topic, "")) not in OF_ANY_NODE and not (arrival and arrival.is_repeat):
             self._judgement.other_message_s = now_s
-        if self._is_to_record(frame.topic, arrival, now_s):
+        if is_recorded and self._is_to_record(frame.topic, arrival, now_s):
             self._record(connection, frame.topic, frame, now_s, size)
         return True
 
@@ -150,7 +151,9 @@ class MessageIntake:
         self, connection: Connection, topic: str, message: Any, arrival: Arrival | None, now_s: float
     ) -> None:
         """Transforms place sensors; each part of a recording begins with those that are sent once."""
-        self._judgement.frames.receive(topic, message)
+        frames = self._judgement.frames
+        frames.receive(topic, message)
+        connection.subscriptions.table.needs_moving = frames.needs_moving
         is_repeat = arrival is not None and arrival.is_repeat
         if not is_repeat:
             self._judgement.other_message_s = now_s
@@ -160,15 +163,6 @@ class MessageIntake:
             self._record(connection, topic, message, now_s, connection.link.frame_bytes)
         if is_static(topic):
             self._recording.hold(topic, kind, message)
-
-    def _places_sensors(self, topic: str, now_s: float) -> bool:
-        """Whether a message of transforms is to be parsed; of those that move, a few a second are enough."""
-        if is_static(topic):
-            return True
-        is_due = now_s - self._transforms_s >= TRANSFORMS_MS / 1000
-        if is_due:
-            self._transforms_s = now_s
-        return is_due
 
     def _arrived(self, connection: Connection, topic: str, message: Any, size: int, now_s: float) -> Arrival | None:
         """Follow a topic's messages, and what its bridge sends again of them; None: each message of it counts."""

@@ -272,7 +272,8 @@ def _scan_note(source: Source | None, snapshot: Snapshot) -> str | None:
     """Of the laser all is to be known at once: the choice of its topic, its mounting, how its driver counts."""
     scan = snapshot.get("scan")
     mounting = scan.value.mounting if scan is not None else None
-    notes = (source.note if source else None, mounting.note if mounting else None, habit_words(snapshot.scan_habit))
+    mounted = mounting.notes if mounting else []
+    notes = (source.note if source else None, *mounted, habit_words(snapshot.scan_habit))
     return "; ".join(note for note in notes if note) or None
 
 

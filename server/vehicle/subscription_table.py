@@ -19,7 +19,7 @@ from server.vehicle.type_definitions import TypeDefinitions
 from server.vehicle.undelivered import CLIENT_COUNT
 
 TRANSFORMS_MS = (
-    200  # of transforms that move: where a laser is changes slowly, and /tf is sent a hundred times a second
+    200  # of transforms that move, where none of them places a sensor: they are sent a hundred times a second
 )
 MOST_TRANSFORMS = 8  # topics: one or two of each namespace
 BY_NAME_AGAIN_S, BY_NAME_LAST_S = 5.0, 60.0  # each attempt without rosapi costs the bridge a line in its log a name
@@ -50,6 +50,7 @@ class SubscriptionTable:
         self.also: Also = "none"  # what is to be recorded beyond the signals
         self.recorded = wanted_topics.Recorded(topics={}, left_out=())
         self.transforms: frozenset[str] = frozenset()  # topics that say where the sensors are
+        self.needs_moving = self._has_moving = False  # whether those that move may place a sensor: each one counts
         self.judged = 0  # topics that are subscribed to for their signals
         self.button: car_marks.Asked | None = None  # how the car's button was subscribed to
 
@@ -117,12 +118,14 @@ class SubscriptionTable:
         """Subscriptions of the transforms, as far as they are not `wanted` to be recorded whole."""
         found = sorted(topic for topic, kind in offered.items() if is_transforms(topic, kind) and topic not in without)
         self.transforms = frozenset(found[:MOST_TRANSFORMS])
+        self._has_moving = self.needs_moving
+        has_all = self.needs_moving and self.load.step == 0
         return {
             topic: Subscription(
                 topic=topic,
                 type=offered[topic],
-                throttle_ms=0 if is_static(topic) else TRANSFORMS_MS,
-                queue_length=50 if is_static(topic) else 1,  # of static ones each publisher sends one, at once
+                throttle_ms=0 if has_all or is_static(topic) else TRANSFORMS_MS,
+                queue_length=50 if has_all or is_static(topic) else 1,  # many publishers send one each, at once
             )
             for topic in self.transforms
             if topic not in wanted
@@ -160,7 +163,10 @@ class SubscriptionTable:
         return False
 
     def tries_another(self) -> bool:
-        """Whether a topic on probation is to be subscribed to now; then `subscribe` is still to be called."""
+        """Whether a topic on probation, or more or less of the transforms, is to be subscribed to now; then `subscribe`
+        is still to be called."""
+        if self.needs_moving != self._has_moving:
+            return True
         return self.load.level.records_others and self.probation.look(self._now())
 
     def look_at_load(self, late_s: float) -> tuple[bool, list[str]]:

@@ -4,7 +4,7 @@ import { withQuestion } from '../../static/js/core/freshness.js';
 import { isAbsent } from '../../static/js/core/ink.js';
 import { otherWords } from '../../static/js/home/signal-more.js';
 import { kindWords } from '../../static/js/home/signals.js';
-import { isOfMounting } from '../../static/js/scan/scan-readout.js';
+import { isOfMounting, lacksBumper } from '../../static/js/scan/scan-readout.js';
 import { answerOf, dealt, keyOf, mayAnswer, restWords, waitingWords } from '../../static/js/settings/question-layout.js';
 import { pointsOf, reachOf, sketchedOf } from '../../static/js/settings/scan-sketch.js';
 import { changeLines, changeTo, DEFAULTS } from '../../static/js/settings/settings-layout.js';
@@ -93,7 +93,9 @@ test('the list of signals and Settings say that a source is not chosen', () => {
 
 test('a note on the mounting leads to its settings', () => {
   for (const note of ['mounting not known: no transform', 'assumed to look ahead: no transforms, and no setting']) assert.ok(isOfMounting(note), note);
-  for (const note of ['', 'not a number (ranges)']) assert.ok(!isOfMounting(note), note);
+  for (const note of ['', 'not a number (ranges)']) assert.ok(!isOfMounting(note) && !lacksBumper(note), note);
+  const noBumper = "gap from the laser: no bumper set; by the car's transforms looking ahead, 0.30 m ahead of base_link";
+  assert.deepEqual([isOfMounting(noBumper), lacksBumper(noBumper)], [false, true]);
 });
 
 test('a replay is of this page alone: who is in control of the car does not matter', () => {

@@ -199,17 +199,26 @@ async def test_the_unit_of_a_signal_is_picked_in_signals(phone: Phone, canned: C
     await expect(units).to_have_count(0)  # it has no choice of units
 
 
-async def test_a_note_on_the_mounting_stands_on_scan_and_leads_to_its_settings(phone: Phone, canned: Canned) -> None:
-    canned.state["signals"]["scan"]["note"] = "assumed to look ahead: no transforms, and no setting"
-    canned.settings = {"schema": {"mounting.yaw_deg": FIELD}, "values": {"mounting.yaw_deg": 0.0}, "defaults": {}}
+@pytest.mark.parametrize(
+    ("words", "setting", "title"),
+    [
+        ("assumed to look ahead: no transforms, and no setting", "mounting.yaw_deg", "Laser turned to the left"),
+        ("gap from the laser: no bumper set", "obstacle.bumper_ahead_m", "Front bumper ahead of the rear axle"),
+    ],
+)
+async def test_a_note_on_the_mounting_stands_on_scan_and_leads_to_its_settings(
+    phone: Phone, canned: Canned, words: str, setting: str, title: str
+) -> None:
+    canned.state["signals"]["scan"]["note"] = words
+    canned.settings = {"schema": {setting: FIELD | {"title": title}}, "values": {setting: 0.0}, "defaults": {}}
     await phone.open(f"{canned.address}/#scan")
     await phone.live()
     note = phone.f("note", "#panel-scan")
-    await expect(note).to_contain_text("assumed to look ahead: no transforms, and no setting")
+    await expect(note).to_contain_text(words)
     await expect(note).to_be_in_viewport(ratio=1)
     await note.tap()
     await expect(phone.page.locator("#tab-settings")).to_have_attribute("aria-selected", "true")
-    await expect(phone.page.locator('[data-setting="mounting.yaw_deg"]')).to_be_visible()
+    await expect(phone.page.locator(f'[data-setting="{setting}"]')).to_be_visible()
     canned.state["signals"]["scan"]["note"] = None
     await phone.page.locator("#tab-scan").tap()
     await expect(note).to_be_hidden()

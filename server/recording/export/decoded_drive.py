@@ -69,7 +69,7 @@ class DecodedDrive:
 
     def other_topics(self) -> dict[str, tuple[str, int]]:
         """Topic → type and count, of what fills no signal."""
-        used, topics = self._drive.topics, self.recording.topics
+        used, topics = self._drive.topics - self._drive.moving_transforms, self.recording.topics
         return {topic: (info.type, info.count) for topic, info in sorted(topics.items()) if topic not in used}
 
     def not_measured(self) -> list[str]:

@@ -22,6 +22,7 @@ from server.recording.read.definitions import definition_of, definitions_of
 from server.recording.read.errors import NoRoom, RecordingUnreadable, Undecodable
 from server.recording.read.open_file import open_file
 from server.recording.read.recognise import Found, FoundRecording, by_name, recognise
+from server.recording.read.sift import sifted
 from server.recording.read.source import Channel, Damage, FileSource, why_not_decoded
 from server.recording.read.steady_time import ClockStep, make_steady, notes_on
 from server.recording.read.time_order import Stream, in_time_order
@@ -141,7 +142,7 @@ class Recording:
     def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
         """Like `messages`, as tuples: time, topic, type, content.
 
-        With `topics`, messages of other topics are empty, because decoding is most of the work. What cannot
+        With `topics`, messages of other topics are empty, because decoding is most of the work (`sifted`). What cannot
         be decoded is left out and counted in `rejected`, what is damaged is left out where the rest can be read without
         it, and named in `damage`. Raises RecordingUnreadable where it cannot, or nothing is whole.
         """
@@ -228,8 +229,7 @@ class Recording:
         self, source: FileSource, readers: dict[int, _ChannelReader], start_ns: int, topics: Collection[str] | None
     ) -> Iterator[Row]:
         ways = {
-            number: (road.topic, road.type, road.decode if topics is None or road.topic in topics else _nothing)
-            for number, road in readers.items()
+            number: (road.topic, road.type, sifted(road.decode, road.topic, topics)) for number, road in readers.items()
         }
         try:
             for time_ns, number, raw in source.messages(set(readers), start_ns):
@@ -256,10 +256,6 @@ def _made_steady(sources: Sequence[FileSource]) -> list[ClockStep]:
         raise
     except Exception as error:
         raise RecordingUnreadable(_what_is_wrong(sources[0].path, error)) from None
-
-
-def _nothing(raw: bytes) -> dict[str, Any]:
-    return {}
 
 
 def _open_parts(found: FoundRecording, sources: list[FileSource], lacking: list[str]) -> None:

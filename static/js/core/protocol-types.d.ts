@@ -1998,7 +1998,7 @@ export interface ScanValue {
   laser_ahead_m?: number | null;
   /** of the centre line */
   laser_left_m?: number | null;
-  /** *laser assumed to look ahead*: what limits what it says of the road; null: nothing */
+  /** *laser assumed to look ahead*, *gap from the laser: no bumper set*: what limits its words on the road */
   mounting?: string | null;
 }
 

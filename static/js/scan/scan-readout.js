@@ -48,7 +48,7 @@ export class ScanReadout {
     show(at('note'), note !== '');
     setAttribute(at('note'), 'title', note);
     setWords(at('note-words'), note);
-    setText(at('note-short'), isOfMounting(note) ? 'Mounting' : 'Note');
+    setText(at('note-short'), isOfMounting(note) ? 'Mounting' : lacksBumper(note) ? 'No bumper' : 'Note');
     this.#describe(isNow ? scan : null, missing);
   }
 
@@ -121,6 +121,11 @@ export function scanInk(store, shown) {
 /** Whether what is to be known of the scan is where its laser is mounted. @param {string} note */
 export function isOfMounting(note) {
   return /mounting|assumed to look/i.test(note);
+}
+
+/** Whether gaps count from the laser, for the bumper is not set. @param {string} note */
+export function lacksBumper(note) {
+  return note.includes('no bumper');
 }
 
 /** Without the steering angle the corridor is drawn straight. @param {import('../core/store.js').Store} store */

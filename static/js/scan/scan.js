@@ -6,7 +6,7 @@ import { THUMB_PX } from './scan-pick.js';
 import { ScanMark } from './scan-mark.js';
 import { ScanGlass } from './scan-glass.js';
 import { styled } from '../core/style-sheet.js';
-import { ScanReadout, isOfMounting, scanInk } from './scan-readout.js';
+import { ScanReadout, isOfMounting, lacksBumper, scanInk } from './scan-readout.js';
 import { mountTouch } from './scan-touch.js';
 import { REACH_M, pinched, placeOf, plotScale, reachWithin, zoomed } from './scan-layout.js';
 
@@ -29,7 +29,11 @@ export function mount(root, { store, isFront }) {
     ...tab.ranges.map((key) => listen(key, 'click', () => tab.reach(Number(key.dataset['range'])))),
     listen(at('nearer'), 'click', () => tab.zoom(1)),
     listen(at('farther'), 'click', () => tab.zoom(-1)),
-    listen(at('note'), 'click', () => (isOfMounting(store.signal('scan')?.note ?? '') ? openSettings('mounting') : openScreen('signals', 'scan'))),
+    listen(at('note'), 'click', () => {
+      const note = store.signal('scan')?.note ?? '';
+      const setting = isOfMounting(note) ? 'mounting' : lacksBumper(note) ? 'bumper' : null;
+      return setting ? openSettings(setting) : openScreen('signals', 'scan');
+    }),
     listen(root, 'keydown', (event) => tab.press(event)),
     listen(window, 'catgraph-theme', themed),
     listen(matchMedia('(prefers-color-scheme: light)'), 'change', themed),

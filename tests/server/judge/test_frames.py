@@ -274,7 +274,9 @@ def test_the_operators_setting_comes_before_the_transforms() -> None:
 def test_assumed_is_said_and_a_setting_or_the_catvehicles_topic_ends_it() -> None:
     laser, posts = Laser(), [(3.3, 0.0, 0.3)]
     assumed = scanned(laser, posts, Frames())
-    assert "(laser assumed to look ahead)" in asked(assumed).text
+    assert "(laser assumed to look ahead); gap from the laser: no bumper set" in asked(assumed).text
+    measured = scanned(laser, posts, Frames(), limits(obstacle__bumper_ahead_m=3.0))
+    assert "(laser assumed to look ahead)" in asked(measured).text
     assert (assumed.mounting.note or "").startswith("assumed to look ahead") if assumed.mounting else False
     set_there = scanned(laser, posts, Frames(), limits(mounting__by_settings=1.0))
     assert "assumed" not in asked(set_there).text
@@ -283,6 +285,36 @@ def test_assumed_is_said_and_a_setting_or_the_catvehicles_topic_ends_it() -> Non
     assert (of_car.mounting.note, "assumed" in asked(of_car).text) == (None, False)
     moved = scanned(laser, posts, Frames(), limits(obstacle__laser_ahead_m=1.0))
     assert "assumed" in asked(moved).text, "its place alone does not tell where it looks"
+
+
+COUNTED = "gap from the laser: no bumper set"
+
+
+@pytest.mark.parametrize(
+    ("x_m", "posts", "words"),
+    [
+        (1.2, [(4.5, 0.0, 0.3)], COUNTED),  # on the roof
+        (1.2, [], COUNTED),
+        (1.2, [(11.5, 0.0, 0.3)], COUNTED),
+        (-0.4, [(4.5, 0.0, 0.3)], "gap from the rear axle: no bumper set"),
+    ],
+)
+@pytest.mark.parametrize("by_settings", [0.0, 1.0])
+def test_a_gap_that_is_not_counted_from_the_bumper_says_so(
+    x_m: float, posts: list[Post], words: str, by_settings: float
+) -> None:
+    laser = Laser(x_m=x_m)
+    set_to = limits(mounting__by_settings=by_settings)
+    scan = scanned(laser, posts, frames(laser.transform()), set_to)
+    expected = COUNTED if by_settings else words  # there the laser's place is that of the settings
+    assert f"; {expected}" in asked(scan, set_to).text
+    assert scan.mounting is not None
+    assert expected in scan.mounting.notes
+    with_bumper = limits(obstacle__bumper_ahead_m=3.5, mounting__by_settings=by_settings)
+    scan = scanned(laser, posts, frames(laser.transform()), with_bumper)
+    assert "bumper" not in asked(scan, with_bumper).text
+    assert scan.mounting is not None
+    assert (scan.mounting.gap_words, len(scan.mounting.notes)) == (None, 1)
 
 
 # -- bad transforms --------------------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ import pytest
 
 from monitor.mounting import Mounting
 from server.judge.drive import Drive as JudgedDrive
+from server.judge.frames import Frames
 from server.judge.offline import OfflineRun
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, open_recording
@@ -138,3 +139,149 @@ def test_of_two_lasers_the_one_that_looks_ahead_is_taken(
     source = choice.sources.get("scan")
     assert (source and source.topic) == expected.get(turn_deg)
     assert len(choice.questions) == (turn_deg not in expected)
+
+
+# -- Imu and Odometry ------------------------------------------------------------------------------------------------
+
+OPPOSITE = Laser(yaw_rad=math.pi)  # of a sensor that is mounted backwards
+STRAIGHT = Laser()
+PLACES = {  # static transforms, and those that move, of a sensor that looks back
+    "static": ([OPPOSITE.transform(child="imu")], []),
+    "moving": ([], [OPPOSITE.transform(child="imu")]),
+    "moving, among others": ([row("base_link", "mast")], [OPPOSITE.transform(child="imu")]),
+    "on a mast that is sent as moving": ([OPPOSITE.transform("mast", "imu")], [STRAIGHT.transform(child="mast")]),
+    "on a turned mast that is sent as moving": (
+        [STRAIGHT.transform("mast", "imu")],
+        [OPPOSITE.transform(child="mast")],
+    ),
+    "a body below base_link": ([STRAIGHT.transform("chassis", "imu")], [OPPOSITE.transform(child="chassis")]),
+    "a body above base_link": (
+        [STRAIGHT.transform("base_footprint", "imu")],
+        [OPPOSITE.transform("base_footprint", "base_link")],
+    ),
+    "a robot's body below base_link": ([STRAIGHT.transform("robot", "imu")], [OPPOSITE.transform(child="robot")]),
+}
+
+
+def measuring(seconds: float, *, frame: str = "imu") -> list[Row]:
+    """A car that speeds up northwards at 1 m/s², by a sensor that is mounted backwards."""
+    rows: list[Row] = []
+    for n in range(round(seconds * 10)):
+        imu = {
+            "header": {"frame_id": frame},
+            "orientation": {"z": -math.sqrt(0.5), "w": math.sqrt(0.5)},
+            "orientation_covariance": [0.01] * 9,
+            "linear_acceleration": {"x": -1.0, "z": 9.81},
+            "linear_acceleration_covariance": [0.01] * 9,
+        }
+        pose = {"position": {"y": 0.05 * (0.1 * n) ** 2}, "orientation": imu["orientation"]}
+        odometry = {
+            "header": {"frame_id": "odom"},
+            "child_frame_id": frame,
+            "pose": {"pose": pose},
+            "twist": {"twist": {"linear": {"x": -5.0 - 0.1 * n}}},
+        }
+        rows.append((0.1 * n + 0.01, "/imu/data", "sensor_msgs/msg/Imu", imu))
+        rows.append((0.1 * n + 0.02, "/odom", "nav_msgs/msg/Odometry", odometry))
+    return rows
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("place", PLACES)
+def test_what_is_measured_has_the_cars_axes_whichever_transforms_place_the_sensor(
+    tmp_path: Path, version: int, place: str
+) -> None:
+    static, moving = PLACES[place]
+    rows = [*measuring(3.0), sent(0.0, *static), *(sent(0.1 * n, *moving, topic="/tf") for n in range(30) if moving)]
+    with open_recording([written(tmp_path / "drive", version, rows)]) as recording:
+        drive = judged_drive(recording)
+        assert drive.moving_transforms == ({"/tf"} if moving else frozenset())
+        run = OfflineRun(recording, drive)
+        run.advance(1.05)
+        snapshot = run.run_state.state.snapshot(run.at_s)
+    assert snapshot.need("speed").speed_mps == pytest.approx(6.0)
+    assert snapshot.need("acceleration").acceleration_mps2 == pytest.approx(1.0)
+    assert snapshot.need("odometry").yaw_rad == pytest.approx(math.pi / 2)
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_recording_and_the_live_car_have_the_same_axes(tmp_path: Path, place: str) -> None:
+    static, moving = PLACES[place]
+    live = Frames()
+    for topic, transforms in (("/tf_static", static), ("/tf", moving)):
+        live.receive(topic, {"transforms": transforms})
+    rows = [*measuring(1.0), sent(0.0, *static), sent(0.0, *moving, topic="/tf")]
+    with open_recording([written(tmp_path / "drive", 2, rows)]) as recording:
+        assert judged_drive(recording).frames.axes("/odom", "imu") == live.axes("/odom", "imu")
+    turn = live.axes("/odom", "imu").turn
+    assert turn is not None
+    assert abs(turn[2]) == pytest.approx(1.0)
+
+
+def test_the_second_laser_of_a_sweep_is_placed_too(tmp_path: Path) -> None:
+    """Scans of one topic come from two frames in turn; one is placed by what moves."""
+    both = [*scans(0.0, 3.0, frame="left"), *((t + 0.05, *rest) for t, *rest in scans(0.0, 3.0, frame="right"))]
+    rows = [*both, sent(0.0, BACKWARDS.transform(child="left"))]
+    rows += [sent(0.1 * n, BACKWARDS.transform(child="right"), topic="/tf") for n in range(30)]
+    with open_recording([written(tmp_path / "drive", 2, rows)]) as recording:  # type: ignore[arg-type]
+        run = OfflineRun(recording, judged_drive(recording))
+        run.advance(1.07)
+        assert run.run_state.state.snapshot(run.at_s).need("scan").frame_id == "right"
+        assert (mounting(run).why_not, mounting(run).yaw_rad) == (None, pytest.approx(math.pi, abs=1e-4))
+
+
+def test_what_moves_and_contradicts_a_static_transform_is_noticed(tmp_path: Path) -> None:
+    """As it is live."""
+    rows = [*measuring(2.0), sent(0.0, OPPOSITE.transform(child="imu"))]
+    rows += [sent(0.1 * n, STRAIGHT.transform("mast", "imu"), topic="/tf") for n in range(20)]
+    with open_recording([written(tmp_path / "drive", 2, rows)]) as recording:
+        run = OfflineRun(recording, judged_drive(recording))
+        run.advance(1.0)
+        assert "also below mast" in run.run_state.state.snapshot(run.at_s).unusable["acceleration"].words
+
+
+def test_what_is_not_measured_on_the_car_needs_no_transforms(tmp_path: Path) -> None:
+    rows = [
+        *measuring(1.0, frame="base_link"),
+        *(sent(0.1 * n, row("odom", "base_link"), topic="/tf") for n in range(9)),
+    ]
+    with open_recording([written(tmp_path / "drive", 2, rows)]) as recording:
+        assert judged_drive(recording).moving_transforms == frozenset()
+
+
+def wheels(seconds: float) -> list[Row]:
+    turned = (0.0, math.sin(0.3), 0.0, math.cos(0.3))
+    names = [f"wheel_{n}" for n in range(4)]
+    return [
+        sent(0.02 * n, *(row("base_link", name, 0.02 * n, rotation=turned) for name in names), topic="/tf")
+        for n in range(round(seconds * 50))
+    ]
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("chain", [["imu"], ["mast", "imu"], ["robot1/top plate", "mast", "imu"], ["chassis", "imu"]])
+def test_of_what_moves_only_what_places_a_sensor_is_decoded_also_if_it_comes_late(
+    tmp_path: Path, version: int, chain: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Long after the first messages, and each link for itself."""
+    rows, parents = [*measuring(12.0), *wheels(12.0)], ["base_link", *chain]
+    for number, child in enumerate(chain):
+        laser = OPPOSITE if number == 0 else STRAIGHT
+        rows += [
+            sent(9.0 + 0.2 * n + 0.01 * number, laser.transform(parents[number], child), topic="/tf") for n in range(10)
+        ]
+    received: list[Any] = []
+    whole = Frames.receive
+    monkeypatch.setattr(
+        Frames, "receive", lambda self, topic, message: received.append(message) or whole(self, topic, message)
+    )
+    with open_recording([written(tmp_path / "drive", version, rows)]) as recording:
+        run = OfflineRun(recording, drive := judged_drive(recording))
+        assert drive.moving_transforms == {"/tf"}
+        received.clear()
+        run.advance(8.0)
+        assert received == []
+        assert run.run_state.state.snapshot(8.0).need("speed").speed_mps < 0.0, "as without transforms"
+        run.advance(11.0)
+        assert run.run_state.state.snapshot(11.0).need("speed").speed_mps > 0.0
+        assert len(received) < (600 if " " in chain[0] else 120)  # a name with a space may be spelled in another way

@@ -64,7 +64,11 @@ async def test_a_latched_transform_turns_the_laser(bridge: RosBridge, server: st
         (alarm,) = (alarm for alarm in state["alarms"] if alarm["id"] == "obstacle")
         assert alarm["trip_text"].startswith("Obstacle 3.0 m ahead, 11° left")  # the nearer of two beams
         assert "by the car's transforms turned by 180°, 0.50 m ahead of base_link" in note_of(state)
-        assert state["signals"]["scan"]["value"]["mounting"] is None
+        assert "gap from the laser: no bumper set" in note_of(state)
+        assert state["signals"]["scan"]["value"]["mounting"] == "gap from the laser: no bumper set"
+        assert alarm["trip_text"].endswith(
+            "gap from the laser: no bumper set; steering unknown, checked straight ahead"
+        )
         await one.until(lambda: one.scans)
         frame = scan_frames.read(one.scans[-1])
         assert frame.gap_m == pytest.approx(3.0, abs=0.05)
@@ -80,7 +84,9 @@ async def test_transforms_that_come_later_count_from_then_on(bridge: RosBridge, 
     async with scanning(bridge), viewer(server) as one:
         state = await one.state(lambda s: "assumed to look ahead" in note_of(s))
         assert not is_alarmed(state)
-        assert state["signals"]["scan"]["value"]["mounting"] == "laser assumed to look ahead"
+        assert state["signals"]["scan"]["value"]["mounting"] == (
+            "laser assumed to look ahead · gap from the laser: no bumper set"
+        )
         bridge.advertise("/tf", TF)
         async with asyncio.timeout(60):
             while not is_alarmed(one.states[-1]):
@@ -157,3 +163,37 @@ async def test_a_part_that_begins_after_an_outage_holds_them_too(bridge: RosBrid
     for path in made:
         with open_recording([path]) as recording:
             assert recording.topics["/tf_static"].count == 1
+
+
+JOINTS = [[row("base_link", f"joint_{10 * group + n}") for n in range(10)] for group in range(30)]
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize("all_topics", [1.0, 0.0], ids=["all topics", "only signals"])
+async def test_a_laser_that_is_placed_once_a_second_among_hundreds_of_joints_is_placed_soon(
+    bridge: RosBridge, tmp_path: Path, all_topics: float
+) -> None:
+    bridge.advertise("/tf", TF)
+    now = asyncio.get_running_loop().time
+
+    async def joints() -> None:
+        while True:
+            for group in JOINTS:
+                bridge.publish("/tf", tf(*group))
+                await asyncio.sleep(0.005)
+
+    config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)  # type: ignore[attr-defined]
+    async with serving(config) as base, scanning(bridge), viewer(base) as one:
+        task = asyncio.create_task(joints())
+        try:
+            assert (await one.ask(kind="set", values={"recording.all_topics": all_topics}))["ok"]
+            await asyncio.sleep(6.0)  # until the topics of the car are looked at again
+            assert "assumed" in note_of(one.states[-1])
+            for yaw_rad in (math.pi, 0.5, -0.7):  # it is placed, and then it turns
+                began_s = now()
+                while f"turned by {round(abs(math.degrees(yaw_rad)))}°" not in note_of(one.states[-1]):
+                    assert now() - began_s <= 3.0
+                    bridge.publish("/tf", tf(Laser(x_m=0.5, yaw_rad=yaw_rad).transform()))
+                    await asyncio.sleep(1.0)
+        finally:
+            task.cancel()
