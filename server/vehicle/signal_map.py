@@ -9,7 +9,7 @@ from monitor.signals import SIGNALS
 from server.judge import pipeline
 from server.judge.comparisons import comparison_sources
 from server.judge.offers import offers
-from server.judge.sources.candidates import to_compare
+from server.judge.sources.candidates import follow
 from server.judge.sources.choice import Choice, choose
 from server.judge.sources.evidence import Evidence, Place
 from server.judge.topics import COMMAND, Source
@@ -38,6 +38,7 @@ class SignalMap:
         """`place`: as of `Evidence`."""
         self.sources: Mapping[str, Source] = {}  # by signal
         self.compared: tuple[Source, ...] = ()  # further topics, decoded to be compared with them
+        self.compared_topics: Mapping[str, tuple[str, ...]] = {}  # the same by signal
         self.carriers: Mapping[str, str] = {}  # signal → the topic that carries it
         self.unmapped: Mapping[str, str] = {}  # topic → type of what carries no signal
         self.offers_nothing = False  # no topic of the car can be read
@@ -60,7 +61,7 @@ class SignalMap:
         evidence, before, unpublished, delivered = (
             self._evidence, self.sources, delivery.unpublished, delivery.delivered,
         )  # fmt: skip
-        evidence.follow(to_compare(offered, picked))
+        follow(evidence, offered, picked)
         in_use = {signal: source.topic for signal, source in before.items() if source.topic in delivered}
         choice = self._choice = choose(offered, picked, unpublished, evidence, in_use)
         self.watched = {one.topic: one for found in choice.watched.values() for one in found}
@@ -83,6 +84,7 @@ class SignalMap:
         self.carriers = pipeline.carriers(self.sources.values())
         was_compared = {source.topic for source in self.compared}
         self.compared = comparison_sources(offered, self.sources, unpublished=unpublished, before=was_compared)
+        self.compared_topics = pipeline.compared(self.compared)
         mapped = {source.topic for source in self.sources.values()}
         self.unmapped = {name: kind for name, kind in offered.items() if name not in mapped}
         self.offers_nothing = not self.undecided and not any(source.decode for source in self.sources.values())
