@@ -69,6 +69,9 @@ class UnitRule:
     source: str
 
 
+_VALUES = (
+    "all values at most 1: not known; three above 1, or one above 2: 0 to 100 %; one above 100, or below 0: not known"
+)
 _PEDAL_VALUES = (
     "not known unless chosen: all values at most 1 may be of both scales, above 1 they may be 0 to 100 %, Nm or bar; "
     "in Nm or bar the pedal is not checked, for nothing says what share of it that is"
@@ -163,8 +166,8 @@ RULES: tuple[UnitRule, ...] = (
         field="data",
         units=(SHARE, PERCENT, LITRES),
         definition=None,
-        by_values=(),
-        decided="not known unless chosen: 0 to 1, 0 to 100 % and litres have values in common",
+        by_values=_OF_WHOLE,
+        decided=f"{_VALUES}; litres only by choice",
         source="the message has no unit",
     ),
 )

@@ -147,8 +147,9 @@ VALUES: dict[str, tuple[str, str, list[float], list[float | None]]] = {
     "pedal of one, one wrong value": ("brake", FLOAT, [0.9, 1.3, 0.9], [None, None, None]),
     "battery, empty": ("fuel", BATTERY, [0.0], [0.0]),
     "battery, permille": ("fuel", BATTERY, [900.0, 80.0], [None, None]),
-    "tank, percent or litres": ("fuel", FLOAT, [30.0, 0.5], [None, None]),
+    "tank, percent": ("fuel", FLOAT, [30.0, 0.5], [30.0, 0.5]),
     "tank, open": ("fuel", FLOAT, [0.5, 0.4], [None, None]),
+    "tank, open until above 1": ("fuel", FLOAT, [0.5, 3.0, 0.4], [None, 3.0, 0.4]),
     "tank, millilitres": ("fuel", FLOAT, [4000.0, 50.0], [None, None]),
     "pedal at rest": ("brake", FLOAT, [0.0, 0.0], [0.0, 0.0]),
     "pedal open": ("brake", FLOAT, [0.0, 0.3, 0.0], [0.0, None, None]),
@@ -200,7 +201,7 @@ def test_a_drive_has_the_right_unit_or_none(kind: tuple[str, str], unit: Any, pa
         decided.append(car.unit(signal) or "unknown")
     assert len(set(decided)) == 1
     if max(numbers) > SHARE.most:
-        assert decided[0] == ("percent" if type == BATTERY else "unknown")
+        assert decided[0] == ("percent" if signal == "fuel" else "unknown")
 
 
 @settings(deadline=None)
