@@ -116,6 +116,7 @@ class Comparisons:
         self._own: dict[str, SourceFollower] = {}
         self._others: dict[str, dict[str, tuple[RateMeter, SourceFollower, Other]]] = {}
         self._awaited: dict[str, dict[str, float]] = {}
+        self._came: set[tuple[str, str]] = set()  # signal and topic of what was awaited and sent anything
         self._is_awaiting = False  # `_awaited` is of the link that is open
         self._link = LinkFacts()
         self._known: Compared | None = NOTHING_COMPARED
@@ -142,7 +143,7 @@ class Comparisons:
             signal: {
                 topic: self._awaited.get(signal, {}).get(topic, since_s)
                 for topic in topics
-                if topic not in self._others.get(signal, {})
+                if topic not in self._others.get(signal, {}) and (signal, topic) not in self._came
             }
             for signal, topics in wanted.items()
         }
@@ -162,6 +163,7 @@ class Comparisons:
         """A value of a further source, None: one that cannot be used; of more than eight topics of one signal the later
         ones are left out."""
         if self._awaited.get(signal, {}).pop(topic, None) is not None:
+            self._came.add((signal, topic))
             self._known = None
         if value is None:
             return
@@ -201,6 +203,7 @@ class Comparisons:
         """The link opens: the others must come anew."""
         self._others.clear()
         self._awaited.clear()
+        self._came.clear()
         self._is_awaiting = False
         self._known = None
 

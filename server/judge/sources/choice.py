@@ -191,7 +191,7 @@ class _Chooser:
         filled = [one for one in found if not self._evidence.of(one.topic).is_twist_empty]
         undoubted = [one for one in found if not self._evidence.of(one.topic).is_empty_by_odometry]
         among = self._speed_among(filled, found) or self._speed_among(undoubted, found)
-        return among or _Open(why=self._empty([one.topic for one in found]))
+        return among or _Open(why=_empty([one.topic for one in found], self._evidence))
 
     def _speed_among(self, filled: list[Candidate], found: list[Candidate]) -> Source | _Open | None:
         own = next((one for one in filled if one.topic.lower() == OWN_NAMES["speed"]), None)
@@ -219,11 +219,6 @@ class _Chooser:
         if isinstance(result, Source) and len(found) == 1 and has_others:
             return replace(result, why="the only speed along the car")
         return result
-
-    def _empty(self, topics: Sequence[str]) -> str:
-        if len(topics) == 1:
-            return f"{topics[0]} has no speed: {self._evidence.of(topics[0]).why_empty}"
-        return f"{', '.join(topics[:3])} have no speed: they are zero while the car moves"
 
     def _is_earth_fixed(self, one: Candidate) -> bool:
         known = self._evidence.of(one.topic)
@@ -265,7 +260,7 @@ class _Chooser:
             is_published=topic not in self._unpublished,
         )
         if signal == "speed" and self._evidence.of(topic).is_empty_by_odometry:
-            return _Open(why=self._empty([topic]))
+            return _Open(why=_empty([topic], self._evidence))
         source = one.source(signal, why=PICKED)
         if signal == "speed" and self._is_earth_fixed(one):
             source = _as_way_made(source)
@@ -343,3 +338,9 @@ NO_OTHER = "nothing else could carry it"
 def _as_way_made(source: Source) -> Source:
     is_stamped = (source.type or "").endswith("TwistStamped")
     return replace(source, decode=way_made_stamped if is_stamped else way_made, note=EAST_AND_NORTH)
+
+
+def _empty(topics: Sequence[str], evidence: Evidence) -> str:
+    if len(topics) == 1:
+        return f"{topics[0]} has no speed: {evidence.of(topics[0]).why_empty}"
+    return f"{', '.join(topics[:3])} have no speed: they are zero while the car moves"

@@ -237,7 +237,9 @@ def test_an_odometry_contradicts_without_gps() -> None:
     assert alike.finding.text == "Speed 0.0 m/s by /vel, but 4.0 m/s by the poses of /vel"
 
 
-@pytest.mark.parametrize(("twist_mps", "pose_mps", "is_raised"), [(0.0, 5.0, True), (5.0, 5.0, False), (5.0, 0.0, False)])
+@pytest.mark.parametrize(
+    ("twist_mps", "pose_mps", "is_raised"), [(0.0, 5.0, True), (5.0, 5.0, False), (5.0, 0.0, False)]
+)
 def test_an_odometry_that_is_the_only_source_is_compared_with_its_own_poses(
     twist_mps: float, pose_mps: float, is_raised: bool
 ) -> None:
