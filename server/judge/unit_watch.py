@@ -98,8 +98,8 @@ class UnitWatch:
             self.has_moved = self.has_moved or abs(value.speed_mps) > MOVES_MPS
         elif kind in PLACES:
             for topic, evidence in self._speeds.items():
-                is_new = evidence.ways is not None and at_s > evidence.until_s
-                if is_new and evidence.ways.add_place(signal, value, at_s):
+                ways = evidence.ways if at_s > evidence.until_s else None
+                if ways is not None and ways.add_place(signal, value, at_s):
                     self._decide("speed", topic)  # every topic in `_speeds` carries it
 
     def convert(self, source: Source, value: Any, at_s: float, basis: UnitBasis) -> Any:
