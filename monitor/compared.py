@@ -9,7 +9,8 @@ from types import MappingProxyType
 from typing import Any
 
 from monitor.geo import offset_m
-from monitor.pace import Pace, PlaceFollower, SpeedFollower
+from monitor.link import LinkFacts
+from monitor.pace import Pace, PlaceFollower, SourceClock, SpeedFollower
 from monitor.rates import RateMeter
 from monitor.reading import Reading
 from monitor.values import GpsFix, Odometry, Twist
@@ -36,6 +37,8 @@ class Compared:
     others: Mapping[str, tuple[Other, ...]] = field(default_factory=dict)  # by signal, in the order they came
     stated: Mapping[str, Pace | None] = field(default_factory=dict)  # by the signal's own speeds
     made: Mapping[str, Pace | None] = field(default_factory=dict)  # by the signal's own places
+    # By signal: further topics of which nothing came, and since when they are awaited.
+    awaited: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def of(self, signal: str) -> tuple[Other, ...]:
         """The further sources of a signal."""
@@ -48,11 +51,12 @@ NOTHING_COMPARED = Compared()
 class SourceFollower:
     """Follows the motion that one source shows."""
 
-    __slots__ = ("_last", "_places", "_speeds", "_x_m", "_y_m")
+    __slots__ = ("_clock", "_last", "_places", "_speeds", "_x_m", "_y_m")
 
     def __init__(self) -> None:
         self._speeds: SpeedFollower | None = None
         self._places: PlaceFollower | None = None
+        self._clock = SourceClock()
         self._last: GpsFix | None = None
         self._x_m = self._y_m = 0.0
 
@@ -75,9 +79,9 @@ class SourceFollower:
         elif kind is Odometry:
             if value.speed_mps is not None:
                 self._state(reading.received_s, value.speed_mps)
-            self._place(reading, value.x_m, value.y_m, POSE_SIGMA_M)
+            self._place(self._clock.time_s(reading.received_s, reading.stamp_s), value.x_m, value.y_m, POSE_SIGMA_M)
         elif kind is GpsFix:
-            self._fix(reading, value)
+            self._fix(self._clock.time_s(reading.received_s, reading.stamp_s), value)
         return self.stated is not stated or self.made is not made
 
     def _state(self, at_s: float, mps: float) -> None:
@@ -85,29 +89,24 @@ class SourceFollower:
             self._speeds = SpeedFollower()
         self._speeds.add(at_s, mps)
 
-    def _fix(self, reading: Reading[Any], fix: GpsFix) -> None:
+    def _fix(self, at_s: float, fix: GpsFix) -> None:
         if fix.status < 0 or not (math.isfinite(fix.lat_deg) and math.isfinite(fix.lon_deg)):
             self._last = None
             if self._places is not None:
                 self._places.restart()
             return
-        if self._places is not None and not self._places.is_due(_time_s(reading)):
+        if self._places is not None and not self._places.is_due(at_s):
             return
         last, self._last = self._last, fix
         if last is not None:
             east_m, north_m = offset_m(last.lat_deg, last.lon_deg, fix.lat_deg, fix.lon_deg)
             self._x_m, self._y_m = self._x_m + east_m, self._y_m + north_m
-        self._place(reading, self._x_m, self._y_m, SIGMA_UNKNOWN_M if fix.sigma_m is None else fix.sigma_m)
+        self._place(at_s, self._x_m, self._y_m, SIGMA_UNKNOWN_M if fix.sigma_m is None else fix.sigma_m)
 
-    def _place(self, reading: Reading[Any], x_m: float, y_m: float, sigma_m: float) -> None:
+    def _place(self, at_s: float, x_m: float, y_m: float, sigma_m: float) -> None:
         if self._places is None:
             self._places = PlaceFollower()
-        self._places.add(_time_s(reading), x_m, y_m, sigma_m)
-
-
-def _time_s(reading: Reading[Any]) -> float:
-    """By the source's own stamps, since Wi-Fi bunches arrivals."""
-    return reading.received_s if reading.stamp_s is None else reading.stamp_s
+        self._places.add(at_s, x_m, y_m, sigma_m)
 
 
 class Comparisons:
@@ -116,7 +115,39 @@ class Comparisons:
     def __init__(self) -> None:
         self._own: dict[str, SourceFollower] = {}
         self._others: dict[str, dict[str, tuple[RateMeter, SourceFollower, Other]]] = {}
+        self._awaited: dict[str, dict[str, float]] = {}
+        self._came: set[tuple[str, str]] = set()  # signal and topic of what was awaited and sent anything
+        self._is_awaiting = False  # `_awaited` is of the link that is open
+        self._link = LinkFacts()
         self._known: Compared | None = NOTHING_COMPARED
+
+    def link(self, facts: LinkFacts, now_s: float) -> None:
+        """What is compared from now on. What is not any more leaves with what was known of it; so does what another
+        topic carried of a signal."""
+        before, self._link = self._link, facts
+        if facts.opened_s is not None and facts.opened_s != before.opened_s:
+            self.opened()
+        if facts.carriers is not before.carriers:
+            for signal, topic in before.carriers.items():
+                if facts.carriers.get(signal, topic) != topic:
+                    self.forget(signal)
+        wanted = facts.compared
+        if wanted is None or facts.opened_s is None or (wanted is before.compared and self._is_awaiting):
+            return
+        self._is_awaiting, since_s = True, max(now_s, facts.opened_s)
+        self._others = {
+            signal: {topic: row for topic, row in rows.items() if topic in wanted.get(signal, ())}
+            for signal, rows in self._others.items()
+        }
+        self._awaited = {
+            signal: {
+                topic: self._awaited.get(signal, {}).get(topic, since_s)
+                for topic in topics
+                if topic not in self._others.get(signal, {}) and (signal, topic) not in self._came
+            }
+            for signal, topics in wanted.items()
+        }
+        self._known = None
 
     def receive(self, signal: str, reading: Reading[Any]) -> None:
         """A reading of the signal itself."""
@@ -129,7 +160,13 @@ class Comparisons:
     def receive_other(
         self, signal: str, topic: str, value: Any, received_s: float, stamp_s: float | None, delay_s: float
     ) -> None:
-        """A value of a further source; of more than eight topics of one signal the later ones are left out."""
+        """A value of a further source, None: one that cannot be used; of more than eight topics of one signal the later
+        ones are left out."""
+        if self._awaited.get(signal, {}).pop(topic, None) is not None:
+            self._came.add((signal, topic))
+            self._known = None
+        if value is None:
+            return
         known = self._others.setdefault(signal, {})
         if topic not in known and len(known) >= MOST_OTHERS:
             return
@@ -165,6 +202,9 @@ class Comparisons:
     def opened(self) -> None:
         """The link opens: the others must come anew."""
         self._others.clear()
+        self._awaited.clear()
+        self._came.clear()
+        self._is_awaiting = False
         self._known = None
 
     @property
@@ -178,5 +218,6 @@ class Comparisons:
                 ),
                 stated=MappingProxyType({signal: one.stated for signal, one in self._own.items()}),
                 made=MappingProxyType({signal: one.made for signal, one in self._own.items()}),
+                awaited=MappingProxyType({signal: dict(topics) for signal, topics in self._awaited.items() if topics}),
             )
         return found

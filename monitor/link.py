@@ -28,6 +28,7 @@ class LinkFacts:
     last_message_s: float | None = None  # when the car last said anything
     published: frozenset[str] = frozenset()  # the signals that discovery found on the car
     carriers: Mapping[str, str] = field(default_factory=dict)  # signal → the topic that carries it
+    compared: Mapping[str, tuple[str, ...]] | None = None  # signal → further topics of it; None: not known
     undecided: Mapping[str, str] = field(
         default_factory=dict
     )  # signals that no topic carries yet, and why, in few words

@@ -15,6 +15,7 @@ LEAST = 3  # samples within the window
 FASTEST_MPS = 70.0
 LEAP_M = 5.0  # a step of more than this, and faster than any car, begins the window anew
 ERROR_SIGMAS = 3.0
+STAMPS_WITHIN = 0.7  # of the time between two arrivals, which a slow link changes by two seconds at most
 
 
 class Pace(NamedTuple):
@@ -24,6 +25,31 @@ class Pace(NamedTuple):
     changed_mps: float = 0.0  # how much the speed changed within that time; of places 0
     error_mps: float = 0.0  # what the noise of the source may make of it
     is_live: bool = True  # False: it never had another value than the first, so it may not be filled
+
+
+class SourceClock:
+    """The time of a source's messages: by its own stamps, since Wi-Fi bunches arrivals; by their arrival while
+    the stamps do not go on as time does."""
+
+    __slots__ = ("_from", "_is_by_stamp", "_received_s")
+
+    def __init__(self) -> None:
+        self._is_by_stamp = True
+        self._from: tuple[float, float] | None = None  # arrival and stamp that later ones are compared with
+        self._received_s = -math.inf
+
+    def time_s(self, received_s: float, stamp_s: float | None) -> float:
+        """The time of one message [s], on a clock that is another one where the stamps turn out to be wrong."""
+        last_s, self._received_s = self._received_s, received_s
+        if stamp_s is None:
+            return received_s
+        if self._from is None or not 0.0 <= received_s - last_s <= GAP_S:
+            self._from = received_s, stamp_s
+        span_s = received_s - self._from[0]
+        if span_s >= WINDOW_S:
+            self._is_by_stamp = abs(stamp_s - self._from[1] - span_s) <= STAMPS_WITHIN * span_s
+            self._from = received_s, stamp_s
+        return stamp_s if self._is_by_stamp else received_s
 
 
 class SpeedFollower:

@@ -35,7 +35,8 @@ def own(snapshot: Snapshot) -> Shown:
 
 
 def others(snapshot: Snapshot) -> list[Shown]:
-    """What else shows a speed, the positions first. What comes on the topic of the speed is no source of its own."""
+    """What else shows a speed, the positions first. Of the topic of the speed only its poses are a source of their
+    own."""
     found: list[Shown] = []
     carriers, compared = snapshot.link.carriers, snapshot.compared
     speed_topic = carriers.get("speed")
@@ -47,7 +48,7 @@ def others(snapshot: Snapshot) -> list[Shown]:
         found.append(_judged(f"GPS {one.topic}", one.reading, one.made, snapshot, why=why, short="no fix"))
     if (odometry := snapshot.get("odometry")) is not None:
         topic = carriers.get("odometry")
-        if topic is not None and speed_topic not in (None, topic):
+        if topic is not None and speed_topic is not None:
             found += _by_odometry(
                 topic, odometry, compared.stated.get("odometry"), compared.made.get("odometry"), snapshot
             )
@@ -55,6 +56,9 @@ def others(snapshot: Snapshot) -> list[Shown]:
         found += _by_odometry(one.topic, one.reading, one.stated, one.made, snapshot)
     for one in _beside("speed", snapshot):
         found += _live(one.topic, one.reading, one.stated, snapshot)
+    for signal in ("position", "odometry", "speed"):
+        for name in compared.awaited.get(signal, ()):
+            found.append(Shown(name, None, f"No message from {name} yet", "not sent"))
     return found
 
 
@@ -65,20 +69,22 @@ def _is_apart(signal: str, snapshot: Snapshot) -> bool:
 
 
 def _beside(signal: str, snapshot: Snapshot) -> list[Other]:
-    """The further sources of a signal, those left out that carry it now or carry the speed."""
+    """The further sources of a signal, those left out that carry it now or carry the speed; of an odometry that does,
+    the poses are another source."""
     if not snapshot.compared.others:
         return []
-    taken = {snapshot.link.carriers.get(signal), snapshot.link.carriers.get("speed")}
+    carriers = snapshot.link.carriers
+    taken = {carriers.get(signal), None if signal == "odometry" else carriers.get("speed")}
     return [one for one in snapshot.compared.of(signal) if one.topic not in taken]
 
 
 def _by_odometry(
     topic: str, reading: Reading[object], stated: Pace | None, made: Pace | None, snapshot: Snapshot
 ) -> list[Shown]:
-    return [
-        *_live(topic, reading, stated, snapshot),
-        *_live(f"the poses of {topic}", reading, made, snapshot),
-    ]
+    poses = _live(f"the poses of {topic}", reading, made, snapshot)
+    if topic == snapshot.link.carriers.get("speed"):
+        return poses
+    return [*_live(topic, reading, stated, snapshot), *poses]
 
 
 def _live(by: str, reading: Reading[object], pace: Pace | None, snapshot: Snapshot) -> list[Shown]:

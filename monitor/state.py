@@ -125,9 +125,9 @@ class State:
         return signal, name
 
     def receive_other(
-        self, signal: str, topic: str, value: Value, received_s: float, stamp_s: float | None, delay_s: float = 0.0
+        self, signal: str, topic: str, value: Value | None, received_s: float, stamp_s: float | None, delay_s: float = 0
     ) -> None:
-        """Take one decoded value of a further source of a signal, which is compared with the signal and is not it."""
+        """Take one decoded value, None: unusable, of a further source of a signal, to be compared with the signal."""
         self._derived.comparisons.receive_other(signal, topic, value, received_s, stamp_s, delay_s)
 
     def refuse(self, signal: str, reason: str, received_s: float, *, is_declared: bool = False) -> None:
@@ -169,6 +169,7 @@ class State:
     def link(self, facts: LinkFacts) -> None:
         """Set the facts of the link. A link that opens restarts the measurement of rates."""
         before, self.link_facts = self.link_facts, facts
+        self._derived.comparisons.link(facts, self._latest_s)
         if before.opened_s is not None and facts.opened_s is None:
             self._components.closed(facts.since_s)
         if facts.opened_s is not None and facts.opened_s != before.opened_s:
@@ -176,7 +177,6 @@ class State:
                 stats.restart()
             self._clock_jump = None
             self._scans = Scans()
-            self._derived.comparisons.opened()
             self._components.opened(facts.opened_s)
             self._unusable = MappingProxyType({})
 

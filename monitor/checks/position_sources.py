@@ -34,6 +34,7 @@ from monitor.snapshot import Snapshot
 from monitor.values import STATUS_UNSET, GpsFix
 
 SILENT_AFTER_S = 5.0  # and after ten of its own periods
+AWAITED_S = 10.0  # for the first message
 RECEIVED = 3  # messages make a source
 UNCERTAIN_S = 0.5  # how much later one source may be than the other
 ONE_SOURCE = absent("Only one source gives a position, so there is nothing to compare it with", brief="one source")
@@ -59,20 +60,26 @@ def _others(snapshot: Snapshot) -> list[Other]:
     return [one for one in snapshot.compared.of("position") if one.topic != carrier]
 
 
+def _awaited_s(snapshot: Snapshot) -> dict[str, float]:
+    """Other topics of which nothing came yet, and for how long."""
+    carrier, awaited = snapshot.link.carriers.get("position"), snapshot.compared.awaited.get("position", {})
+    return {topic: max(0.0, snapshot.now_s - since_s) for topic, since_s in awaited.items() if topic != carrier}
+
+
 def _why_not(snapshot: Snapshot, was_active: bool) -> Finding | None:
     """Why there is nothing to compare, None where there is."""
     if snapshot.get("position") is None and "position" not in snapshot.link.published:
         return absent("Position is not published")
-    if not _others(snapshot):
+    if not _others(snapshot) and not _awaited_s(snapshot):
         return unknown("No other source of the position sends any more", short="not sent") if was_active else ONE_SOURCE
     if snapshot.need("position").status < 0:
         return unknown("The receiver has no fix", short="no fix")
     return None
 
 
-def _is_filter_of(one: Other, carrier: str | None) -> bool:
+def _is_filter_of(topic: str, carrier: str | None) -> bool:
     """Whether, by the names, another topic is made of the one that carries the position."""
-    return FILTERED.search(one.topic) is not None and (carrier is None or FILTERED.search(carrier) is None)
+    return FILTERED.search(topic) is not None and (carrier is None or FILTERED.search(carrier) is None)
 
 
 def _silent_s(one: Other, now_s: float) -> float | None:
@@ -90,7 +97,7 @@ def receives(snapshot: Snapshot, limits: PositionLimits, was_active: bool) -> Fi
     unclear: list[str] = []
     for one in _others(snapshot):
         silent_s, status = _silent_s(one, snapshot.now_s), one.reading.value.status
-        if _is_filter_of(one, carrier) or one.reading.count < RECEIVED:
+        if _is_filter_of(one.topic, carrier) or one.reading.count < RECEIVED:
             continue
         if silent_s is not None:
             lost.append((one.topic, f"Nothing from {one.topic} for {silent_s:.0f} s"))
@@ -98,6 +105,11 @@ def receives(snapshot: Snapshot, limits: PositionLimits, was_active: bool) -> Fi
             unclear.append(f"{one.topic} does not say whether it has a fix")
         elif status < 0:
             lost.append((one.topic, f"No fix at {one.topic}"))
+    for topic, awaited_s in _awaited_s(snapshot).items():
+        if awaited_s > AWAITED_S and not _is_filter_of(topic, carrier):
+            lost.append((topic, f"Nothing from {topic} for {awaited_s:.0f} s, nor before"))
+        else:
+            unclear.append(f"No message from {topic} yet")
     if lost:
         goes_on = "the position" if carrier is None else f"the position of {carrier}"
         text = f"{'; '.join(words for _, words in lost)}; {goes_on} continues without it"
@@ -117,7 +129,7 @@ def agree(snapshot: Snapshot, limits: PositionLimits, was_active: bool) -> Findi
         return unknown("How fast the car moves is not known", short="no speed")
     apart: list[tuple[float, float, float, str]] = []
     near: list[str] = []
-    unclear: list[str] = []
+    unclear = [f"No message from {topic} yet" for topic in _awaited_s(snapshot)]
     for one in _others(snapshot):
         fix: GpsFix = one.reading.value
         if not one.reading.is_fresh(snapshot.now_s):

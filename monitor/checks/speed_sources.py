@@ -2,8 +2,9 @@
 
 Each source gives its mean over the last 3 s. How far apart they may be grows with the error that a receiver states,
 and with the change of the speed, because one source may be later than another. A position that drifts at standstill is
-the matter of `gps_drift`, one that leaps of `gps_jump`. What comes on the topic of the speed is no second source; nor
-is a speed that was never anything but 0, or a pose that never moved: its driver may not fill it.
+the matter of `gps_drift`, one that leaps of `gps_jump`. What comes on the topic of the speed is no second source, but
+for the poses of an odometry; nor is a speed that was never anything but 0, or a pose that never moved: its driver may
+not fill it.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from server.judge import profiles
 from server.judge.reception_stats import Reception
 from server.judge.settings import Settings
 from server.judge.signals import TOPICS
-from server.judge.sources.candidates import to_compare
+from server.judge.sources.candidates import follow
 from server.judge.sources.choice import Choice, choose
 from server.judge.sources.evidence import Evidence
 from server.judge.topics import BY_SIGNAL, Source
@@ -177,7 +177,7 @@ async def _discover_and_report(
     ear.by_topic = {}
     for source in (*choice.sources.values(), *(one for found in choice.watched.values() for one in found)):
         ear.by_topic[source.topic] = (*ear.by_topic.get(source.topic, ()), source)
-    ear.evidence.follow(to_compare(offer.topics, {}))
+    follow(ear.evidence, offer.topics, {})
     for topic, kind in offer.topics.items():
         mapped = [source for source in ear.by_topic.get(topic, ()) if source.decode is not None]
         cbor = any(BY_SIGNAL[source.signal].compression == "cbor" for source in mapped)

@@ -12,7 +12,8 @@ from server.judge.plausible import FASTEST_KMH, plausible_speed
 from server.judge.signals.odometry import odometry
 from server.judge.signals.position import nav_sat_fix
 from server.judge.sources.candidates import cars_of, pools_of
-from server.judge.sources.namespaces import namespace_of
+from server.judge.sources.motion import is_lost
+from server.judge.sources.namespaces import is_of_another_robot, namespace_of
 from server.judge.topic import Decode
 from server.judge.topics import BY_SIGNAL, Source, plain_type
 
@@ -20,9 +21,6 @@ MOST = 4  # further topics of one signal
 FIX, ODOMETRY = "sensor_msgs/NavSatFix", "nav_msgs/Odometry"
 TWISTS = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
 VELOCITY_OF_A_RECEIVER = "vel"  # beside its NavSatFix, as the drivers of receivers name it
-OF_A_ROBOT = frozenset({FIX, ODOMETRY, "sensor_msgs/LaserScan", "sensor_msgs/Imu"})
-ALIKE = 2  # so many kinds of topics that two namespaces have alike make them two robots
-LOST_M2 = 1000.0  # the covariance by which an odometry declares itself lost
 
 
 def size_of_twist(message: Any) -> Twist:
@@ -35,12 +33,8 @@ def size_of_twist(message: Any) -> Twist:
 
 def odometry_that_is_not_lost(message: Any) -> Odometry:
     """Raises NotMeasured where the covariance of the pose says that nothing is known of it."""
-    covariance = inner(message, "pose").get("covariance")
-    try:
-        if number({"covariance": covariance[0]}, "covariance") > LOST_M2:
-            raise NotMeasured("lost")
-    except (TypeError, KeyError, IndexError):
-        pass
+    if is_lost(inner(message, "pose")):
+        raise NotMeasured("lost")
     return odometry(message)
 
 
@@ -63,14 +57,16 @@ def comparison_sources(
         carrier = sources.get(signal)
         if carrier is None or carrier.decode is None:
             continue
-        taken = {carrier.topic, _topic(sources, "command"), _topic(sources, "speed")}
+        taken = {carrier.topic, _topic(sources, "command")}
+        if signal != "odometry":  # the poses of an odometry are another source than its twist
+            taken.add(_topic(sources, "speed"))
         topics = [
             topic
             for topic, kind in usable.items()
             if topic not in taken
             and is_fit(topic, kind)
             and namespace_of(topic, cars) in (None, namespace_of(carrier.topic, cars))
-            and not _is_of_another_robot(topic, carrier.topic, usable)
+            and not is_of_another_robot(topic, carrier.topic, usable)
         ]
         own = _folder(carrier.topic)
         order = sorted((topic not in before, _folder(topic) != own, topic) for topic in topics)
@@ -107,22 +103,3 @@ def _topic(sources: Mapping[str, Source], signal: str) -> str | None:
 
 def _folder(topic: str) -> str:
     return topic.rpartition("/")[0]
-
-
-def _root(topic: str) -> str:
-    """The first part of a name with more than one, else nothing."""
-    first, _, rest = topic.lstrip("/").partition("/")
-    return first if rest else ""
-
-
-def _is_of_another_robot(topic: str, carrier: str, usable: Mapping[str, str]) -> bool:
-    """Whether the namespaces of two topics hold several kinds of topics under the same names; names without one are
-    alike."""
-    one, other = _root(topic), _root(carrier)
-    if one == other:
-        return False
-    below_one, below_other = (
-        {(name.lstrip("/")[len(root) :].lstrip("/"), kind) for name, kind in usable.items() if _root(name) == root}
-        for root in (one, other)
-    )
-    return len({kind for _, kind in below_one & below_other if kind in OF_A_ROBOT}) >= ALIKE

@@ -18,7 +18,7 @@ from server.judge.ros_names import BadName, canonical_name
 from server.judge.settings import BadSetting
 from server.judge.settings_override import NO_CHOICES, SettingsOverride, recorded_override, tuning_for
 from server.judge.sources import survey as source_survey
-from server.judge.sources.candidates import to_compare
+from server.judge.sources.candidates import follow
 from server.judge.sources.choice import Choice, choose
 from server.judge.sources.evidence import Evidence
 from server.judge.stamp_steps import ClockStep
@@ -86,6 +86,7 @@ class SettingsEpoch:
     choice: Choice
     listeners: Mapping[str, tuple[Source, ...]]  # by topic as the recording spells it
     carriers: Mapping[str, str]  # signal → the topic that carries it
+    compared: Mapping[str, tuple[str, ...]]  # signal → further topics of it
     competing: frozenset[str] = frozenset()  # topics as the recording spells them, of signals that none carries yet
 
     @property
@@ -226,16 +227,20 @@ class Drive:
             choice=choice,
             listeners=listeners,
             carriers=pipeline.carriers(choice.sources.values()),
+            compared=pipeline.compared(source for sources in by_topic.values() for source in sources),
             competing=frozenset(topic for topic, name in self._names.items() if name in choice.competing),
         )
 
     def _evidence_for(self, picked: Mapping[str, str]) -> Evidence | None:
         """What the recording shows of the topics that compete for a signal; read once, and only where some do."""
-        if self.evidence is None and to_compare(self.offered, picked):
+        if self.evidence is None:
+            evidence, found = Evidence(self._transforms.looks_ahead), self._source.topics
             # Of all that could compete: with the next settings others may.
-            topics, found = to_compare(self.offered, {}) | to_compare(self.offered, picked), self._source.topics
-            silent = [name for topic, name in self._names.items() if getattr(found[topic], "count", 1) == 0]
-            self.evidence = source_survey.survey(
-                self._source, self._names, topics, silent, self._transforms.looks_ahead
+            follow(evidence, self.offered, {})
+            follow(evidence, self.offered, picked)
+            evidence.silent = frozenset(
+                name for topic, name in self._names.items() if getattr(found[topic], "count", 1) == 0
             )
+            if evidence.is_to_gather:
+                self.evidence = source_survey.survey(self._source, self._names, evidence)
         return self.evidence

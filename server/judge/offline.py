@@ -327,6 +327,7 @@ def _link(drive: Drive, epoch: SettingsEpoch, run_state: RunState, now_s: float)
         last_message_s=run_state.last_message_s,
         published=epoch.published,
         carriers=epoch.carriers,
+        compared=epoch.compared,
         undecided=epoch.undecided,
         wall_zero_s=None if drive.clock_steps else drive.start_s,  # one that was set proves nothing
     )

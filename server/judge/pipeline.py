@@ -50,6 +50,15 @@ def carriers(sources: Iterable[Source]) -> dict[str, str]:
     return {source.signal: source.topic for source in sources if source.decode is not None and source.carries}
 
 
+def compared(sources: Iterable[Source]) -> dict[str, tuple[str, ...]]:
+    """Signal → the further topics that are compared with it."""
+    found: dict[str, tuple[str, ...]] = {}
+    for source in sources:
+        if not source.carries:
+            found[source.signal] = (*found.get(source.signal, ()), source.topic)
+    return found
+
+
 def receive(
     sources: tuple[Source, ...],
     message: Any,
@@ -88,8 +97,8 @@ def receive(
             return ()
     for source in sources:
         if not source.carries:
-            if (other := reception.read_other(source, message, at_s, profile)) is not None:
-                state.receive_other(source.signal, source.topic, other, at_s, steady_s, delay_s)
+            other = reception.read_other(source, message, at_s, profile)
+            state.receive_other(source.signal, source.topic, other, at_s, steady_s, delay_s)
             continue
         value = reception.read(source, message, note)
         if value is not None and source.signal in UNITS:

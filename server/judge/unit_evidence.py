@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 
@@ -30,6 +31,7 @@ class Evidence:
     beyond: dict[str, int] = field(default_factory=dict)  # unit → values that it does not allow
     ways: Ways | None = None  # of a speed
     is_whole: bool = False  # all values of the drive are in it: nothing is added
+    until_s: float = -math.inf  # all values until then are in it; seconds since the beginning of the recording
     alternates: bool = False
     _last: float = 0.0
     _steps: deque[bool] = field(default_factory=lambda: deque(maxlen=PAIRS))
@@ -129,7 +131,8 @@ def _by_way(rule: UnitRule, evidence: Evidence, known: Unit | None, by: str) -> 
 
 
 def _is_beyond(unit: Unit, evidence: Evidence) -> bool:
-    return max(-evidence.lowest, evidence.highest) > unit.most
+    size = max(-evidence.lowest, evidence.highest)
+    return size > unit.most or size <= unit.above
 
 
 def _is_clearly_beyond(unit: Unit, evidence: Evidence) -> bool:

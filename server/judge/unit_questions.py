@@ -6,9 +6,11 @@ from collections.abc import Mapping
 
 from monitor.signals import SIGNALS
 from server.judge.topics import Source
-from server.judge.unit_watch import UnitWatch
+from server.judge.unit_watch import UnitWatch, cannot_convert
 from server.judge.units import Unit
 from server.protocol.questions import Question
+
+NOT_EVALUATED = "It is not evaluated."
 
 
 def unit_questions(units: UnitWatch, sources: Mapping[str, Source], chosen: Mapping[str, str]) -> tuple[Question, ...]:
@@ -39,9 +41,11 @@ def unit_sentences(units: UnitWatch, sources: Mapping[str, Source]) -> list[str]
     found = []
     for signal, source in sources.items():
         decision = units.decision(signal, source.topic)
+        if decision is not None and decision.unit is not None and not decision.unit.converts:
+            found.append(f"{SIGNALS[signal].label} ({source.topic}): {cannot_convert(decision.unit)}. {NOT_EVALUATED}")
         if decision is None or decision.unit is not None or decision.is_rest:
             continue
-        words = f"{SIGNALS[signal].label} ({source.topic}): {decision.why}. It is not evaluated."
+        words = f"{SIGNALS[signal].label} ({source.topic}): {decision.why}. {NOT_EVALUATED}"
         if signal in asked:
             names = " or ".join(f'"{unit.name}"' for unit in decision.fits)
             words += f" Choose it in the file for --settings: [units] {signal} = {names}."

@@ -5,6 +5,7 @@ A decision then does not depend on where a replay begins.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -51,6 +52,13 @@ class _Target:
     evidence: Evidence
 
 
+@dataclass(slots=True)
+class _Progress:
+    """How far a recording was read."""
+
+    until_s: float = -math.inf  # since its beginning
+
+
 def survey(recording: Rows, epochs: Sequence[Surveyed]) -> dict[Key, Evidence]:
     """The evidence of the whole drive, by signal and topic as a bridge spells it; nothing is read where nothing is in
     doubt. What cannot be read ends it: the run that follows reports that."""
@@ -63,15 +71,18 @@ def survey(recording: Rows, epochs: Sequence[Surveyed]) -> dict[Key, Evidence]:
     if is_short and not references:
         return {}
     counted = dict(recording.rejected)
-    is_over = False
+    is_over, progress = False, _Progress()
     with suppress(Exception):
-        is_over = _read(recording, targets, references, speeds, MOST_FOR_SPEED if is_short else MOST_VALUES, is_short)
+        is_over = _read(
+            recording, targets, references, speeds, MOST_FOR_SPEED if is_short else MOST_VALUES, is_short, progress
+        )
     recording.rejected.clear()
     recording.rejected.update(counted)  # they are counted when they are judged
     found = {}
     for rows in targets.values():
         for target in rows:
             target.evidence.is_whole = is_over
+            target.evidence.until_s = progress.until_s
             found[target.source.signal, target.source.topic] = target.evidence
     return found
 
@@ -114,6 +125,7 @@ def _read(
     speeds: Sequence[_Target],
     most: int,
     is_short: bool,
+    progress: _Progress,
 ) -> bool:
     """Whether everything was read."""
     taken = 0
@@ -127,7 +139,7 @@ def _read(
         taken += 1
         if taken > most:
             return False
-        at_s = row_s - recording.start_s
+        at_s = progress.until_s = row_s - recording.start_s
         for target in here:
             number = number_of(read(target.source, message))
             if number is not None:

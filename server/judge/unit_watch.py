@@ -98,7 +98,8 @@ class UnitWatch:
             self.has_moved = self.has_moved or abs(value.speed_mps) > MOVES_MPS
         elif kind in PLACES:
             for topic, evidence in self._speeds.items():
-                if evidence.ways is not None and evidence.ways.add_place(signal, value, at_s):
+                ways = evidence.ways if at_s > evidence.until_s else None
+                if ways is not None and ways.add_place(signal, value, at_s):
                     self._decide("speed", topic)  # every topic in `_speeds` carries it
 
     def convert(self, source: Source, value: Any, at_s: float, basis: UnitBasis) -> Any:
@@ -119,12 +120,14 @@ class UnitWatch:
             watched.profiled = basis.unit_of(source.signal)
             self._decide(*key)
         number, evidence = get(value), watched.evidence
-        if evidence.add(number, watched.rule.units):
-            self._decide(*key)
-        if evidence.ways is not None and not evidence.is_whole:
-            evidence.ways.add_speed(number, at_s)
+        if at_s > evidence.until_s:
+            if evidence.add(number, watched.rule.units):
+                self._decide(*key)
+            if evidence.ways is not None and not evidence.is_whole:
+                evidence.ways.add_speed(number, at_s)
         decision = watched.decision
-        if (decision.unit is None and not decision.is_rest) or (self._voided and key in self._voided):
+        has_none = not decision.is_rest if decision.unit is None else not decision.unit.converts
+        if has_none or (self._voided and key in self._voided):
             self._voided.discard(key)
             self.is_void = source.carries
         return self._in_unit(value, number, watched, basis)
@@ -156,6 +159,8 @@ class UnitWatch:
         unit, why = found.decision.unit, found.decision.why
         if unit is None:
             return None if found.decision.is_rest else why
+        if not unit.converts:
+            return cannot_convert(unit)
         if found.void is not None:
             return f"published in {unit.label}, {why}; {found.void}"
         is_usual = unit == found.rule.definition or why.startswith("as this kind")
@@ -194,6 +199,8 @@ class UnitWatch:
         if unit is None and not is_rest:
             raise UnitUnknown(watched.decision.why)
         if unit is not None:
+            if not unit.converts:
+                raise UnitUnknown(cannot_convert(unit))
             if not watched.rule.by_way and abs(number) > unit.most:
                 raise Rejected(f"a value beyond {unit.label}")
             if not is_rest:
@@ -208,6 +215,11 @@ class UnitWatch:
                 raise Rejected(TOO_FAST)
             return value if factor == 1.0 else replace(value, speed_mps=number * factor)
         return value if factor == 1.0 else Effort(percent=number * factor)
+
+
+def cannot_convert(unit: Unit) -> str:
+    """Why a value of a known unit is not evaluated."""
+    return f"in {unit.label}, which cannot be converted to %"
 
 
 def _steered(number: float, unit: Unit | None, basis: UnitBasis) -> Steering:

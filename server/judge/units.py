@@ -20,10 +20,14 @@ class Unit:
     label: str  # as the operator reads it
     factor: float | None  # to the unit of `monitor.signals`; None: follows from the kind of car
     most: float  # a number beyond, of either sign, is not of this unit; noise is allowed for
+    above: float = 0.0  # it is not offered while no number is beyond this
+    converts: bool = True  # False: nothing that is known of a car turns it into the unit of `monitor.signals`
 
 
 SHARE = Unit(name="share", label="0 to 1", factor=100.0, most=1.05)
 PERCENT = Unit(name="percent", label="0 to 100 %", factor=1.0, most=105.0)
+NEWTON_METRES = Unit(name="nm", label="Nm", factor=None, most=100_000.0, above=1.05, converts=False)
+BAR = Unit(name="bar", label="bar", factor=None, most=1_000.0, above=1.05, converts=False)
 LITRES = Unit(name="litres", label="litres", factor=1.0, most=10_000.0)
 MPS = Unit(name="mps", label="m/s", factor=1.0, most=FASTEST_MPS)
 KMH = Unit(name="kmh", label="km/h", factor=1 / 3.6, most=FASTEST_KMH)
@@ -36,7 +40,8 @@ BY_RATIO = Unit(
     name="ratio", label="the unit of the setting *Tyre angle per unit of steering*", factor=None, most=10_000.0
 )  # a setting
 
-_PEDAL = (SHARE, PERCENT)
+_OF_WHOLE = (SHARE, PERCENT)
+_PEDAL = (SHARE, PERCENT, NEWTON_METRES, BAR)
 _STEERING = (STEERING_PERCENT, TYRE_RAD, TYRE_DEG, WHEEL_RAD, WHEEL_DEG)
 
 UNITS: Mapping[str, tuple[Unit, ...]] = {
@@ -66,6 +71,10 @@ class UnitRule:
 
 _VALUES = (
     "all values at most 1: not known; three above 1, or one above 2: 0 to 100 %; one above 100, or below 0: not known"
+)
+_PEDAL_VALUES = (
+    "not known unless chosen: all values at most 1 may be of both scales, above 1 they may be 0 to 100 %, Nm or bar; "
+    "in Nm or bar the pedal is not checked, for nothing says what share of it that is"
 )
 _WAY = (
     "m/s; km/h where the way that follows from it is 3.6 times (±10 %) that of the odometry's pose or the receiver's "
@@ -103,8 +112,8 @@ RULES: tuple[UnitRule, ...] = (
         field="force.x",
         units=_PEDAL,
         definition=None,
-        by_values=_PEDAL,
-        decided=f"CATVehicle: 0 to 100 %; any other car: {_VALUES}",
+        by_values=(),
+        decided=f"CATVehicle: 0 to 100 %; any other car: {_PEDAL_VALUES}",
         source="profile of the CATVehicle; newton by geometry_msgs/Wrench, which no pedal has",
     ),
     UnitRule(
@@ -113,8 +122,8 @@ RULES: tuple[UnitRule, ...] = (
         field="data",
         units=_PEDAL,
         definition=None,
-        by_values=_PEDAL,
-        decided=_VALUES,
+        by_values=(),
+        decided=_PEDAL_VALUES,
         source="the message has no unit",
     ),
     UnitRule(
@@ -123,10 +132,9 @@ RULES: tuple[UnitRule, ...] = (
         field="torque.z",
         units=_STEERING,
         definition=None,
-        by_values=(TYRE_RAD, STEERING_PERCENT),
+        by_values=(),
         is_signed=True,
-        decided="CATVehicle: percent; its simulator: rad; any other car: not known while all values are within ±1.2, "
-        "then percent; one beyond ±100: not known",
+        decided="CATVehicle: percent; its simulator: rad; any other car: not known unless chosen",
         source="profiles of the CATVehicle, whose message it is",
     ),
     UnitRule(
@@ -145,9 +153,9 @@ RULES: tuple[UnitRule, ...] = (
         signals=("fuel",),
         types=("sensor_msgs/BatteryState",),
         field="percentage",
-        units=_PEDAL,
+        units=_OF_WHOLE,
         definition=SHARE,
-        by_values=_PEDAL,
+        by_values=_OF_WHOLE,
         decided="0 to 1; 0 to 100 % as soon as three values are above 1, or one above 2, also for values below 1; one "
         "above 100: not known",
         source="sensor_msgs/BatteryState: charge percentage on 0 to 1 range",
@@ -158,7 +166,7 @@ RULES: tuple[UnitRule, ...] = (
         field="data",
         units=(SHARE, PERCENT, LITRES),
         definition=None,
-        by_values=_PEDAL,
+        by_values=_OF_WHOLE,
         decided=f"{_VALUES}; litres only by choice",
         source="the message has no unit",
     ),

@@ -140,9 +140,9 @@ class CommandHandler:
                 return {"ok": True}
             case "signals":
                 topics = parts.connection.subscriptions
-                offered = topics.offered
-                candidates = None if offered is None else topics.signals.candidates(offered)
-                return queries.signals(candidates, topics.signals.unmapped, judgement.reception)
+                return queries.signals(
+                    topics.signals.candidates(topics.offered), topics.signals.unmapped, judgement.reception
+                )
             case "settings":
                 return {**parts.settings.as_json(), "toml": parts.settings.as_toml()}
             case "check":

@@ -44,6 +44,7 @@ def link_facts(parts: SessionParts, now_s: float, *, wall_ms: int, log_trouble: 
         last_message_s=judgement.last_message_s,
         published=topics.published(),
         carriers=topics.signals.carriers,
+        compared=topics.signals.compared_topics,
         undecided=topics.signals.undecided,
         log_trouble=log_trouble,
         late_s=judgement.transport.late_s(now_s) if connection.phase == "monitoring" else None,

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 from monitor.signals import SIGNALS
 from server.judge import pipeline
 from server.judge.comparisons import comparison_sources
 from server.judge.offers import offers
-from server.judge.sources.candidates import to_compare
+from server.judge.sources.candidates import follow
 from server.judge.sources.choice import Choice, choose
 from server.judge.sources.evidence import Evidence, Place
 from server.judge.topics import COMMAND, Source
 from server.protocol.questions import Question
 from server.protocol.topic_offer import TopicOffer
+from server.vehicle.by_name import NOTE, TopicsByName
 
 SEEN_S, SETTLED_S = 1.0, 2.0  # with messages of all candidates, or without, the operator is not asked before
 
@@ -38,12 +40,15 @@ class SignalMap:
         """`place`: as of `Evidence`."""
         self.sources: Mapping[str, Source] = {}  # by signal
         self.compared: tuple[Source, ...] = ()  # further topics, decoded to be compared with them
+        self.compared_topics: Mapping[str, tuple[str, ...]] = {}  # the same by signal
         self.carriers: Mapping[str, str] = {}  # signal → the topic that carries it
         self.unmapped: Mapping[str, str] = {}  # topic → type of what carries no signal
         self.offers_nothing = False  # no topic of the car can be read
         self.undecided: Mapping[str, str] = {}  # signal → why none of its topics carries it
         self.questions: Sequence[Question] = ()
         self.watched: Mapping[str, Source] = {}  # topic → what it may carry, of signals that none carries yet
+        self.by_name: TopicsByName | None = None  # of a bridge that does not name its topics
+        self._picked: Mapping[str, str] = {}
         self._evidence = Evidence(place)
         self._choice: Choice | None = None
         self._compared_since_s: float | None = None
@@ -60,7 +65,7 @@ class SignalMap:
         evidence, before, unpublished, delivered = (
             self._evidence, self.sources, delivery.unpublished, delivery.delivered,
         )  # fmt: skip
-        evidence.follow(to_compare(offered, picked))
+        follow(evidence, offered, picked)
         in_use = {signal: source.topic for signal, source in before.items() if source.topic in delivered}
         choice = self._choice = choose(offered, picked, unpublished, evidence, in_use)
         self.watched = {one.topic: one for found in choice.watched.values() for one in found}
@@ -83,9 +88,21 @@ class SignalMap:
         self.carriers = pipeline.carriers(self.sources.values())
         was_compared = {source.topic for source in self.compared}
         self.compared = comparison_sources(offered, self.sources, unpublished=unpublished, before=was_compared)
+        self.compared_topics = pipeline.compared(self.compared)
         mapped = {source.topic for source in self.sources.values()}
         self.unmapped = {name: kind for name, kind in offered.items() if name not in mapped}
         self.offers_nothing = not self.undecided and not any(source.decode for source in self.sources.values())
+
+    def update_by_name(self, picked: Mapping[str, str], delivery: Delivers, now_s: float) -> Mapping[str, str]:
+        """The same of a bridge that does not name its topics: of those of which messages came, topic → type."""
+        by_name = self.by_name = self.by_name or TopicsByName()
+        self._picked = picked
+        offered = by_name.offered(now_s)
+        if offered is not None:
+            self.update(offered, picked, delivery, now_s)
+            self.sources = {signal: replace(one, note=one.note or NOTE) for signal, one in self.sources.items()}
+        self.watched = {**by_name.beside({one.topic: one for one in self.decoded}), **self.watched}
+        return by_name.found
 
     def _settle(self, now_s: float) -> bool:
         """Whether the candidates have shown themselves only now, as far as they will before the operator is asked."""
@@ -101,6 +118,8 @@ class SignalMap:
 
     def is_due(self, now_s: float) -> bool:
         """Whether candidates had their time, so that `update` may decide otherwise."""
+        if self.by_name is not None and self.by_name.is_due(now_s):
+            return True
         return not self._evidence.is_settled and self._had_their_time(now_s)
 
     def _had_their_time(self, now_s: float) -> bool:
@@ -110,10 +129,17 @@ class SignalMap:
 
     def compare(self, topic: str, message: Any, now_s: float) -> bool:
         """Takes a message of any topic as evidence; whether `update` may decide otherwise by it."""
-        return self._evidence.receive(topic, message, now_s)
+        is_new = self.by_name is not None and self.by_name.receive(topic, message, self._picked, now_s)
+        if self.by_name is not None and topic not in self.watched:
+            self.watched = {**self.by_name.beside({one.topic: one for one in self.decoded}), **self.watched}
+        return self._evidence.receive(topic, message, now_s) or is_new
 
-    def candidates(self, offered: Mapping[str, str]) -> dict[str, list[TopicOffer]]:
-        """Signal → the topics that can carry it, with what is known of each."""
+    def candidates(self, offered: Mapping[str, str] | None) -> dict[str, list[TopicOffer]] | None:
+        """Signal → the topics that can carry it, with what is known of each; None: not known."""
+        if offered is None:
+            if self.by_name is None:
+                return None
+            offered = self.by_name.found
         return offers(offered, {} if self._choice is None else self._choice.reasons, self._evidence)
 
     @property

@@ -265,7 +265,9 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
 
 def _is_unit_known(facts: Facts, source: Source) -> bool:
     decision = facts.reception.units.decision(source.signal, source.topic)
-    return decision is None or decision.unit is not None or decision.is_rest
+    if decision is None or decision.unit is None:
+        return decision is None or decision.is_rest
+    return decision.unit.converts
 
 
 def _scan_note(source: Source | None, snapshot: Snapshot) -> str | None:

@@ -131,13 +131,12 @@ class SubscriptionTable:
             if topic not in wanted
         }
 
-    def subscribe_by_name(self, picked: Mapping[str, str]) -> Mapping[str, tuple[Source, ...]]:
-        """Without rosapi, by the names that are known; the signals that each topic would fill."""
-        by_topic, wanted = wanted_topics.by_name(picked, self.load)
-        self.judged = len(by_topic)
+    def subscribe_by_name(self, picked: Mapping[str, str]) -> None:
+        """Without rosapi, by the names that are known and those that the operator picked."""
+        wanted = wanted_topics.by_name(picked, self.load)
+        self.judged = len(wanted)
         button = Subscription(topic=car_marks.TOPIC, type=None, queue_length=10)
-        self._apply({**wanted, button.topic: button}, [*by_topic], [button.topic])
-        return by_topic
+        self._apply({**wanted, button.topic: button}, [*wanted], [button.topic])
 
     def renew_by_name(self) -> None:
         """A bridge drops a subscription without a type if the topic has no publisher yet."""

@@ -53,7 +53,7 @@ class Subscriptions:
         self._recognised = recognised
         self._noted = noted
         self._offer: discovery.Offer | None = None
-        self._looked = self._look_soon = False
+        self._look_soon = False
         self._unfit: str | None = None  # why the car's button does not mark
         self._definitions = TypeDefinitions(learned, self._subscribe)
         self._missing = MissingWatch(
@@ -135,8 +135,8 @@ class Subscriptions:
         )
 
     def type_of(self, topic: str) -> str | None:
-        """The type of a topic that is subscribed to, as the bridge spells it; None: not known."""
-        sources, offered = self.by_topic.get(topic), (self.offered or {}).get(topic)
+        """The type of a topic that is subscribed to, as the bridge spells it; None: it does not say."""
+        sources, offered = self.by_topic.get(topic) if self._offer else None, (self.offered or {}).get(topic)
         return self.others.get(topic) or (sources[0].type if sources else offered or None)
 
     def problem(self, now_s: float, *, flows: bool) -> Problem | None:
@@ -170,10 +170,8 @@ class Subscriptions:
 
     def map_again(self) -> None:
         """After a change of settings, of what is published or shown, or of what the link bears."""
-        if self._offer is not None:
-            self._map(self._offer)
-        elif self._link is not None and self.by_topic:
-            self._subscribe_by_name()
+        if self._offer is not None or self.signals.by_name is not None:
+            self._map()
 
     # -- what came ---------------------------------------------------------------------------------------------------
 
@@ -234,43 +232,46 @@ class Subscriptions:
         if link is not self._link:
             return
         if offer is None:
-            if not self._looked and not self.signals.sources:
-                self._subscribe_by_name()  # no rosapi: try the names we know
-            elif self._offer is None:
+            if self._offer is None:
+                self._map()  # no rosapi: try the names we know
                 self.table.renew_by_name()
             else:
                 self._learn(asks, self._offer)  # rosapi may have ended since it named them
             return
-        self._looked = True
+        self.signals.by_name = None
         self._proved()
         self.ros_version = offer.ros or self.ros_version
         self._offer = offer
         if self._tuning.recognise(offer.topics, offer.ros):
             self._recognised(self._tuning.profile.title)
-        self._map(offer)
+        self._map()
         self._learn(asks, offer)
 
     def _learn(self, asks: Asks, offer: discovery.Offer) -> None:
         if self.table.also != "none":
             self._definitions.learn(asks, offer.topics, self.ros_version)
 
-    def _map(self, offer: discovery.Offer) -> None:
-        """Chooses the topic of each signal and subscribes to them."""
-        self.signals.update(offer.topics, self._tuning.settings.topics, self._missing.delivery, self._now())
+    def _map(self) -> None:
+        """Chooses the topic of each signal and subscribes to them; without rosapi of those of which messages come."""
+        offer, known = self._offer, (self._tuning.settings.topics, self._missing.delivery, self._now())
+        if offer is None:
+            if self._tuning.recognise(self.signals.update_by_name(*known), None):
+                self._recognised(self._tuning.profile.title)
+            return self._subscribe()
+        self.signals.update(offer.topics, *known)
         self._subscribe()
         before, self._unfit = self._unfit, car_marks.unfit(offer.topics.get(car_marks.TOPIC))
         if self._unfit not in (None, before):
             self._noted(self._unfit)
 
     def _subscribe(self) -> None:
-        if self._link is not None:
-            self.by_topic = pipeline.by_topic(self.signals.decoded)
+        self.by_topic = pipeline.by_topic(self.signals.decoded)
+        if self.signals.by_name is not None:
+            self.table.subscribe_by_name(self._tuning.settings.topics)
+        elif self._link is not None:
             needs, watched = self._missing.needs_client_count, self.signals.watched
             self.table.subscribe(self.by_topic, self.offered, needs_client_count=needs, watched=watched)
 
     def _subscribe_anew(self, topic: str) -> None:
         if self.table.renew(topic):
             self._subscribe()
-
-    def _subscribe_by_name(self) -> None:
-        self.by_topic = self.table.subscribe_by_name(self._tuning.settings.topics)

@@ -110,24 +110,16 @@ def rows_of(found: Recorded, *, fit: Collection[str], compression: Compression) 
     }
 
 
-def by_name(picked: Mapping[str, str], load: LinkLoad) -> tuple[dict[str, tuple[Source, ...]], dict[str, Subscription]]:
-    """Without rosapi: what the operator picked, else every name of the table, its type left to the bridge."""
-    by_topic: dict[str, tuple[Source, ...]] = {}
+def by_name(picked: Mapping[str, str], load: LinkLoad) -> dict[str, Subscription]:
+    """Without rosapi: what the operator picked, and every name of the table, its type left to the bridge."""
     wanted: dict[str, Subscription] = {}
     for row in TOPICS:
-        for name in (picked[row.signal],) if row.signal in picked else row.names:
-            source = Source(
-                signal=row.signal,
-                topic=name,
-                type=None,
-                decode=row.types[row.expected_type],
-                note="subscribed by name: the bridge has no rosapi",
-            )
-            by_topic[name] = (*by_topic.get(name, ()), source)
+        for name in (*row.names, *((picked[row.signal],) if row.signal in picked else ())):
+            before = wanted.get(name)
             wanted[name] = Subscription(
                 topic=name,
                 type=None,
-                throttle_ms=load.throttle_ms(row.signal),
+                throttle_ms=min(load.throttle_ms(row.signal), before.throttle_ms if before else 10_000),
                 queue_length=1 if load.step else row.queue_length,
             )
-    return by_topic, wanted
+    return wanted

@@ -91,23 +91,28 @@ def pedals(folder: Path, numbers: list[float]) -> Path:
     return write_ros1(folder / "pedals.bag", Drive(messages=rows))
 
 
-OTHERS: dict[str, tuple[list[float], str | None]] = {
-    "percent": ([0.0] * 40 + [0.4, 0.8] + [60.0] * 80, None),
-    "percent, late": ([0.5] * 100 + [60.0] * 60, None),
-    "newton metres": ([0.0] * 40 + [60.0] * 60 + [220.0] * 60, "values beyond 0 to 1 and 0 to 100 %"),
+OTHERS: dict[str, tuple[list[float], str]] = {
+    "percent, Nm or bar": ([0.0] * 40 + [0.4, 0.8] + [60.0] * 80, "0 to 100 % or Nm or bar"),
+    "the same, late": ([0.5] * 100 + [60.0] * 60, "0 to 100 % or Nm or bar"),
+    "newton metres": ([0.0] * 40 + [60.0] * 60 + [220.0] * 60, "Nm or bar"),
     "two publishers": ([0.3, 30.0] * 80, "values of two units alternate, as of two publishers on one topic"),
     "below zero": ([-1.0, 1.0] * 60, "values below zero"),
 }
 
 
 @pytest.mark.parametrize(("numbers", "why"), OTHERS.values(), ids=OTHERS)
-def test_other_units_of_pedals(tmp_path: Path, numbers: list[float], why: str | None) -> None:
+def test_other_units_of_pedals(tmp_path: Path, numbers: list[float], why: str) -> None:
     report = judged(pedals(tmp_path, numbers))
-    if why is None:
-        assert "pedals" in raised(report)
-    else:
-        assert "pedals" not in raised(report)
-        assert never_checked(report)["pedals"] == f"Brake: unit unknown: {why}"
+    assert "pedals" not in raised(report)
+    assert never_checked(report)["pedals"] == f"Brake: unit unknown: {why}"
+
+
+def test_a_brake_in_nm_is_not_checked_and_the_report_names_the_reason(tmp_path: Path) -> None:
+    report = checked(pedals(tmp_path, [0.0] * 40 + [60.0] * 80), brake="nm", accelerator="percent")
+    reason = "in Nm, which cannot be converted to %"
+    assert "pedals" not in raised(report)
+    assert never_checked(report)["pedals"] == f"Brake: {reason}"
+    assert f"Brake (/brake): {reason}. It is not evaluated." in summary.text(report)
 
 
 def test_pedals_that_rest_are_checked(tmp_path: Path) -> None:
@@ -137,6 +142,10 @@ def test_an_export_has_the_numbers_and_says_that_their_unit_is_unknown(bag: Path
 
 
 def test_an_export_in_a_decided_unit_is_in_the_unit_of_the_signal(tmp_path: Path) -> None:
-    files, _ = exported(pedals(tmp_path, [0.5, 60.0]), tmp_path / "pedals.zip")
-    assert [line.rsplit(",", 1)[1] for line in files["brake.csv"]] == ["brake [%]", "0.5", "60.0"]
-    assert "brake-unit-unknown.csv" not in files
+    battery = "sensor_msgs/msg/BatteryState"
+    rows: list[Row] = [
+        (n / 20, "/battery_state", battery, {"present": True, "percentage": one}) for n, one in enumerate([0.5, 60.0])
+    ]
+    files, _ = exported(write_ros1(tmp_path / "battery.bag", Drive(messages=rows)), tmp_path / "battery.zip")
+    assert [line.rsplit(",", 2)[1] for line in files["fuel.csv"]] == ["level", "0.5", "60.0"]
+    assert "fuel-unit-unknown.csv" not in files

@@ -13,6 +13,7 @@ from server.judge.sources.source import BY_SIGNAL, COMMAND, Source, plain_type, 
 from server.judge.topic import Topic
 
 MOST_COMPARED = 12  # topics of one signal
+MOST_BESIDE = 4  # of those that show whether the car moves
 OWN_NAMES = {"speed": "/catvehicle/vel", "scan": "/catvehicle/front_laser_points"}  # names that say enough
 OTHER_CAR = "of another car"
 USUAL_NAME = "a usual name"
@@ -107,9 +108,43 @@ def to_compare(offered: Mapping[str, str], picked: Mapping[str, str]) -> dict[st
         speeds = [one for one in speeds if one.topic == pick]
     if pick is not None or not _has_own_name("speed", speeds):
         add(speeds)
-        if any("Twist" in one.type for one in speeds):
-            add([one for one in pools["position"] if one.is_readable][:2])
     return wanted
+
+
+def beside_the_speed(offered: Mapping[str, str]) -> dict[str, str]:
+    """The topics (topic → type) that show whether the car moves, and whether the twists of those are filled."""
+    pools, wanted = pools_of(offered), dict[str, str]()
+    own = [one for one in pools["speed"] if one.is_readable and one.topic.lower() == OWN_NAMES["speed"]]
+    for found in (own, pools["odometry"], pools["position"]):
+        wanted.update({one.topic: one.type for one in [c for c in found if c.is_readable][:MOST_BESIDE]})
+    return wanted
+
+
+def follow(evidence: Evidence, offered: Mapping[str, str], picked: Mapping[str, str]) -> None:
+    """Lets the messages of all topics that may decide count."""
+    evidence.follow(to_compare(offered, picked))
+    evidence.follow(beside_the_speed(offered), is_beside=True)
+    evidence.is_of_one_car = OneCar(offered)
+
+
+class OneCar:
+    """Whether two topics are of one car, as far as their names and types say."""
+
+    def __init__(self, offered: Mapping[str, str]) -> None:
+        self._offered = offered
+        self._cars: tuple[str, ...] | None = None
+        self._known: dict[tuple[str, str], bool] = {}
+
+    def __call__(self, one: str, other: str) -> bool:
+        found = self._known.get((one, other))
+        if found is None:
+            if self._cars is None:
+                self._cars = cars_of(pools_of(self._offered))
+                self._usable = {topic: plain_type(kind) for topic, kind in self._offered.items()}
+            found = self._known[one, other] = namespaces.namespace_of(one, self._cars) == namespaces.namespace_of(
+                other, self._cars
+            ) and not namespaces.is_of_another_robot(one, other, self._usable)
+        return found
 
 
 def _has_own_name(signal: str, found: Collection[Candidate]) -> bool:
@@ -147,7 +182,7 @@ def what_is_known(one: Candidate, signal: str, evidence: Evidence) -> str:
                 else "its name suggests another direction"
             )
     if signal in ("speed", "odometry") and known.is_twist_empty:
-        words.append("its twist is never filled")
+        words.append(known.why_empty)
     if signal == "speed" and known.is_earth_fixed:
         words.append("its velocity is east and north")
     if one.is_named:
@@ -157,4 +192,6 @@ def what_is_known(one: Candidate, signal: str, evidence: Evidence) -> str:
     return ", ".join(words)
 
 
-__all__ = ["COMMAND", "Candidate", "Pools", "cars_of", "named_first", "pools_of", "to_compare", "what_is_known"]
+__all__ = [
+    "COMMAND", "Candidate", "Pools", "cars_of", "follow", "named_first", "pools_of", "to_compare", "what_is_known",
+]  # fmt: skip

@@ -28,6 +28,7 @@ from server.judge.sources.candidates import (
 from server.judge.sources.evidence import Evidence
 from server.judge.sources.namespaces import is_within, namespace_of
 from server.judge.sources.source import BY_SIGNAL, COMMAND, Source, plain_type, unread
+from server.judge.topic import FLOATS
 from server.protocol.questions import Question
 
 PICKED = "chosen by the operator"
@@ -122,8 +123,20 @@ class _Chooser:
                 )
                 for signal, one in opened.items()
                 if signal in ("speed", "odometry", "position", "scan")
-            },
+            }
+            | self._other_numbers(sources.get("speed")),
         )
+
+    def _other_numbers(self, source: Source | None) -> dict[str, tuple[Source, ...]]:
+        """Plain numbers that may be the speed, as long as the one in use is zero: nothing else compares them."""
+        if source is None or source.decode is None or self._evidence.of(source.topic).has_twist:
+            return {}
+        found = tuple(
+            replace(one.source("speed", why="compared"), carries=False)
+            for one in self._pools["speed"]
+            if one.plain_type in FLOATS and one.is_readable and one.is_published and one.topic != source.topic
+        )
+        return {"speed": found[:MOST_WATCHED]} if found else {}
 
     def _decide(self, signal: str) -> Source | _Open | None:
         pick = self._picked.get(signal)
@@ -155,7 +168,7 @@ class _Chooser:
         if signal == "speed":
             return self._speed(found)
         result = self._plain(signal, found)
-        if isinstance(result, Source) and signal == "odometry" and self._evidence.of(result.topic).is_twist_empty:
+        if isinstance(result, Source) and signal == "odometry" and self._evidence.of(result.topic).is_empty_by_odometry:
             return replace(result, decode=pose_only, note="its twist is never filled: it gives no speed")
         return result
 
@@ -174,21 +187,27 @@ class _Chooser:
         return _Open(why=f"{_lower(questions.title(signal, found))}, none chosen", among=found)
 
     def _speed(self, found: list[Candidate]) -> Source | _Open:
-        own = next((one for one in found if one.topic.lower() == OWN_NAMES["speed"]), None)
+        """What is zero while the car moves is taken only if nothing but a receiver says so, and there is no other."""
+        filled = [one for one in found if not self._evidence.of(one.topic).is_twist_empty]
+        undoubted = [one for one in found if not self._evidence.of(one.topic).is_empty_by_odometry]
+        among = self._speed_among(filled, found) or self._speed_among(undoubted, found)
+        return among or _Open(why=_empty([one.topic for one in found], self._evidence))
+
+    def _speed_among(self, filled: list[Candidate], found: list[Candidate]) -> Source | _Open | None:
+        own = next((one for one in filled if one.topic.lower() == OWN_NAMES["speed"]), None)
         if own is not None:
             return own.source("speed", why=BY_NAME)
-        evidence = self._evidence
-        named = [one for one in found if one.is_named]
-        along = [one for one in named if not self._is_earth_fixed(one) and not evidence.of(one.topic).is_twist_empty]
+        named = [one for one in filled if one.is_named]
+        along = [one for one in named if not self._is_earth_fixed(one)]
         if along and (first := named_first(along)) is not None:
             return first.source("speed", why=BY_NAME)
-        odometries = [one for one in found if one not in named and not evidence.of(one.topic).is_twist_empty]
+        odometries = [one for one in filled if one not in named]
         if odometries:
             return self._speed_of_odometry(odometries, has_others=len(odometries) < len(found))
         earth = [one for one in named if self._is_earth_fixed(one)]
         if earth and (first := named_first(earth)) is not None:
             return _as_way_made(first.source("speed", why="the only speed there is"))
-        return _Open(why=_empty_twist([one.topic for one in found]))
+        return None
 
     def _speed_of_odometry(self, found: list[Candidate], *, has_others: bool) -> Source | _Open:
         usual = [name.lower() for name in BY_SIGNAL["odometry"].names]
@@ -240,12 +259,12 @@ class _Chooser:
             is_readable=plain_type(kind) in BY_SIGNAL[signal].types,
             is_published=topic not in self._unpublished,
         )
-        if signal == "speed" and self._evidence.of(topic).is_twist_empty:
-            return _Open(why=_empty_twist([topic]))
+        if signal == "speed" and self._evidence.of(topic).is_empty_by_odometry:
+            return _Open(why=_empty([topic], self._evidence))
         source = one.source(signal, why=PICKED)
         if signal == "speed" and self._is_earth_fixed(one):
             source = _as_way_made(source)
-        if signal == "odometry" and source.decode is not None and self._evidence.of(topic).is_twist_empty:
+        if signal == "odometry" and source.decode is not None and self._evidence.of(topic).is_empty_by_odometry:
             source = replace(source, decode=pose_only, note="its twist is never filled: it gives no speed")
         return self._read(source)
 
@@ -321,7 +340,7 @@ def _as_way_made(source: Source) -> Source:
     return replace(source, decode=way_made_stamped if is_stamped else way_made, note=EAST_AND_NORTH)
 
 
-def _empty_twist(topics: Sequence[str]) -> str:
+def _empty(topics: Sequence[str], evidence: Evidence) -> str:
     if len(topics) == 1:
-        return f"{topics[0]} has no speed: its twist is zero while its pose moves"
-    return f"{', '.join(topics[:3])} have no speed: their twists are zero while their poses move"
+        return f"{topics[0]} has no speed: {evidence.of(topics[0]).why_empty}"
+    return f"{', '.join(topics[:3])} have no speed: they are zero while the car moves"

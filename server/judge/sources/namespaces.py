@@ -29,6 +29,8 @@ PART_WORDS = (
 OWN = "vehicle"  # where drivers of a single car have its wheels and pedals
 DRIVES = frozenset({"speed", "odometry", "command"})  # a car has one of each
 MOST_LEVELS = 6
+OF_A_ROBOT = frozenset({"sensor_msgs/NavSatFix", "nav_msgs/Odometry", "sensor_msgs/LaserScan", "sensor_msgs/Imu"})
+ALIKE = 2  # so many kinds of topics that two namespaces have alike make them two robots
 
 
 def competing(topics: Mapping[str, Collection[str]]) -> tuple[str, ...]:
@@ -66,3 +68,22 @@ def namespace_of(topic: str, namespaces: Collection[str]) -> str | None:
 
 def _count(namespace: str, topics: Collection[str]) -> int:
     return sum(is_within(topic, namespace) for topic in topics)
+
+
+def is_of_another_robot(topic: str, other: str, usable: Mapping[str, str]) -> bool:
+    """Whether the namespaces of two topics hold several kinds of topics under the same names; names without one are
+    alike. `usable`: topic → type in the spelling of ROS 1."""
+    one, second = _root(topic), _root(other)
+    if one == second:
+        return False
+    below_one, below_second = (
+        {(name.lstrip("/")[len(root) :].lstrip("/"), kind) for name, kind in usable.items() if _root(name) == root}
+        for root in (one, second)
+    )
+    return len({kind for _, kind in below_one & below_second if kind in OF_A_ROBOT}) >= ALIKE
+
+
+def _root(topic: str) -> str:
+    """The first part of a name with more than one, else nothing."""
+    first, _, rest = topic.lstrip("/").partition("/")
+    return first if rest else ""

@@ -7,7 +7,7 @@ from itertools import islice
 from typing import Protocol
 
 from server.judge.message import Json
-from server.judge.sources.evidence import Evidence, Place
+from server.judge.sources.evidence import Evidence
 
 # Where it looks, as parts of the length: a car may stand still at the beginning, for minutes.
 PLACES = (0.0, 0.03, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
@@ -28,22 +28,13 @@ class Rows(Protocol):
     def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]: ...
 
 
-def survey(
-    source: Rows,
-    names: Mapping[str, str],
-    topics: Mapping[str, str],
-    silent: Collection[str],
-    place: Place | None = None,
-) -> Evidence:
-    """What the messages of `topics` (topic → type, as a bridge would offer them) show; it ends as soon as that decides.
+def survey(source: Rows, names: Mapping[str, str], evidence: Evidence) -> Evidence:
+    """Lets the messages of the topics that the evidence follows count, until they are enough.
 
-    `names`: topic as the recording spells it → as a bridge would. `silent`: topics without any message; `place`: see
-    `Evidence`.
+    `names`: topic as the recording spells it → as a bridge would.
     """
-    evidence = Evidence(place)
-    evidence.silent = frozenset(silent)
-    evidence.follow(topics)
-    wanted = frozenset(name for name, offered in names.items() if offered in topics)
+    followed = evidence.followed
+    wanted = frozenset(name for name, offered in names.items() if offered in followed)
     rejected: dict[str, int] = getattr(source, "rejected", {})
     before = dict(rejected)
     for part in PLACES:

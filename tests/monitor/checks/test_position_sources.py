@@ -230,3 +230,39 @@ def test_positions_beyond_the_limits_always_are(
     distance_m = 1.01 * allowed_m + beyond_m  # `moved` is on a sphere
     fix = moved(HERE, distance_m * math.cos(angle), distance_m * math.sin(angle), sigma_m)
     assert ask(APART, beside(("/gps/fix", fix), speed_mps=speed_mps)).verdict == "fault"
+
+
+def awaiting(*topics: str, seconds: float, fixes: tuple[tuple[str, GpsFix], ...] = (), **carriers: str) -> Snapshot:
+    snapshot = beside(*fixes, **carriers)
+    awaited = {"position": dict.fromkeys(topics, snapshot.now_s - seconds)}
+    return replace(snapshot, compared=replace(snapshot.compared, awaited=awaited))
+
+
+@pytest.mark.parametrize(
+    ("snapshot", "verdict", "text"),
+    [
+        (
+            awaiting("/gps/fix", seconds=11.0),
+            "fault",
+            "Nothing from /gps/fix for 11 s, nor before; the position of /gps/filtered goes on without it",
+        ),
+        (
+            awaiting("/b/fix", seconds=60.0, position="/a/fix"),
+            "fault",
+            "Nothing from /b/fix for 60 s, nor before; the position of /a/fix goes on without it",
+        ),
+        (
+            awaiting("/b/fix", seconds=60.0, fixes=(FIX,), position="/a/fix"),
+            "fault",
+            "Nothing from /b/fix for 60 s, nor before; the position of /a/fix goes on without it",
+        ),
+        (awaiting("/gps/fix", seconds=9.0), "unknown", "No message from /gps/fix yet"),
+        (awaiting("/gps/filtered", seconds=60.0, position="/gps/fix"), "unknown", "No message from /gps/filtered yet"),
+        (awaiting("/gps/filtered", seconds=60.0), "unknown", "Only one source gives a position"),  # it carries it
+    ],
+)
+def test_a_receiver_of_which_nothing_ever_came_is_noticed(snapshot: Snapshot, verdict: str, text: str) -> None:
+    found = ask(RECEIVER, snapshot)
+    assert str(found.verdict) == verdict
+    assert found.text.startswith(text)
+    assert str(ask(APART, snapshot).verdict) in ("unknown", "absent", "ok")

@@ -232,8 +232,22 @@ def test_an_odometry_contradicts_without_gps() -> None:
     assert [id for id in car.alarms if id != "gps_fix"] == [ID]
     assert car.finding.text == "Speed 0.0 m/s by /vel, but 4.0 m/s by /odom and 4.0 m/s by the poses of /odom"
     alike = Car(truth=car.truth, wheels=car.wheels, status=car.status, twist=car.twist, poses=car.poses)
-    alike.link = facts(odometry="/vel")  # the same topic is no second source
-    assert ID not in alike.go(12.0).alarms
+    alike.link = facts(odometry="/vel")  # its twist is no second source, its poses are
+    assert ID in alike.go(12.0).alarms
+    assert alike.finding.text == "Speed 0.0 m/s by /vel, but 4.0 m/s by the poses of /vel"
+
+
+@pytest.mark.parametrize(
+    ("twist_mps", "pose_mps", "is_raised"), [(0.0, 5.0, True), (5.0, 5.0, False), (5.0, 0.0, False)]
+)
+def test_an_odometry_that_is_the_only_source_is_compared_with_its_own_poses(
+    twist_mps: float, pose_mps: float, is_raised: bool
+) -> None:
+    """A pose that never moved may be one that its driver does not fill."""
+    car = Car(truth=lambda t: 0.0, wheels=lambda t: twist_mps, twist=lambda t: twist_mps, poses=lambda t: pose_mps)
+    car.link = replace(LINK, carriers={"speed": "/odom", "odometry": "/odom"}, published=frozenset(CARRIERS))
+    car.status = lambda t: -1
+    assert (ID in car.go(12.0).alarms) is is_raised
 
 
 def test_drift_at_standstill_is_no_dispute_of_speeds() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from server.judge.sources import survey as module
 from server.judge.sources.survey import survey
-from tests.server.judge.test_sources import FIX, LASERS, ODOM, odometry, scan
+from tests.server.judge.test_sources import FIX, LASERS, ODOM, odometry, scan, shown
 
 Row = tuple[float, str, str, Any]
 
@@ -47,7 +47,7 @@ def stands_then_moves(stands_s: float, length_s: float, mps: float, twist_mps: f
 
 
 def looked_into(drive: Drive) -> Any:
-    return survey(drive, {"odom": "/odom"}, {"/odom": ODOM}, ())
+    return survey(drive, {"odom": "/odom"}, shown({"/odom": ODOM}))
 
 
 @pytest.mark.parametrize("stands_s", [0.0, 5.0, 60.0, 900.0, 1700.0])
@@ -84,6 +84,5 @@ def test_a_damaged_recording_shows_what_can_be_read() -> None:
 
 def test_of_topics_that_do_not_compete_nothing_is_kept() -> None:
     rows = [(1000.0 + n, topic, kind, scan(topic)) for n in range(9) for topic, kind in {**LASERS, "/fix": FIX}.items()]
-    evidence = survey(Drive(rows), {topic: topic for topic in [*LASERS, "/fix"]}, LASERS, {"/fix"})
+    evidence = survey(Drive(rows), {topic: topic for topic in [*LASERS, "/fix"]}, shown(LASERS))
     assert [evidence.of(topic).frame for topic in [*LASERS, "/fix"]] == ["/front/scan", "/rear/scan", None]
-    assert evidence.silent == {"/fix"}

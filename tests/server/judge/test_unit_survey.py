@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from server.judge import unit_survey
 from server.judge.drive import Drive as JudgedDrive
 from server.judge.offline import OfflineRun
 from server.judge.settings_override import SettingsOverride
@@ -104,3 +105,46 @@ def test_the_operators_choice_counts_before_the_values(tmp_path: Path) -> None:
             reading = run.run_state.state.get("brake")
             assert reading is not None
             assert reading.value.percent == pytest.approx(percent)
+
+
+@pytest.mark.parametrize(("most", "from_row"), [(2, 0), (3, 0), (3, 2), (3, 5), (5, 1)])
+def test_what_was_read_before_counts_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most: int, from_row: int
+) -> None:
+    """Two wrong values of a battery are glitches, and four of them are percent."""
+    monkeypatch.setattr(unit_survey, "MOST_VALUES", most)
+    battery, levels = "sensor_msgs/msg/BatteryState", [0.9, 1.4, 1.3, 0.5, 0.6, 0.5, 0.4, 0.3]
+    rows: list[Row] = [
+        (float(n), "/battery_state", battery, {"present": True, "percentage": level}) for n, level in enumerate(levels)
+    ]
+    with open_recording([write_ros1(tmp_path / "battery.bag", Drive(messages=rows))]) as recording:
+        drive = JudgedDrive(recording, read_recorded_events(recording))
+        run = OfflineRun(recording, drive, from_s=max(0.0, from_row - 0.5))
+        units = run.run_state.reception.units
+        (evidence,) = units._surveyed.values()
+        assert not evidence.is_whole
+        run.advance(100.0)
+        decision = units.decision("fuel", "/battery_state")
+        assert decision is not None
+        assert decision.unit is None
+        assert evidence.count == len(levels) - max(0, from_row - most)
+        assert evidence.beyond["share"] == 2
+
+
+def test_a_way_that_was_read_before_counts_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first 200 messages of a speed in km/h: 2.5 s of the way, which shows nothing yet."""
+    monkeypatch.setattr(unit_survey, "MOST_VALUES", 300)
+    with open_recording([driving(tmp_path, FLOAT, 3.6)]) as recording:
+        run = OfflineRun(recording, JudgedDrive(recording, read_recorded_events(recording)))
+        (evidence,) = run.run_state.reception.units._surveyed.values()
+        assert evidence.until_s == pytest.approx(7.45)
+        before, ways = evidence.count, evidence.ways
+        assert ways is not None
+        way = ways._way
+        run.advance(7.45)
+        assert (evidence.count, ways._way) == (before, way)
+        run.advance(20.0)
+        assert evidence.count > before
+        reading = run.run_state.state.get("speed")
+        assert reading is not None
+        assert reading.value.speed_mps == pytest.approx(8.0)

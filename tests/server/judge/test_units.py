@@ -131,8 +131,8 @@ def test_every_signal_with_units_has_rules_and_every_unit_is_of_one() -> None:
 
 
 def test_a_profile_with_an_unknown_unit_is_refused() -> None:
-    with pytest.raises(ValueError, match="brake has no unit 'bar'"):
-        profiles._read("x", {"title": "x", "units": {"brake": "bar"}})
+    with pytest.raises(ValueError, match="brake has no unit 'psi'"):
+        profiles._read("x", {"title": "x", "units": {"brake": "psi"}})
 
 
 # -- values decide ---------------------------------------------------------------------------------------------------
@@ -153,13 +153,14 @@ VALUES: dict[str, tuple[str, str, list[float], list[float | None]]] = {
     "tank, millilitres": ("fuel", FLOAT, [4000.0, 50.0], [None, None]),
     "pedal at rest": ("brake", FLOAT, [0.0, 0.0], [0.0, 0.0]),
     "pedal open": ("brake", FLOAT, [0.0, 0.3, 0.0], [0.0, None, None]),
-    "pedal in percent": ("brake", FLOAT, [0.0, 0.4, 3.0, 0.4], [0.0, None, 3.0, 0.4]),
-    "pedal in Nm": ("brake", FLOAT, [60.0, 150.0, 60.0], [60.0, None, None]),
+    "pedal in percent, Nm or bar": ("brake", FLOAT, [0.0, 0.4, 3.0, 0.4], [0.0, None, None, None]),
+    "pedal in Nm": ("brake", FLOAT, [60.0, 150.0, 60.0], [None, None, None]),
     "pedal below zero": ("brake", FLOAT, [-0.5, 0.5, 40.0], [None, None, None]),
-    "wrench of any car": ("brake", WRENCH, [0.4, 3.0, 0.4], [None, 3.0, 0.4]),
+    "wrench of any car": ("brake", WRENCH, [0.4, 3.0, 0.4], [None, None, None]),
+    "accelerator up to 100": ("accelerator", FLOAT, [0.0, 60.0, 100.0], [0.0, None, None]),
     "steering, float": ("steering", FLOAT, [0.0, 0.1, 40.0], [0.0, None, None]),
-    "steering, wrench": ("steering", WRENCH, [0.5, -20.0, 0.5], [None, -20.0, 0.5]),
-    "steering, wrench of degrees": ("steering", WRENCH, [-20.0, 400.0, -20.0], [-20.0, None, None]),
+    "steering, wrench": ("steering", WRENCH, [0.5, -20.0, 0.5], [None, None, None]),
+    "steering, wrench of degrees": ("steering", WRENCH, [-20.0, 400.0, -20.0], [None, None, None]),
 }
 
 
@@ -200,7 +201,7 @@ def test_a_drive_has_the_right_unit_or_none(kind: tuple[str, str], unit: Any, pa
         decided.append(car.unit(signal) or "unknown")
     assert len(set(decided)) == 1
     if max(numbers) > SHARE.most:
-        assert decided[0] == "percent"
+        assert decided[0] == ("percent" if signal == "fuel" else "unknown")
 
 
 @settings(deadline=None)
@@ -244,7 +245,8 @@ def test_two_publishers_of_other_units_are_noticed(pattern: list[float], chosen:
     car.say("brake", *(pattern * 8))
     assert car.say("brake", *pattern) == [None] * len(pattern)
     assert "two publishers" in car.why("brake") or chosen == "share"
-    assert car.questions() == ({"brake": ["percent"]} if chosen == "share" and "two" not in car.why("brake") else {})
+    answers = ["percent", "nm", "bar"]
+    assert car.questions() == ({"brake": answers} if chosen == "share" and "two" not in car.why("brake") else {})
     assert any("unit unknown" in words for words in unit_sentences(car.reception.units, car.sources))
 
 
@@ -292,6 +294,7 @@ def test_nobody_is_asked_of_pedals_that_rest_or_have_a_unit() -> None:
     car = Car({"brake": FLOAT, "accelerator": FLOAT, "speed": TWIST, "fuel": BATTERY})
     car.say("speed", 3.0)
     car.say("brake", 0.0, 0.001)
+    car.units = {"accelerator": "percent"}
     car.say("accelerator", 0.4, 20.0)
     car.say("fuel", 0.8)
     assert car.questions() == {}
@@ -302,7 +305,40 @@ def test_a_choice_that_the_values_contradict_is_not_believed() -> None:
     assert car.say("brake", 0.5, 30.0) == [50.0, 50.0]  # one wrong value is none
     assert car.say("brake", 30.0, 30.0, 0.5)[1:] == [None, None]
     assert car.why("brake") == "unit unknown: 0 to 1 as chosen, but values are beyond it"
-    assert car.questions() == {"brake": ["percent"]}
+    assert car.questions() == {"brake": ["percent", "nm", "bar"]}
+
+
+@pytest.mark.parametrize("type", [FLOAT, WRENCH])
+@pytest.mark.parametrize("signal", ["brake", "accelerator"])
+@pytest.mark.parametrize("numbers", [[0.0, 12.0, 60.0, 100.0], [2.0] * 9, [1.1, 1.2, 1.3, 1.4], [0.4, 40.0, 99.9]])
+def test_a_pedal_in_an_unknown_unit_up_to_100_is_asked_for(type: str, signal: str, numbers: list[float]) -> None:
+    car = Car({signal: type, "speed": TWIST})
+    assert [one for one in car.say(signal, *numbers) if one] == []
+    car.say("speed", 3.0)
+    assert car.questions() == {signal: ["percent", "nm", "bar"]}
+    assert car.why(signal) == "unit unknown: 0 to 100 % or Nm or bar"
+    car.units = {signal: "percent"}
+    assert car.say(signal, *numbers) == pytest.approx(numbers)
+
+
+@pytest.mark.parametrize(("unit", "label"), [("nm", "Nm"), ("bar", "bar")])
+def test_a_brake_in_a_unit_that_cannot_be_converted_is_not_checked_and_nobody_is_asked(unit: str, label: str) -> None:
+    car = Car({"brake": FLOAT, "accelerator": FLOAT, "speed": TWIST}, units={"accelerator": "percent"})
+    car.say("accelerator", 80.0)
+    car.say("speed", 3.0)
+    car.say("brake", 0.0, 40.0)
+    assert car.questions() == {"brake": ["percent", "nm", "bar"]}
+    car.units |= {"brake": unit}
+    assert car.say("brake", 0.0, 0.3, 40.0, 100.0, 180.0) == [None] * 5
+    assert car.questions() == {}
+    reason = f"in {label}, which cannot be converted to %"
+    assert car.reception.units.note("brake", "/brake") == reason
+    assert unit_sentences(car.reception.units, car.sources) == [f"Brake (/brake): {reason}. It is not evaluated."]
+    with pytest.raises(Exception, match=f"Brake: {reason}"):
+        find_pedals(car.state.snapshot(car.now_s), PedalLimits(), False)
+    car.units |= {"brake": "percent"}
+    assert car.say("brake", 40.0) == [40.0]
+    assert car.reception.tally("brake").rejected == 0
 
 
 def test_litres_are_shown_as_such_and_not_judged() -> None:
