@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from server.judge.message import RosVersion
+from server.recording.clock_history import ClockHistory
 from server.recording.delay import DelayWriter, LinkDelay
 from server.recording.early_entries import EarlyEntries
 from server.recording.folder import RecordingsFolder, id_of, part_id
@@ -60,6 +61,7 @@ class RecordingParts:
         self._definitions: dict[str, str] = {}
         self._held: dict[tuple[str, ...], tuple[str, str | None, Any]] = {}
         self._clock = RecordingClock(now, wall_ms)
+        self.history = ClockHistory(now, wall_ms)
         self._ended_ms = 0
 
     @property
@@ -90,6 +92,7 @@ class RecordingParts:
         if self.recorder is not None:
             self.recorder.forget_dropped()
         self._clock.start()
+        self.history.recording_started()
         id = self._folder.first_id(self._vehicle, self._wall_ms())  # made unique by the thread, which may ask the disk
         session = RecordingSession(id=id, session=str(uuid.uuid4()), by=by, began_s=now_s, due_s=now_s + BEGIN_AFTER_S)
         self._state.session = session
@@ -104,6 +107,7 @@ class RecordingParts:
         session.due_s = None
         session.part += 1
         session.is_open = True
+        self.history.part_started()
         self._state.saved = None
         started_ms = self._clock.ms()  # in the same clock as the parts before
         settings = self._settings.as_entry()
@@ -128,6 +132,7 @@ class RecordingParts:
         session = self._state.session
         if session is not None and session.is_open and self.recorder is not None:
             session.is_open = False
+            self.history.part_ended()
             self._ended_ms = self._wall_ms()
             self._state.completing += 1
             self.recorder.end(ended="closed", why=why, then=self._completed, **self._state.missing.as_metadata())
