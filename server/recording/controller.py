@@ -87,6 +87,10 @@ class SessionRecording:
         """Gets ready to record, so that the first message finds all that it needs."""
         self._parts.prepare()
 
+    def on_closing(self, settle: Callable[[], None]) -> None:
+        """`settle` is called before each part ends, while messages are still taken."""
+        self._parts.on_closing = settle
+
     # -- events of the session ---------------------------------------------------------------------------------------
 
     def link_opened(self, address: str | None) -> None:

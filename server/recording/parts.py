@@ -63,6 +63,7 @@ class RecordingParts:
         self._clock = RecordingClock(now, wall_ms)
         self.history = ClockHistory(now, wall_ms)
         self._ended_ms = 0
+        self.on_closing: Callable[[], None] = lambda: None  # called before a part ends
 
     @property
     def status(self) -> Status:
@@ -131,6 +132,7 @@ class RecordingParts:
         """Ends the part that is open, if one is."""
         session = self._state.session
         if session is not None and session.is_open and self.recorder is not None:
+            self.on_closing()
             session.is_open = False
             self.history.part_ended()
             self._ended_ms = self._wall_ms()
@@ -228,6 +230,8 @@ class RecordingParts:
 
     async def stop(self) -> None:
         """Completes what is being written; for the end of the server."""
+        if self._state.session is not None and self._state.session.is_open:
+            self.on_closing()
         recorder, self.recorder = self.recorder, None
         self._state.session = None
         if recorder is not None:
