@@ -33,6 +33,13 @@ class PlaceMark(OfMark):
         ]
         | None
     ) = None
+    age_ms: (
+        Annotated[
+            float,
+            Field(ge=-(2**53), le=2**53, allow_inf_nan=False, description="how long ago, by the device's own clock"),
+        ]
+        | None
+    ) = None
     category: Annotated[str, Field(max_length=40, description='a word or two; "": none any more')] | None = None
     words: Annotated[str, Field(max_length=2000, description='what is to be seen there; "": none any more')] | None = (
         None

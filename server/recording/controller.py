@@ -15,6 +15,7 @@ from monitor.recorder import RecorderFacts
 from monitor.runner import Refused
 from server.judge.active_settings import ActiveSettings
 from server.protocol.recording_state import RecordingState
+from server.recording.clock_history import ClockHistory
 from server.recording.delay import LinkDelay
 from server.recording.folder import RecordingsFolder
 from server.recording.own import Own
@@ -77,9 +78,18 @@ class SessionRecording:
     def missing(self, missing: Missing) -> None:
         self._state.missing = missing
 
+    @property
+    def history(self) -> ClockHistory:
+        """What the server's clock was, and that of each recording."""
+        return self._parts.history
+
     def prepare(self) -> None:
         """Gets ready to record, so that the first message finds all that it needs."""
         self._parts.prepare()
+
+    def on_closing(self, settle: Callable[[], None]) -> None:
+        """`settle` is called before each part ends, while messages are still taken."""
+        self._parts.on_closing = settle
 
     # -- events of the session ---------------------------------------------------------------------------------------
 
@@ -235,6 +245,7 @@ class SessionRecording:
 
     def tick(self, now_s: float) -> None:
         """Advance the time: a link that does not return ends the session; a silent car is recorded as such."""
+        self.history.look()
         session = self._state.session
         if session is None:
             return

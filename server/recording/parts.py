@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from server.judge.message import RosVersion
+from server.recording.clock_history import ClockHistory
 from server.recording.delay import DelayWriter, LinkDelay
 from server.recording.early_entries import EarlyEntries
 from server.recording.folder import RecordingsFolder, id_of, part_id
@@ -60,7 +61,9 @@ class RecordingParts:
         self._definitions: dict[str, str] = {}
         self._held: dict[tuple[str, ...], tuple[str, str | None, Any]] = {}
         self._clock = RecordingClock(now, wall_ms)
+        self.history = ClockHistory(now, wall_ms)
         self._ended_ms = 0
+        self.on_closing: Callable[[], None] = lambda: None  # called before a part ends
 
     @property
     def status(self) -> Status:
@@ -90,6 +93,7 @@ class RecordingParts:
         if self.recorder is not None:
             self.recorder.forget_dropped()
         self._clock.start()
+        self.history.recording_started()
         id = self._folder.first_id(self._vehicle, self._wall_ms())  # made unique by the thread, which may ask the disk
         session = RecordingSession(id=id, session=str(uuid.uuid4()), by=by, began_s=now_s, due_s=now_s + BEGIN_AFTER_S)
         self._state.session = session
@@ -104,6 +108,7 @@ class RecordingParts:
         session.due_s = None
         session.part += 1
         session.is_open = True
+        self.history.part_started()
         self._state.saved = None
         started_ms = self._clock.ms()  # in the same clock as the parts before
         settings = self._settings.as_entry()
@@ -127,7 +132,9 @@ class RecordingParts:
         """Ends the part that is open, if one is."""
         session = self._state.session
         if session is not None and session.is_open and self.recorder is not None:
+            self.on_closing()
             session.is_open = False
+            self.history.part_ended()
             self._ended_ms = self._wall_ms()
             self._state.completing += 1
             self.recorder.end(ended="closed", why=why, then=self._completed, **self._state.missing.as_metadata())
@@ -223,6 +230,8 @@ class RecordingParts:
 
     async def stop(self) -> None:
         """Completes what is being written; for the end of the server."""
+        if self._state.session is not None and self._state.session.is_open:
+            self.on_closing()
         recorder, self.recorder = self.recorder, None
         self._state.session = None
         if recorder is not None:

@@ -50,6 +50,7 @@ class ReplayClient:
 
     def __init__(self, recording: str, *, now: Callable[[], float], on_new: Callable[[str], None]) -> None:
         self.recording = recording
+        self.instead: ReplayClient | None = None  # the one that is closed once this one is open
         self.token = secrets.token_hex(8)
         self.failed: str | None = None  # why there is no more to come, as a sentence
         self.numbers = {"state": 0, "scan": 0, "timeline": 0}
@@ -262,18 +263,30 @@ class ReplayManager:
     def count(self) -> int:
         return len(self._clients)
 
-    async def open(self, recording: str, opening: Mapping[str, Any], *, on_new: Callable[[str], None]) -> ReplayClient:
-        """A replay that is ready to be shown. Raises NoReplay."""
+    async def open(
+        self,
+        recording: str,
+        opening: Mapping[str, Any],
+        *,
+        on_new: Callable[[str], None],
+        instead: ReplayClient | None = None,
+    ) -> ReplayClient:
+        """A replay that is ready to be shown. `instead`: an open one that is closed then, and takes no further place.
+        Raises NoReplay."""
         most = MOST_REPLAYS if self._most is None else self._most
-        if len(self._clients) >= most:
+        replaced = {one.instead.token for one in self._clients.values() if one.instead is not None}
+        others = self._clients.keys() - replaced - ({instead.token} if instead is not None else set())
+        if len(others) >= most:
             raise NoReplay(f"{most} replays are open already: close one first.")
         client = self._made(recording, opening, on_new)
+        client.instead = instead
         self._clients[client.token] = client
         try:
             await self._begin(client, opening)
         except BaseException:
             await self.close(client)
             raise
+        client.instead = None
         return client
 
     def _made(self, recording: str, _opening: Mapping[str, Any], on_new: Callable[[str], None]) -> ReplayClient:

@@ -120,7 +120,7 @@ class ViewSource:
 
     async def open(self, order: OpenReplay) -> None:
         """Switch to a recording; the former source continues until it is open. Raises NoReplay."""
-        await self._turn_to(await self._opened(order))
+        await self._turn_to(await self._opened(order, self._client))
 
     async def open_beside(self, order: OpenBeside) -> None:
         """Show a second recording beside the first; one that was there before is closed. Raises NoReplay."""
@@ -129,7 +129,7 @@ class ViewSource:
             raise NoReplay(NO_REPLAY)
         if order.recording == first.recording:
             raise NoReplay("This recording is shown already: choose another one.")
-        client = await self._opened(order)
+        client = await self._opened(order, self._beside)
         if self._client is not first:
             await self._replays.close(client)
             raise NoReplay("The replay was left meanwhile.")
@@ -152,7 +152,7 @@ class ViewSource:
         if self._client is not None:
             await self._turn_to(None)
 
-    async def _opened(self, order: OpenReplay | OpenBeside) -> ReplayClient:
+    async def _opened(self, order: OpenReplay | OpenBeside, instead: ReplayClient | None) -> ReplayClient:
         settings: Mapping[str, Any] = {}
         with contextlib.suppress(NotServed):
             settings = await self._bus.request(self._vehicle, {"kind": "settings"})
@@ -164,7 +164,7 @@ class ViewSource:
             "topics": order.topics if isinstance(order, OpenReplay) else {},
             "units": order.units if isinstance(order, OpenReplay) else {},
         }
-        return await self._replays.open(order.recording, opening, on_new=self._on_new)
+        return await self._replays.open(order.recording, opening, on_new=self._on_new, instead=instead)
 
     async def ask(self, order: ReplayOrder) -> Mapping[str, Any]:
         """What the replay answers to an order, or the recording beside it."""

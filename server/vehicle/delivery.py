@@ -26,6 +26,8 @@ FIRST_WITHIN_S = 5.0  # the first message of a publisher that came later
 QUIET_S = 2.0  # a signal's topic without a message for so long, when a recording begins
 FLOWS_S = 2.0  # anything within so long: the bridge delivers, so it is this topic and not all of them
 AT_ONCE = 8  # topics per round
+LEAST_GAPS = 3  # that show how fast a topic is
+SLOW_PERIODS = 2  # a topic of which that is not known sends its next message within so many of its intervals
 
 
 @dataclass(slots=True)
@@ -41,7 +43,9 @@ class _Row:
     got: int = 0  # messages since it was subscribed to
     was_prompt: bool = False  # the first of them came with the subscription
     single: int = 0  # renewals in a row before which the subscription gave one message at once, and no other
+    interval_s: float = 0.0  # between the newest message and the one before, with a renewal in between
     publishers: tuple[str, ...] | None = None  # None: not known
+    publishers_s: float = -math.inf  # since when there are these
     asked_s: float = -math.inf
     renewed: int = 0  # times in a row, without two messages since
 
@@ -51,13 +55,15 @@ class _Row:
         return self.newest_s is not None or self.was_given
 
     def heard(self, now_s: float) -> None:
+        is_of_these = self.newest_s is not None and self.newest_s >= self.publishers_s
         if self.got:
             self.renewed = self.single = 0
-            if self.newest_s is not None:
+            if is_of_these and self.newest_s is not None:
                 self.gaps += 1
                 self.gaps_s += now_s - self.newest_s
         else:
             self.was_prompt = now_s - self.since_s <= PROMPT_S
+            self.interval_s = now_s - self.newest_s if is_of_these and self.newest_s is not None else 0.0
         self.got += 1
         self.newest_s = now_s
 
@@ -74,6 +80,17 @@ class _Row:
             return False
         due_s = max(STOPPED_AFTER_S, STOPPED_PERIODS * self.gaps_s / self.gaps) if self.gaps else ONCE_AFTER_S
         return now_s - self.last_s >= due_s
+
+    def came_once(self, now_s: float) -> bool:
+        """Whether each subscription gives one message, and the topic is not merely slow: then its next message comes by
+        itself before the third subscription, and after about the interval of those before."""
+        if self.got > 1 or not self.single:
+            return False
+        is_given = self.got == 1 and self.was_prompt
+        is_known = self.gaps >= LEAST_GAPS
+        slow_s = STOPPED_PERIODS * self.gaps_s / self.gaps if is_known else SLOW_PERIODS * self.interval_s
+        due_s = max(RENEW_AFTER_S, slow_s)
+        return self.single > 2 or (is_given and (self.single > 1 or now_s - self.last_s >= due_s))
 
     @property
     def last_s(self) -> float:
@@ -133,6 +150,11 @@ class Delivery:
         if row is not None:
             row.was_given = True
 
+    def renewed_s(self, topic: str) -> float:
+        """When a topic's subscription was renewed last."""
+        row = self._rows.get(topic)
+        return row.since_s if row is not None and row.renewed else -math.inf
+
     def quiet(self, now_s: float) -> list[str]:
         """Topics of signals that came on this connection, and not lately: the bridge may keep a sample of them."""
         return [
@@ -184,6 +206,8 @@ class Delivery:
             row.since_s = now_s  # it has its time from here on
         if publishers and publishers != row.publishers:
             row.renewed = row.single = 0  # another publisher has its own renewals
+        if row.publishers not in (None, publishers) or not publishers:
+            row.publishers_s = now_s
         row.publishers = publishers
         if not publishers or not row.is_silent(now_s):
             return False
@@ -207,16 +231,8 @@ class Delivery:
         ]
 
     def came_once(self, now_s: float) -> list[str]:
-        """Topics of signals that have a publisher and of which two subscriptions in a row gave one message each."""
-        return [
-            topic
-            for topic, row in self._rows.items()
-            if row.is_judged
-            and row.publishers
-            and row.single
-            and row.got <= 1
-            and (row.single > 1 or (row.got and row.was_prompt and now_s - row.last_s >= RENEW_AFTER_S))
-        ]
+        """Topics of signals that have a publisher and of which each subscription gives one message."""
+        return [topic for topic, row in self._rows.items() if row.is_judged and row.publishers and row.came_once(now_s)]
 
     def never_received(self, topic: str) -> bool:
         """Whether nothing came of a topic on this connection."""

@@ -12,12 +12,14 @@ from server.bus.bus import SessionBus
 from server.control.acting import acting_as
 from server.control.authorization import Caller
 from server.protocol.alarm_state import Note
-from server.protocol.mark_commands import MarkCommand, RemoveMark
+from server.protocol.mark_commands import MarkCommand, PlaceMark, RemoveMark
 from server.protocol.marks import DriveMark, MarkList, MarkSource
+from server.recording.clock_history import ClockHistory
 from server.recording.controller import SessionRecording
 from server.recording.marks.media import MediaName, name_of
 from server.recording.marks.rows import CHANGES, MOST_CATEGORY, MOST_WORDS, entry, row_of
 from server.recording.recorder_queue import Attachment
+from server.recording.recording_clock import STEP_MS
 from server.system.clean_text import clean
 from server.vehicle.car_marks import CarMarks
 
@@ -25,7 +27,6 @@ MOST = 2000  # marks of one drive, by people
 MOST_OF_CAR = 500  # by the car's own button
 KNOWN = 2 * MOST  # marks that are known by their ids, those of earlier drives and removed ones among them
 OLDEST_MS = 30 * 24 * 3600 * 1000  # a mark that waited longer on a phone has lost its moment
-AHEAD_MS = 1000  # clocks that were set by each other differ by less
 LATE_MS = 60_000  # the event of a mark that comes so late says so
 _PORTION = 500
 
@@ -35,6 +36,16 @@ class _Known:
     row: DriveMark
     drive: int  # 0: of an earlier one
     is_removed: bool = False
+    moment_s: float | None = None  # by the session's clock, which is never set; None: of before the server started
+
+
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """When a mark was made, by the session's clock."""
+
+    at_s: float
+    said: str
+    is_arrival: bool = False  # its own time cannot be
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,10 +70,13 @@ class Marks:
         *,
         wall_ms: Callable[[], int],
         place: MarksPlace,
+        history: ClockHistory | None = None,
     ) -> None:
+        """`history`: the server's clock; None: it is never set."""
         self._note = note
         self._recording = recording
         self._wall_ms = wall_ms
+        self._history = history or ClockHistory(lambda: wall_ms() / 1000, wall_ms)
         self._on_late = place.on_late
         self._media = place.media
         self._known: dict[str, _Known] = {}  # the newest last
@@ -83,16 +97,17 @@ class Marks:
         known = self._known.get(command.mark)
         if known is not None:
             if not known.is_removed:  # what was taken back stays so, though it is sent again
-                self._change(known, at_ms=command.at_ms, words=words, category=category, by=by)
+                self._change(known, command, words=words, category=category, by=by)
             return
         if self.count - self._by_car >= MOST:
             raise Refused(f"This drive has {MOST} marks, which is the most there can be: take one back first.")
-        marked_ms, said = self._moment(command.at_ms)
+        found = self._moment(command)
+        marked_ms = self._history.placed(found.at_s).ms
         row: DriveMark = {
             "mark": command.mark, "marked_ms": marked_ms, "category": category or None, "words": words or "",
             "voice": False, "photo": False, "source": source, "by": by,
         }  # fmt: skip
-        self._put(row, "mark", f"Mark{_described(row)}.{said}", by=by)
+        self._put(row, "mark", f"Mark{_described(row)}.{found.said}", by=by, moment_s=found.at_s)
 
     def place(self, mark: str, words: str, suffix: str = "") -> None:
         """The car's own button."""
@@ -102,7 +117,8 @@ class Marks:
             "mark": mark, "marked_ms": self._wall_ms(), "category": None,
             "words": _words(words), "voice": False, "photo": False, "source": "car", "by": None,
         }  # fmt: skip
-        self._put(row, "mark", f"Mark by the car{_described(row)}.{suffix}", by=None)
+        moment_s = self._history.look()
+        self._put(row, "mark", f"Mark by the car{_described(row)}.{suffix}", by=None, moment_s=moment_s)
         self._said_by_car[row["words"]] = None
 
     def button(self, now_s: float, *, read_s: Callable[[float], float | None]) -> CarMarks:
@@ -131,13 +147,15 @@ class Marks:
     def _attach(self, file: MediaName, path: Path, *, by: str | None) -> DriveMark:
         """Raises Refused."""
         old = self.need(file.mark)
+        moment_s = self._known[file.mark].moment_s
         is_voice = file.kind == "voice"
         row: DriveMark = {**old, "voice": is_voice or old["voice"], "photo": old["photo"] or not is_voice}
         if row != old:
             what = "A voice note was added" if is_voice else "A photo was added"
-            self._put(row, "mark_changed", f"{what} to a mark{_described(row)}.", by=by)
+            self._put(row, "mark_changed", f"{what} to a mark{_described(row)}.", by=by, moment_s=moment_s)
+        row, is_over = self._placed(row, moment_s)
         at_ns = row["marked_ms"] * 1_000_000
-        if not self._recording.attach(
+        if is_over or not self._recording.attach(
             Attachment(path=path, name=file.attachment, media_type=file.media_type, at_ns=at_ns)
         ):
             self._on_late(row["marked_ms"])
@@ -157,13 +175,15 @@ class Marks:
         if known is None:
             raise Refused("There is no such mark.")
         if not known.is_removed:
-            self._put(known.row, "mark_removed", f"A mark was taken back{_described(known.row)}.", by=by)
+            text = f"A mark was taken back{_described(known.row)}."
+            self._put(known.row, "mark_removed", text, by=by, moment_s=known.moment_s)
 
-    def _change(self, known: _Known, *, at_ms: float | None, words: str | None, category: str | None, by: str) -> None:
-        old = known.row
-        marked_ms, said = (old["marked_ms"], "") if at_ms is None else self._moment(at_ms)
-        if at_ms is not None and _was_clamped(at_ms, marked_ms):  # as it was when it came first
-            marked_ms, said = old["marked_ms"], ""
+    def _change(self, known: _Known, command: PlaceMark, *, words: str | None, category: str | None, by: str) -> None:
+        old, moment_s, said = known.row, known.moment_s, ""
+        marked_ms = old["marked_ms"]
+        if command.at_ms is not None and not (found := self._moment(command)).is_arrival:
+            moment_s, said = found.at_s, found.said  # else it is as it was when it came first
+            marked_ms = _kept_ms(marked_ms, self._history.placed(moment_s).ms, least_ms=1)
         new: DriveMark = {
             **old,
             "marked_ms": marked_ms,
@@ -171,34 +191,43 @@ class Marks:
             "category": old["category"] if category is None else category or None,
         }
         if new != old:
-            self._put(new, "mark_changed", f"A mark was changed{_described(new)}.{said}", by=by)
+            self._put(new, "mark_changed", f"A mark was changed{_described(new)}.{said}", by=by, moment_s=moment_s)
 
-    def _moment(self, at_ms: float | None) -> tuple[int, str]:
+    def _moment(self, command: PlaceMark) -> _Moment:
         """The moment that counts, and what has to be said of it."""
-        now_ms = self._wall_ms()
+        now_s, now_ms, at_ms = self._history.look(), self._wall_ms(), command.at_ms
         if at_ms is None:
-            return now_ms, ""
-        late_ms = now_ms - at_ms
-        if late_ms < -AHEAD_MS:
-            return now_ms, f" Its time was {_span(-late_ms)} ahead of the server's clock: the time it arrived counts."
+            return _Moment(now_s, "")
+        at_s = self._history.moment_s(at_ms, command.age_ms)
+        if at_s is None:
+            ahead = f" Its time was {_span(at_ms - now_ms)} ahead of the server's clock: the time it arrived counts."
+            return _Moment(now_s, ahead, is_arrival=True)
+        late_ms = (now_s - at_s) * 1000
         if late_ms > OLDEST_MS:
-            return now_ms, f" Its time was {_span(late_ms)} ago, which cannot be: the time it arrived counts."
-        if late_ms > LATE_MS:
-            return round(at_ms), f" It arrived {_span(late_ms)} after its moment."
-        return round(at_ms), ""
+            old = f" Its time was {_span(late_ms)} ago, which cannot be: the time it arrived counts."
+            return _Moment(now_s, old, is_arrival=True)
+        return _Moment(at_s, f" It arrived {_span(late_ms)} after its moment." if late_ms > LATE_MS else "")
 
-    def _put(self, row: DriveMark, change: str, text: str, *, by: str | None) -> None:
+    def _put(self, row: DriveMark, change: str, text: str, *, by: str | None, moment_s: float | None) -> None:
         is_removed = change == "mark_removed"
         before = self._known.get(row["mark"])
         drive = self._drive if before is None else before.drive
-        self._keep(row["mark"], _Known(row, drive, is_removed))
+        row, is_over = self._placed(row, moment_s)
+        self._keep(row["mark"], _Known(row, drive, is_removed, moment_s))
         if is_removed:
             self._note("mark_removed", text, by=by, mark=row["mark"])
         else:
             self._note(change, text, by=by, **{name: value for name, value in row.items() if name != "by"})  # type: ignore[arg-type]
         at_ms = row["marked_ms"] if change == "mark" else max(row["marked_ms"], self._wall_ms())
-        if not self._recording.mark(entry(row, change), row["marked_ms"], at_ms):
+        if is_over or not self._recording.mark(entry(row, change), row["marked_ms"], at_ms):
             self._on_late(row["marked_ms"])
+
+    def _placed(self, row: DriveMark, moment_s: float | None) -> tuple[DriveMark, bool]:
+        """A mark by the clock of the recording that covers it, which may have been set since; whether that is over."""
+        if moment_s is None:
+            return row, False
+        placed = self._history.placed(moment_s)
+        return {**row, "marked_ms": _kept_ms(row["marked_ms"], placed.ms, least_ms=STEP_MS)}, placed.is_over
 
     # -- what there is -----------------------------------------------------------------------------------------------
 
@@ -276,8 +305,9 @@ def _described(row: DriveMark) -> str:
     return f"{category}: {row['words']}" if row["words"] else category
 
 
-def _was_clamped(at_ms: float, marked_ms: int) -> bool:
-    return abs(at_ms - marked_ms) >= 1
+def _kept_ms(before_ms: int, after_ms: int, *, least_ms: int) -> int:
+    """A time of day that is only changed by so much."""
+    return after_ms if abs(after_ms - before_ms) > least_ms else before_ms
 
 
 def _span(ms: float) -> str:

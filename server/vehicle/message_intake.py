@@ -15,6 +15,7 @@ from server.slowdown.command_target import GUARD_STATE
 from server.slowdown.controller import SlowDownController
 from server.vehicle import car_marks
 from server.vehicle.connection import Connection
+from server.vehicle.doubtful import Doubtful, Held
 from server.vehicle.judgement import Judgement
 from server.vehicle.marks import Marks
 from server.vehicle.scan_feed import ScanFeed
@@ -52,6 +53,7 @@ class MessageIntake:
         self._button = marks.button(now(), read_s=self._read_s)
         self._now = now
         self._connection: Connection | None = None
+        recording.on_closing(self._settle)
         self.reset()
 
     def _read_s(self, sent_s: float) -> float | None:
@@ -66,6 +68,7 @@ class MessageIntake:
         self._scans = ScanFeed(self._vehicle, self._bus)
         self._pace = TransformPace()
         self._sent_again = SentAgain(self._read_s)
+        self._doubtful = Doubtful()
 
     def subscribed(self, topic: str) -> None:
         """A subscription to a topic was sent: what the bridge kept of it may come again."""
@@ -104,7 +107,7 @@ class MessageIntake:
         arrival = self._arrived(connection, frame.topic, frame, size, now_s)
         if plain_type(topics.others.get(frame.topic, "")) not in OF_ANY_NODE and not (arrival and arrival.is_repeat):
             self._judgement.other_message_s = now_s
-        if is_recorded and self._is_to_record(frame.topic, arrival, now_s):
+        if is_recorded and self._is_to_record(connection, frame.topic, Held(frame, size, now_s), arrival):
             self._record(connection, frame.topic, frame, now_s, size)
         return True
 
@@ -123,7 +126,7 @@ class MessageIntake:
         if topic in topics.table.transforms:
             self._transforms_received(connection, topic, message, arrival, now_s)
             return
-        if self._is_to_record(topic, arrival, now_s) and connection.link is not None:
+        if connection.link is not None and self._is_to_record(connection, topic, Held(message, size, now_s), arrival):
             self._record(connection, topic, message, now_s, size)
         if is_button or self._slow_down.receive(topic, message) or topics.took(topic, message):
             return
@@ -159,8 +162,10 @@ class MessageIntake:
             self._judgement.other_message_s = now_s
         kind = connection.subscriptions.type_of(topic)
         is_in_part = is_repeat and is_static(topic) and self._recording.holds(topic, message)
-        if connection.link is not None and not is_in_part and self._is_to_record(topic, arrival, now_s):
-            self._record(connection, topic, message, now_s, connection.link.frame_bytes)
+        if connection.link is not None and not is_in_part:
+            size = connection.link.frame_bytes
+            if self._is_to_record(connection, topic, Held(message, size, now_s), arrival):
+                self._record(connection, topic, message, now_s, size)
         if is_static(topic):
             self._recording.hold(topic, kind, message)
 
@@ -177,18 +182,50 @@ class MessageIntake:
             connection.subscriptions.received(topic)
         return arrival
 
-    def _is_to_record(self, topic: str, arrival: Arrival | None, now_s: float) -> bool:
+    def _is_to_record(self, connection: Connection, topic: str, one: Held, arrival: Arrival | None) -> bool:
         """Whether a message belongs into the recording: each one once in a part."""
         part = self._recording.part
         if part is None or arrival is None:
             return part is not None
         sample = arrival.sample
-        if arrival.is_repeat and sample.part == part:
-            return arrival.may_be_new
-        if arrival.is_repeat:
-            self._judgement.transport.given(topic, now_s - sample.first_s)
+        if arrival.is_repeat and sample.part == part and not arrival.may_be_new:
+            if arrival.is_doubtful:
+                self._doubt(connection, topic, one, arrival.answers_needed)
+            return False
+        if arrival.is_repeat and sample.part != part:
+            self._judgement.transport.given(topic, one.at_s - sample.first_s)
+        self._record_late(connection, topic, *self._doubtful.settled(topic))
         sample.part = part
         return True
+
+    def _doubt(self, connection: Connection, topic: str, one: Held, needed: int | None) -> None:
+        """Another subscription shows whether a message was published now, or is what its publisher keeps."""
+        verdict = self._doubtful.came(topic, one, needed)
+        self._record_late(connection, topic, *verdict.record)
+        if verdict.is_kept:
+            self._sent_again.is_kept(topic)
+        elif verdict.probes and not connection.subscriptions.table.probe(topic):
+            self._record_late(connection, topic, *self._doubtful.settled(topic))
+
+    def tick(self, now_s: float) -> None:
+        """Records what was in doubt and is not any more."""
+        if self._connection is not None:
+            for topic, one in self._doubtful.overdue(now_s):
+                self._record_late(self._connection, topic, one)
+
+    def _settle(self) -> None:
+        """A part of the recording ends: what is in doubt belongs into it."""
+        if self._connection is not None:
+            for topic, one in self._doubtful.all():
+                self._record_late(self._connection, topic, one)
+
+    def _record_late(self, connection: Connection, topic: str, *held: Held) -> None:
+        """Records messages that were in doubt, with their delay."""
+        now_s = self._now()
+        for one in held:
+            if one.at_s < now_s:
+                self._judgement.transport.given(topic, now_s - one.at_s)
+            self._record(connection, topic, one.message, now_s, one.size)
 
     def _show_scan(self, message: Any, now_s: float) -> None:
         self._scans.count()

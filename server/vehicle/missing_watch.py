@@ -112,5 +112,5 @@ class MissingWatch:
             self._undelivered.bridges = frozenset(nodes or ())
         for topic in self._undelivered.to_ask(self._now()):
             self._undelivered.answered(topic, await discovery.fetch_subscribers(asks, topic), self._now())
-        for topic in self._undelivered.to_renew(self._now()):
+        for topic in self._undelivered.to_renew(self._now(), delivery.renewed_s):
             self._renew(topic)

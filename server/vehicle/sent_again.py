@@ -4,7 +4,8 @@ A real bridge gives the latched sample of a topic to each new subscription, also
 bridge of ROS 2 sends the first message after a second subscription of one connection twice. Neither is new: it must not
 make an old value look fresh. Only a message like one that came before can be a repeat, and of each only as many as
 there were subscriptions. With a stamp, this is certain. Without one, a publisher may have sent the same value anew:
-then only the first message after a subscription counts as a repeat, which costs at most one period of its age.
+then only the first message after a subscription counts as a repeat, which costs at most one period of its age. Its age
+alone is in doubt: whether it is recorded, `doubtful.py` decides.
 
 Pure: time is an argument, on a monotonic clock in seconds.
 """
@@ -22,6 +23,7 @@ import numpy as np
 from server.judge.message_fields import stamp_s
 from server.rosbridge.codec import Unreadable
 from server.rosbridge.raw_frame import RawFrame
+from server.vehicle.doubtful import answers_needed
 
 GIVEN_WITHIN_S = 5.0  # after it has read a subscription, a bridge of ROS 2 needs some time to get the kept sample
 TWICE_WITHIN_S = 0.1  # a message that a bridge sends twice
@@ -30,6 +32,7 @@ IN_TIME = 0.25  # a message that comes when its period has passed, give or take 
 PERIOD_WEIGHT = 0.2
 STEADY = 3  # gaps in a row that make a period
 KEPT, KEPT_BYTES = 16, 64 * 1024  # of one topic: several publishers may each have a latched sample
+HEADER_BYTES = 400  # of a large message, in which its stamp is sought
 MOST_SUBSCRIBED = 3  # repeats of one sample that are expected at a time
 MOST_TOPICS = 2_000
 
@@ -38,7 +41,7 @@ MOST_TOPICS = 2_000
 class Sample:
     """A message as it first came."""
 
-    content: Any  # parsed, or the bytes of its frame, or their number and hash where they are many
+    content: Any  # parsed, or its RawFrame, or the number and hash of its bytes where they are many
     size: int
     first_s: float
     part: object = None  # of the recording, that holds it
@@ -54,6 +57,7 @@ class _Topic:
     newest_s: float = -math.inf
     period_s: float | None = None
     steady: int = 0  # gaps in a row of about this period
+    is_kept: bool = False  # its publisher gave the newest sample to each subscription
 
     def came(self, at_s: float) -> None:
         gap_s = at_s - self.newest_s
@@ -77,6 +81,8 @@ class Arrival:
     sample: Sample
     is_repeat: bool = False
     may_be_new: bool = False  # a repeat without a stamp that came when a new message was due
+    is_doubtful: bool = False  # a repeat without a stamp, of a topic whose publisher is not known to keep a sample
+    answers_needed: int | None = None  # as of doubtful.py, for one that is
 
 
 class SentAgain:
@@ -90,9 +96,15 @@ class SentAgain:
     def subscribed(self, topic: str, at_s: float) -> None:
         """A subscription to a topic was sent, the first one or another."""
         known = self._topic(topic)
+        if not known.was_given:
+            known.is_kept = False
         known.subscribed_s, known.is_first, known.was_given = at_s, True, False
         for sample in known.samples:
             sample.expected = min(sample.expected + 1, MOST_SUBSCRIBED)
+
+    def is_kept(self, topic: str) -> None:
+        """The publisher of a topic gives the newest sample to each subscription: what comes first is not new."""
+        self._topic(topic).is_kept = True
 
     def receive(self, topic: str, message: Any, size: int, at_s: float) -> Arrival:
         """A message came, parsed or as RawFrame. `size`: bytes of its frame."""
@@ -125,7 +137,7 @@ class SentAgain:
                 if _is_stamped(message, size):
                     return Arrival(sample, is_repeat=True)
                 if sample is known.samples[-1] and self._may_be_given(known, sample, at_s):
-                    return Arrival(sample, is_repeat=True, may_be_new=known.is_due(at_s))
+                    return _unstamped(known, sample, at_s)
                 return None
         return None
 
@@ -151,18 +163,27 @@ class SentAgain:
         return known
 
 
+def _unstamped(known: _Topic, sample: Sample, at_s: float) -> Arrival:
+    return Arrival(
+        sample,
+        is_repeat=True,
+        may_be_new=known.is_due(at_s),
+        is_doubtful=not known.is_kept,
+        answers_needed=answers_needed(known.period_s, at_s - known.newest_s),
+    )
+
+
 def _content(message: Any, size: int) -> Any:
     """What of a message is kept to compare the next ones with; None: it is too large for that."""
     if isinstance(message, RawFrame):
-        payload = message.payload
-        return payload if size <= KEPT_BYTES else (size, hash(payload))
+        return message if size <= KEPT_BYTES else (size, hash(message.payload))
     return message if size <= KEPT_BYTES else None
 
 
 def _is_stamped(message: Any, size: int) -> bool:
     if isinstance(message, RawFrame):
         if size > KEPT_BYTES:
-            return True  # so much is not the same by chance
+            return b"stamp" in message.payload[message.begins : message.begins + HEADER_BYTES]
         try:
             message = message.message()
         except Unreadable:
@@ -179,10 +200,17 @@ def _same(one: Any, other: Any) -> bool:
     """Whether two messages have the same content, whatever they were encoded as."""
     if one is None or other is None:
         return False
+    if isinstance(one, RawFrame) and isinstance(other, RawFrame) and one.is_binary == other.is_binary:
+        return one.payload == other.payload
     try:
-        return _equal(one, other)
-    except RecursionError:  # only a hostile message is so deep
+        return _equal(_parsed(one), _parsed(other))
+    except (RecursionError, Unreadable):  # only a hostile message is so deep
         return False
+
+
+def _parsed(content: Any) -> Any:
+    """Raises Unreadable."""
+    return content.message() if isinstance(content, RawFrame) else content
 
 
 def _equal(one: Any, other: Any) -> bool:

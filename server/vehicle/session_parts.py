@@ -109,7 +109,7 @@ def session_parts(
     )  # fmt: skip
     event_log = EventLog(vehicle, bus, settings, wall_ms=wall_ms, also=recording.events)
     slow_down = _slow_down(event_log, judgement, recording, number=bus.last_event(vehicle), now=now, wall_ms=wall_ms)
-    placed = Marks(event_log.note, recording, wall_ms=wall_ms, place=marks)
+    placed = Marks(event_log.note, recording, wall_ms=wall_ms, place=marks, history=recording.history)
     intake = MessageIntake(vehicle, bus, judgement, recording, slow_down, attempts, placed, now=now)
 
     def subscriptions(link: LiveSource | None) -> Subscriptions:

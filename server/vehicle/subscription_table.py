@@ -161,6 +161,13 @@ class SubscriptionTable:
         self._renew(topic)
         return False
 
+    def probe(self, topic: str) -> bool:
+        """Subscribe to a topic once more, to see whether its publisher keeps a sample; False: it cannot be."""
+        if not any(row.topic == topic for row in self.rows):
+            return False
+        self._renew(topic, is_quiet=True)
+        return True
+
     def tries_another(self) -> bool:
         """Whether a topic on probation, or more or less of the transforms, is to be subscribed to now; then `subscribe`
         is still to be called."""

@@ -153,6 +153,7 @@ class Tick:
         topics, recording = self._parts.connection.subscriptions, self._parts.recording
         recording.ros_version = topics.ros_version
         recording.missing = topics.missing
+        self._parts.intake.tick(now_s)
         recording.tick(now_s)
         if self._parts.connection.phase == "monitoring":
             found = self._link_facts(now_s)

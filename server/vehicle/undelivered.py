@@ -10,7 +10,7 @@ Pure: time is an argument.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -78,9 +78,13 @@ class Passing:
         else:
             self._is_subscribed[topic] = is_subscribed
 
-    def to_renew(self, now_s: float) -> list[str]:
-        """Returns, once, the topics that may arrive after a new subscription, because a client left them."""
-        freed = sorted(one for one in self._freed if now_s - self._freed_s.get(one, -math.inf) >= AGAIN_S)
+    def to_renew(self, now_s: float, renewed_s: Callable[[str], float] = lambda _: -math.inf) -> list[str]:
+        """Returns, once, the topics that may arrive after a new subscription, because a client left them.
+
+        `renewed_s(topic)`: when it was renewed for another reason.
+        """
+        newest_s = {one: max(self._freed_s.get(one, -math.inf), renewed_s(one)) for one in self._freed}
+        freed = sorted(one for one, at_s in newest_s.items() if now_s - at_s >= AGAIN_S)
         self._freed -= set(freed)
         self._freed_s.update(dict.fromkeys(freed, now_s))
         self._asked_s.update(dict.fromkeys(freed, now_s))  # the bridge needs a moment to subscribe

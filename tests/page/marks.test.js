@@ -107,6 +107,8 @@ function delivery(tells, { vehicle = () => 'car', onChange = () => {} } = {}) {
   const heard = [];
   /** @type {string[]} */
   const takenBack = [];
+  /** @type {any[]} */
+  const sent = [];
   const tell = (/** @type {string} */ step, /** @type {string} */ id) => {
     heard.push(`${step} ${id}`);
     return Promise.resolve(tells(step, id));
@@ -124,9 +126,9 @@ function delivery(tells, { vehicle = () => 'car', onChange = () => {} } = {}) {
     alone: (/** @type {string} */ _, /** @type {() => Promise<void>} */ act) => act(),
     onTakenBack: (/** @type {string} */ reason) => void takenBack.push(reason),
   };
-  const server = { isThere: () => true, vehicle, mark: (/** @type {{mark: string}} */ { mark: id }) => tell('mark', id), remove: (/** @type {string} */ id) => tell('remove', id), upload: (/** @type {string} */ id, /** @type {string} */ _, /** @type {string} */ step) => tell(step, id) };
+  const server = { isThere: () => true, vehicle, mark: (/** @type {{mark: string}} */ fields) => { sent.push(fields); return tell('mark', fields.mark); }, remove: (/** @type {string} */ id) => tell('remove', id), upload: (/** @type {string} */ id, /** @type {string} */ _, /** @type {string} */ step) => tell(step, id) };
   let now_ms = 0;
-  return { kept, heard, takenBack, wait: (/** @type {number} */ ms) => { now_ms += ms; }, it: new Delivery(marks, server, () => now_ms) };
+  return { kept, heard, sent, takenBack, wait: (/** @type {number} */ ms) => { now_ms += ms; }, it: new Delivery(marks, server, () => now_ms) };
 }
 
 const OK = { ok: true, isLost: false, reason: '' };
@@ -240,6 +242,13 @@ test('a mark that the server does not take back stays, and says why', async () =
   assert.equal(kept.get('a')?.isRemoved, false);
   assert.match(moreWords(/** @type {any} */ (kept.get('a'))).join(), /not taken back: Viewers cannot do this/);
   assert.deepEqual(takenBack, ['Viewers cannot do this.', '']);
+});
+
+test('a mark says how long ago it was, for the server’s clock may have been set meanwhile', async () => {
+  const { it, kept, sent } = delivery(() => OK);
+  kept.set('a', mark('a', { wall_ms: Date.now() - 90_000, shift_s: -2 }));
+  await it.look();
+  assert.ok(sent[0].age_ms >= 92_000 && sent[0].age_ms < 122_000, String(sent[0].age_ms));
 });
 
 test('what is changed while it is under way is sent again, and what is taken back is removed', async () => {

@@ -5,7 +5,7 @@ import { isAbsent } from '../../static/js/core/ink.js';
 import { otherWords } from '../../static/js/home/signal-more.js';
 import { kindWords } from '../../static/js/home/signals.js';
 import { isOfMounting, lacksBumper } from '../../static/js/scan/scan-readout.js';
-import { answerOf, dealt, keyOf, mayAnswer, restWords, waitingWords } from '../../static/js/settings/question-layout.js';
+import { answerOf, dealt, joinedChoices, keyOf, mayAnswer, restWords, waitingWords } from '../../static/js/settings/question-layout.js';
 import { pointsOf, reachOf, sketchedOf } from '../../static/js/settings/scan-sketch.js';
 import { changeLines, changeTo, DEFAULTS } from '../../static/js/settings/settings-layout.js';
 import { topicWords } from '../../static/js/settings/settings-topics.js';
@@ -102,4 +102,11 @@ test('a replay is of this page alone: who is in control of the car does not matt
   const control = /** @type {any} */ ({ holder: 'Pixel 8', page: 'p' });
   assert.equal(mayAnswer({ isViewer: false, page: 'q', control, replaying: true }), true);
   assert.equal(mayAnswer({ isViewer: true, page: 'q', control, replaying: true }), false);
+});
+
+test('a choice for a replay is added to those before, and one that is taken back is none', () => {
+  const first = joinedChoices({ topics: {}, units: {} }, { topics: { scan: '/front' } });
+  const second = joinedChoices(first, { units: { brake: 'share' }, topics: { speed: '/odom' } });
+  assert.deepEqual(second, { topics: { scan: '/front', speed: '/odom' }, units: { brake: 'share' } });
+  assert.deepEqual(joinedChoices(second, { topics: { scan: null } }), { topics: { speed: '/odom' }, units: { brake: 'share' } });
 });

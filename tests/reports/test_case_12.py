@@ -111,6 +111,17 @@ def test_alarms_are_those_of_the_drive_without_a_step(
     assert len(step_notes(report.run.notes)) == sum(after_s > 0.0 for after_s, _ in steps)
 
 
+@pytest.mark.parametrize("steps", [[(8.0, 240.0), (33.0, -240.0)], [(8.0, -240.0), (33.0, 240.0)]])
+def test_a_clock_that_is_set_and_set_back_raises_nothing_though_no_sensor_shows_it(
+    tmp_path: Path, steps: list[Step]
+) -> None:
+    expected = raised(judged(write(tmp_path / "plain", "bag", has_own_clock=False)))
+    report = judged(write(tmp_path / "stepped", "bag", steps=steps, has_own_clock=False))
+    assert raised(report) == pytest.approx(expected, abs=0.3)
+    assert report.run.to_s == pytest.approx(LENGTH_S, abs=0.3)
+    assert len(step_notes(report.run.notes)) == 2
+
+
 def silent_alarms(**how: Any) -> dict[str, float]:
     return {name: at_s for name, at_s in raised(judged(write(**how))).items() if "stale" in name or "silent" in name}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
@@ -152,6 +153,55 @@ def test_a_slow_topic_that_starts_with_one_message_is_soon_left_alone_and_nobody
                 renewed.append(now_s)
         assert delivery.came_once(now_s) == []
     assert len(renewed) <= 6
+
+
+@pytest.mark.world(n=27)
+@pytest.mark.parametrize(
+    "periods_s", [(5.0, 5.1), (5.0, 7.0), (5.5, 5.5), (6.0, 6.0), (4.0, 12.0), (9.0, 20.0), (6.0, 40.0)]
+)
+def test_a_topic_that_is_slow_is_never_said_to_give_one_message_a_subscription(periods_s: tuple[float, float]) -> None:
+    """Whenever its messages come, also always just behind a renewal."""
+    for seed in range(20):
+        chance = random.Random(seed)
+        delivery = Delivery()
+        delivery.follow(["/vel", "/fuel"], [], 0.0)
+        due_s = chance.uniform(0.0, 7.0)
+        for step in range(1200):
+            now_s = step / 5
+            delivery.heard("/vel", now_s)
+            if now_s >= due_s:
+                due_s = now_s + chance.uniform(*periods_s)
+                delivery.heard("/fuel", now_s)
+            for topic in delivery.to_ask(now_s):
+                delivery.answered(topic, ("/car",), now_s)
+            assert delivery.came_once(now_s) == [], (seed, now_s)
+
+
+@pytest.mark.world(n=27)
+@pytest.mark.parametrize("given_after_s", [0.1, 1.0])
+@pytest.mark.parametrize("away_s", [0.0, 300.0])
+def test_one_message_a_subscription_is_noticed_within_half_a_minute(given_after_s: float, away_s: float) -> None:
+    """Also of a publisher that was away for longer than a slow topic would be."""
+    delivery = Delivery()
+    delivery.follow(["/vel", "/fuel"], [], 0.0)
+    subscribed_s, noticed_s = 0.0, None
+    if away_s:
+        drive(delivery, {}, flows={"/vel": 0.1, "/fuel": 0.1}, seconds=10.0)
+        drive(delivery, {"/fuel": ()}, flows={"/vel": 0.1}, seconds=away_s, start_s=10.1)
+        subscribed_s = away_s + 11.0
+    back_s = subscribed_s
+    for step in range(300):
+        now_s = back_s + step / 5
+        delivery.heard("/vel", now_s)
+        if 0.0 <= now_s - subscribed_s - given_after_s < 0.19:
+            delivery.heard("/fuel", now_s)
+        for topic in delivery.to_ask(now_s):
+            if delivery.answered(topic, ("/car",), now_s):
+                subscribed_s = now_s
+        if delivery.came_once(now_s):
+            noticed_s = noticed_s or now_s
+    assert noticed_s is not None
+    assert noticed_s - back_s < 30.0
 
 
 @pytest.mark.world(n=9)

@@ -197,6 +197,40 @@ def test_a_sample_in_another_encoding_is_the_same() -> None:
     assert not bridge.repeats({**as_json, "ranges": [1.0, 2.0, 2.5]}, 30.1)
 
 
+@pytest.mark.parametrize("made", [level, stamped])
+def test_a_sample_that_was_only_recorded_is_the_same_once_its_topic_carries_a_signal(made: Any) -> None:
+    for before, after in ((frame(made(80.0)), made(80.0)), (made(80.0), frame(made(80.0)))):
+        bridge = Bridge()
+        assert not bridge.repeats(before, 0.0)
+        bridge.subscribe(10.0)
+        assert bridge.repeats(after, 10.1)
+        bridge.subscribe(20.0)
+        assert not bridge.repeats(made(79.0), 20.1)
+
+
+def test_a_frame_that_cannot_be_read_is_the_same_as_no_message() -> None:
+    bridge = Bridge()
+    broken = RawFrame(
+        topic=TOPIC, payload=b'{"op":"publish","topic":"/fuel","msg":{"data":}}', is_binary=False, begins=40
+    )
+    bridge.repeats(broken, 0.0)
+    bridge.subscribe(10.0)
+    assert not bridge.repeats(level(80.0), 10.1)
+
+
+def test_a_large_message_without_a_stamp_may_be_new() -> None:
+    for content, is_doubtful in (
+        ({"data": [0] * KEPT_BYTES}, True),
+        (stamped(1.0) | {"data": [0] * KEPT_BYTES}, False),
+    ):
+        known = SentAgain(lambda sent_s: sent_s)
+        large = frame(content)
+        known.receive(TOPIC, large, len(large.payload), 0.0)
+        known.subscribed(TOPIC, 10.0)
+        found = known.receive(TOPIC, frame(content), len(large.payload), 10.1)
+        assert (found.is_repeat, found.is_doubtful) == (True, is_doubtful)
+
+
 def nested(depth: int) -> dict[str, Any]:
     inner: dict[str, Any] = {}
     for _ in range(depth):

@@ -1,28 +1,31 @@
 """Finds where the clock of a recorder was set while it recorded, by the log times of messages in the order of receipt.
 
 A clock is set where the log times go back, where they begin before 2000 and leap to now, where they leap by more than a
-day, or where the stamps of a sensor with a clock of its own show that less time has passed. Every other gap is silence.
+day, where the stamps of a sensor with a clock of its own show that less time has passed, or where another step takes
+the gap back (clock_returns.py). Every other gap is silence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from server.recording.read.clock_returns import Jump, S
+
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-S = 10**9  # ns
 BACK_NS = S // 2  # less is the order in which threads of a recorder write
 GAP_NS = 2 * S  # the stamps of longer gaps are compared
 LEAP_NS = 86_400 * S  # a longer gap in one file is a clock that was set
 FIRST_NS, LAST_NS = 946_684_800 * S, 4_102_444_800 * S  # years 2000 and 2100: of other times a clock was never set
 MOST_STEPS = 100
 MOST_COMPARED = 50  # gaps whose stamps are compared
+MOST_INTERVALS = 10_000
 WINDOW = 512  # messages before and behind a step whose interval is looked at
 UNKNOWN_NS = S // 100  # the interval where too few messages tell one
 LEAST = 3  # messages from which the clock of a stretch is believed
@@ -69,16 +72,29 @@ class _Cut:
     is_leap: bool = False
 
 
-def find_stretches(arrivals: Callable[[], Iterator[Arrivals]], witness: Witness) -> list[Stretch]:
-    """The stretches of one file, the first with a shift of 0; empty: its clock was not set."""
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What the log times of one file show."""
+
+    stretches: Sequence[Stretch] = ()  # the first with a shift of 0; empty: the clock was not set
+    jumps: Sequence[Jump] = ()  # steps, and gaps that may be some
+    interval_ns: int = 0  # usual one of two messages
+
+
+def find_steps(arrivals: Callable[[], Iterator[Arrivals]], witness: Witness, returns: Collection[int] = ()) -> Found:
+    """Where the clock was set in one file. `returns`: places behind gaps that another step takes back."""
     if not _has_gaps(arrivals()):
-        return []
+        return Found()
     found = _joined(list(arrivals()))
+    search = _Search(found, witness, frozenset(returns))
     try:
-        cuts = _cuts(found, witness)
+        cuts = search.cuts()
     except _NotInOrder:
-        return []
-    return _stretches(found, cuts) if cuts else []
+        return Found()
+    stretches = _stretches(found, cuts) if cuts else []
+    intervals_ns = np.diff(found.times_ns[:MOST_INTERVALS])
+    usual_ns = int(np.median(intervals_ns[intervals_ns >= 0])) if (intervals_ns >= 0).any() else 0
+    return Found(stretches, search.jumps, usual_ns)
 
 
 def corrected_ns(stretches: Sequence[Stretch], places: Any, times_ns: Any) -> Ints:
@@ -114,39 +130,51 @@ def _joined(parts: list[Arrivals]) -> Arrivals:
     )
 
 
-def _cuts(found: Arrivals, witness: Witness) -> list[_Cut]:
-    cuts: list[_Cut] = []
-    begin, is_leap = 0, False
-    compared = 0
+@dataclass(slots=True)
+class _Search:
+    """For the steps of one file."""
 
-    def shown(at: int) -> int | None:
-        nonlocal compared
-        compared += 1
-        return witness(found, begin, at) if compared <= MOST_COMPARED else None
+    found: Arrivals
+    witness: Witness
+    returns: frozenset[int]
+    jumps: list[Jump] = field(default_factory=list)
+    compared: int = 0
 
-    while len(cuts) < MOST_STEPS and (cut := _next_cut(found, begin, is_leap, shown)) is not None:
-        cuts.append(cut)
-        begin, is_leap = cut.at, cut.is_leap
-    return cuts
+    def cuts(self) -> list[_Cut]:
+        """Raises _NotInOrder."""
+        cuts: list[_Cut] = []
+        begin, is_leap = 0, False
+        while len(cuts) < MOST_STEPS and (cut := self._next_cut(begin, is_leap)) is not None:
+            cuts.append(cut)
+            begin, is_leap = cut.at, cut.is_leap
+        return cuts
 
+    def _next_cut(self, begin: int, is_behind_leap: bool) -> _Cut | None:
+        """The first step behind `begin`. `is_behind_leap`: what came before it was earlier by more than a day."""
+        found = self.found
+        times_ns = found.times_ns[begin:]
+        highs_ns = np.maximum.accumulate(times_ns)[:-1]
+        steps_ns = times_ns[1:] - highs_ns
+        back = _first_back(times_ns, highs_ns, steps_ns, found.channels[begin:], is_behind_leap)
+        for index in np.flatnonzero(steps_ns[:back] > GAP_NS):
+            gap_ns, high_ns, next_ns = int(steps_ns[index]), int(highs_ns[index]), int(times_ns[index + 1])
+            is_leap = gap_ns > LEAP_NS or high_ns < FIRST_NS <= next_ns
+            at = begin + int(index) + 1
+            elapsed_ns = _elapsed(gap_ns, self._shown(begin, at))
+            place = int(found.places[at])
+            is_cut = is_leap or elapsed_ns is not None
+            self.jumps.append(Jump(place, gap_ns, is_sure=is_cut))
+            if is_cut or place in self.returns:
+                return _Cut(at, elapsed_ns, is_leap)
+        if back is None:
+            return None
+        at = begin + back + 1
+        self.jumps.append(Jump(int(found.places[at]), int(steps_ns[back]), is_sure=True))
+        return _Cut(at, _elapsed(int(steps_ns[back]), self._shown(begin, at)))
 
-def _next_cut(found: Arrivals, begin: int, is_behind_leap: bool, shown: Callable[[int], int | None]) -> _Cut | None:
-    """The first step behind `begin`. `is_behind_leap`: what came before it was earlier by more than a day."""
-    times_ns = found.times_ns[begin:]
-    highs_ns = np.maximum.accumulate(times_ns)[:-1]
-    steps_ns = times_ns[1:] - highs_ns
-    back = _first_back(times_ns, highs_ns, steps_ns, found.channels[begin:], is_behind_leap)
-    for index in np.flatnonzero(steps_ns[:back] > GAP_NS):
-        gap_ns, high_ns, next_ns = int(steps_ns[index]), int(highs_ns[index]), int(times_ns[index + 1])
-        is_leap = gap_ns > LEAP_NS or high_ns < FIRST_NS <= next_ns
-        at = begin + int(index) + 1
-        elapsed_ns = _elapsed(gap_ns, shown(at))
-        if is_leap or elapsed_ns is not None:
-            return _Cut(at, elapsed_ns, is_leap)
-    if back is None:
-        return None
-    at = begin + back + 1
-    return _Cut(at, _elapsed(int(steps_ns[back]), shown(at)))
+    def _shown(self, begin: int, at: int) -> int | None:
+        self.compared += 1
+        return self.witness(self.found, begin, at) if self.compared <= MOST_COMPARED else None
 
 
 def _elapsed(gap_ns: int, ahead_ns: int | None) -> int | None:

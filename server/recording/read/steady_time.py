@@ -6,20 +6,23 @@ The clock of the last stretch is taken for the right one, as a clock is set to b
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Sequence
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from server.recording.mcap.mcap_file import McapFile
+from server.recording.read.clock_returns import Jump, returned
 from server.recording.read.clock_steps import (
     FIRST_NS,
+    GAP_NS,
     LAST_NS,
     LEAP_NS,
     LEAST,
     UNKNOWN_NS,
+    Found,
     S,
     Stretch,
-    find_stretches,
+    find_steps,
     follows,
 )
 from server.recording.read.source import FileSource
@@ -59,13 +62,15 @@ def notes_on(steps: Sequence[ClockStep]) -> list[str]:
 @dataclass(slots=True)
 class _File:
     source: FileSource
+    found: Found
     stretches: list[Stretch]
+    is_return: bool = False  # the gap before it is a step of the clock that another one takes back
 
 
 def make_steady(sources: Sequence[FileSource]) -> list[ClockStep]:
     """Correct the times of files, and list the steps of their clocks in the order of time."""
-    files = [_File(source, _stretches_of(source)) for source in sources if any(one.count for one in source.channels)]
-    pairs = [pair for series in _series(files) for pair in _corrected(series)]
+    files = [_file(source) for source in sources if any(one.count for one in source.channels)]
+    pairs = [pair for series in _series(files) for pair in _corrected(_with_returns(series))]
     if not pairs:
         return []
     filled = [file.source for file in files]
@@ -80,10 +85,35 @@ def make_steady(sources: Sequence[FileSource]) -> list[ClockStep]:
     ]
 
 
-def _stretches_of(source: FileSource) -> list[Stretch]:
-    found = find_stretches(source.arrivals, StampWitness(source.channels, source.raw_at).ahead_ns)
+def _file(source: FileSource, returns: Collection[int] = ()) -> _File:
+    found = find_steps(source.arrivals, StampWitness(source.channels, source.raw_at).ahead_ns, returns)
     count = sum(one.count for one in source.channels)
-    return found or [Stretch(place=0, count=count, first_ns=source.start_ns, last_ns=source.end_ns)]
+    whole = Stretch(place=0, count=count, first_ns=source.start_ns, last_ns=source.end_ns)
+    return _File(source, found, list(found.stretches) or [whole])
+
+
+def _with_returns(series: Sequence[_File]) -> Sequence[_File]:
+    """Files that follow each other, with the gaps as steps that another step takes back, in whatever file that is."""
+    jumps: list[Jump] = []
+    owners: list[tuple[int, bool]] = []  # number of the file of each jump, and whether it is the gap before that file
+    for number, file in enumerate(series):
+        if number:
+            before, one = series[number - 1].stretches[-1], file.stretches[0]
+            gap_ns = one.first_ns - before.last_ns
+            if (is_step := _between(before, one) is not None) or gap_ns > GAP_NS:
+                jumps.append(Jump(0, gap_ns, is_sure=is_step))
+                owners.append((number, True))
+        jumps += file.found.jumps
+        owners += [(number, False)] * len(file.found.jumps)
+    found = returned(jumps, max((file.found.interval_ns for file in series), default=0))
+    made = list(series)
+    for number in {owners[index][0] for index in found}:
+        own = [index for index in found if owners[index][0] == number]
+        places = {jumps[index].place for index in own if not owners[index][1]}
+        if places:
+            made[number] = _file(series[number].source, places)
+        made[number].is_return = any(owners[index][1] for index in own)
+    return made
 
 
 def _corrected(series: Sequence[_File]) -> list[tuple[Stretch, Stretch]]:
@@ -93,7 +123,7 @@ def _corrected(series: Sequence[_File]) -> list[tuple[Stretch, Stretch]]:
     for file in series:
         own = file.stretches
         if flat:
-            change_ns = _between(flat[-1], own[0])
+            change_ns = _between(flat[-1], own[0], is_return=file.is_return)
             is_step.append(change_ns is not None)
             first = own[0].moved(flat[-1].shift_ns) if change_ns is None else follows(flat[-1], own[0], change_ns)
             own = [one.moved(first.shift_ns - own[0].shift_ns) for one in own]
@@ -113,10 +143,10 @@ def _corrected(series: Sequence[_File]) -> list[tuple[Stretch, Stretch]]:
     return [(flat[place], flat[place + 1]) for place, found in enumerate(is_step) if found]
 
 
-def _between(before: Stretch, one: Stretch) -> int | None:
+def _between(before: Stretch, one: Stretch, *, is_return: bool = False) -> int | None:
     """The change of the shift between two files; None: the clock was not set."""
     gap_ns = one.first_ns - before.last_ns
-    if gap_ns < -BETWEEN_FILES_NS or before.last_ns < FIRST_NS <= one.first_ns or gap_ns > LEAP_NS:
+    if is_return or gap_ns < -BETWEEN_FILES_NS or before.last_ns < FIRST_NS <= one.first_ns or gap_ns > LEAP_NS:
         return UNKNOWN_NS - gap_ns
     return None
 

@@ -84,12 +84,15 @@ class KeptReplays:
         self.manager = manager
         self._shown: dict[str, Shown] = {}
 
-    async def open(self, recording: str, opening: dict[str, Any]) -> ReplayClient:
-        """Raises NoReplay."""
+    async def open(self, recording: str, opening: dict[str, Any], instead: str = "") -> ReplayClient:
+        """`instead`: the token of one that its node closes then. Raises NoReplay."""
         for token in [token for token, shown in self._shown.items() if not self.manager.holds(token)]:
             del self._shown[token]
         shown = Shown(self.manager)
-        client = shown.client = await self.manager.open(recording, opening, on_new=shown.on_new)
+        before = self._shown.get(instead)
+        client = shown.client = await self.manager.open(
+            recording, opening, on_new=shown.on_new, instead=None if before is None else before.client
+        )
         self._shown[client.token] = shown
         shown.asked()
         return client
@@ -122,9 +125,11 @@ def _shown(request: Request, token: str) -> Shown:
 
 
 @router.post("")
-async def opened(request: Request, body: Annotated[OpenKept, Body()]) -> dict[str, Any]:
+async def opened(
+    request: Request, body: Annotated[OpenKept, Body()], instead: Annotated[str, Query(max_length=40)] = ""
+) -> dict[str, Any]:
     try:
-        client = await _kept(request).open(body.recording, body.opening.model_dump())
+        client = await _kept(request).open(body.recording, body.opening.model_dump(), instead)
     except NoReplay as why:
         raise HTTPException(409, str(why)) from None
     return {"token": client.token, **client.source_facts()}

@@ -41,7 +41,10 @@ class RemoteReplay(ReplayClient):
 
     async def open(self, source: ReplaySource | None, opening: Mapping[str, Any]) -> None:
         """Has the agent open it and waits for its first state. Raises NoReplay."""
-        found = await self._json("POST", "", {"recording": self.recording, "opening": dict(opening)})
+        before = self.instead
+        query = {"instead": before._theirs} if isinstance(before, RemoteReplay) and before._theirs is not None else {}
+        body = {"recording": self.recording, "opening": dict(opening)}
+        found = await self._json("POST", "", body, urlencode(query))
         self._theirs = str(found["token"])
         self._source = ReplaySource(path=Path(), vehicle=str(found["vehicle"]), title=str(found["title"]))
         self._following = asyncio.create_task(self._follow(), name=f"replay of {self.recording}")
@@ -80,9 +83,11 @@ class RemoteReplay(ReplayClient):
         with contextlib.suppress(NoReplay):
             await self.ask(order)
 
-    async def _json(self, method: str, rest: str, body: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    async def _json(
+        self, method: str, rest: str, body: Mapping[str, Any] | None = None, query: str = ""
+    ) -> dict[str, Any]:
         """Raises NoReplay."""
-        status, raw = await self._call(method, rest, b"" if body is None else orjson.dumps(body))
+        status, raw = await self._call(method, rest, b"" if body is None else orjson.dumps(body), query)
         try:
             found = orjson.loads(raw)
         except orjson.JSONDecodeError:

@@ -25,6 +25,8 @@ export class Known {
   cars = null;
   /** The page shows a recording: frames of the live car are none of it, nor the other way round. */
   replaying = false;
+  /** What was chosen for the replay that is shown. @type {{topics: Record<string, string>, units: Record<string, string>}} */
+  judgedBy = { topics: {}, units: {} };
   /** Who this page is to the server. @type {import('./protocol-types.js').Hello['who'] | null} */
   who = null;
   /** Who is on duty at this device; null: the server has not told. @type {import('./protocol-types.js').Duty | null} */

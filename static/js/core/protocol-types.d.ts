@@ -1517,6 +1517,7 @@ export interface PlaceMarkCommand {
   /** its id, made up by who marks; the same again changes it */
   mark: string;
   at_ms?: number | null;
+  age_ms?: number | null;
   category?: string | null;
   words?: string | null;
 }

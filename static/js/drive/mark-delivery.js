@@ -20,7 +20,7 @@ const UNKNOWN = 'There is no such mark.';
  * @typedef {object} Server
  * @property {() => boolean} isThere
  * @property {() => string} vehicle
- * @property {(fields: {mark: string, vehicle: string, at_ms: number, category: string, words: string}, within_ms: number) => Promise<Delivered>} mark
+ * @property {(fields: {mark: string, vehicle: string, at_ms: number, age_ms: number, category: string, words: string}, within_ms: number) => Promise<Delivered>} mark
  * @property {(id: string, vehicle: string, within_ms: number) => Promise<Delivered>} remove
  * @property {(id: string, vehicle: string, part: 'voice' | 'photo', blob: Blob, type: string, within_ms: number) => Promise<Delivered>} upload
  * @typedef {object} Marks
@@ -155,8 +155,9 @@ export class Delivery {
   /** @param {Exclude<Step, 'drop'>} step @param {Mark} mark @returns {Promise<Delivered>} */
   #send(step, mark) {
     const { id, vehicle, category, words } = mark;
+    const age_ms = Date.now() - mark.wall_ms - mark.shift_s * 1000; // the server's clock may have been set since
     if (step === 'remove') return this.server.remove(id, vehicle, COMMAND_MS);
-    if (step === 'mark' || step === 'change') return this.server.mark({ mark: id, vehicle, at_ms: markedAt(mark), category: category ?? '', words }, COMMAND_MS);
+    if (step === 'mark' || step === 'change') return this.server.mark({ mark: id, vehicle, at_ms: markedAt(mark), age_ms, category: category ?? '', words }, COMMAND_MS);
     const part = /** @type {import('./mark-model.js').Part} */ (mark[step]);
     return this.server.upload(id, vehicle, step, /** @type {Blob} */ (part.blob), part.type, UPLOAD_MS);
   }

@@ -26,10 +26,9 @@ export class CandidateFeed {
     this.model = settingsOf(store);
   }
 
-  /** Those of a signal; null: not known. In a replay the live car would be asked, which is another one. @param {string} name */
+  /** Those of a signal, in a replay of its recording; null: not known. @param {string} name */
   of(name) {
     const { model, store } = this;
-    if (store.replaying) return null;
     if (!store.isSilent && store.now() - this.#asked_ms > FETCH_EVERY_MS) {
       this.#asked_ms = store.now();
       model.candidates().then(({ candidates }) => { this.#found = candidates; }, () => { this.#found = null; });
@@ -78,7 +77,7 @@ export class SignalMore {
     const key = JSON.stringify([details, others, choices]);
     if (key !== this.#shown) this.#fill(details, others, choices);
     this.#shown = key;
-    const chosen = model.body?.units?.[this.name] ?? '';
+    const chosen = model.chosen.units[this.name] ?? '';
     for (const one of this.units.children) setAttribute(one, 'aria-pressed', String(/** @type {HTMLElement} */ (one).dataset['unit'] === chosen));
   }
 

@@ -9,11 +9,12 @@ import { Scrubber } from './replay-scrubber.js';
 import { request } from '../control/request.js';
 import { fetchStyle, styled } from '../core/style-sheet.js';
 import { addressOf } from '../files/files-model.js';
+import { joinedChoices } from '../settings/question-layout.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
  * @typedef {(sentence: string, title?: string) => void} Say
- * @typedef {import('../settings/question-layout.js').Choices} Choices
+ * @typedef {import('../settings/question-layout.js').Change} Change
  */
 
 /** A long file that was never closed is read through before it is shown [ms]. */
@@ -72,7 +73,7 @@ export async function openReplay(id, store, say, { at_s = 0, staysOnTab = false 
 
 /**
  * Judge the recording that is shown by other topics or units, from the same moment on.
- * @param {Choices} change
+ * @param {Change} change
  * @returns {Promise<{ok: boolean, reason?: string}>}
  */
 export async function judgeBy(change) {
@@ -98,8 +99,6 @@ class Replay {
   #seen = '';
   /** How it ran, for a socket that breaks. */
   #ran = { is_playing: false, rate: 1, at_s: 0 };
-  /** What was chosen for this replay. @type {{topics: Record<string, string>, units: Record<string, string>}} */
-  #choices = { topics: {}, units: {} };
   parts = build();
   band = new ReplayBand();
   sheet = liveSheet();
@@ -114,6 +113,7 @@ class Replay {
   constructor(id, store, say) {
     this.id = id;
     this.store = store;
+    store.judgedBy = { topics: {}, units: {} };
     this.say = say;
     this.board = need(document, '#monitor');
     this.root = document.documentElement;
@@ -233,15 +233,15 @@ class Replay {
   /** The socket is there again: back to the moment, and on as it ran. Until then nothing live is shown as recorded. */
   async #again() {
     if (this.#isOpening) return;
-    const answer = await this.#reopen(this.#choices);
+    const answer = await this.#reopen(this.store.judgedBy);
     if (current === this && !answer.ok && this.store.socket.isOpen) void this.leave(answer.reason ?? 'Refused.');
   }
 
-  /** @param {Choices} change */
-  async judgeBy({ topics = {}, units = {} }) {
-    const choices = { topics: { ...this.#choices.topics, ...topics }, units: { ...this.#choices.units, ...units } };
+  /** @param {Change} change */
+  async judgeBy(change) {
+    const choices = joinedChoices(this.store.judgedBy, change);
     const answer = await this.#reopen(choices);
-    if (answer.ok) this.#choices = choices;
+    if (answer.ok && current === this) this.store.judgedBy = choices;
     return answer;
   }
 

@@ -127,7 +127,7 @@ class QuestionSheet {
     this.#isSent = true;
     setText(this.bad, '');
     const { replaying } = this.store;
-    const outcome = await (replaying ? this.#judgeBy(value) : this.#keep(value)).catch(() => UNSENT);
+    const outcome = await this.#keep(value).catch(() => UNSENT);
     this.#isSent = false;
     if (outcome.ok) {
       this.does.answered();
@@ -136,15 +136,10 @@ class QuestionSheet {
     } else setWords(this.bad, `Not chosen. ${outcome.reason}`);
   }
 
-  /** Into the settings of the car. @param {string} value @returns {Promise<Outcome>} */
+  /** Into the settings of the car, or for this replay. @param {string} value @returns {Promise<Outcome>} */
   async #keep(value) {
-    if (!this.model.body) await this.model.load();
+    if (!this.model.body && !this.store.replaying) await this.model.load();
     return this.model.set(answerOf(this.question, value));
-  }
-
-  /** For this replay: the settings are those of the live car. @param {string} value @returns {Promise<Outcome>} */
-  async #judgeBy(value) {
-    return (await import('../replay/replay.js')).judgeBy(answerOf(this.question, value));
   }
 
   /** Draws what each laser sees, and again a moment later. */

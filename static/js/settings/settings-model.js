@@ -76,6 +76,12 @@ export class SettingsModel {
     return this.store.limit(name) ?? this.body?.values[name] ?? null;
   }
 
+  /** The topics and units that somebody chose: for the car, or in a replay for that replay. */
+  get chosen() {
+    const { body, store } = this;
+    return store.replaying ? store.judgedBy : { topics: body?.topics ?? {}, units: body?.units ?? {} };
+  }
+
   /** What was asked for and is not confirmed. @param {string} name */
   pending(name) {
     return this.#pending.get(name)?.value ?? null;
@@ -123,6 +129,7 @@ export class SettingsModel {
    * @returns {Promise<Outcome>}
    */
   set(change, of = '') {
+    if (this.store.replaying && !change.values) return judgeBy(change);
     /** @type {Map<string, Pending>} */
     const wishes = new Map();
     for (const [name, wanted] of Object.entries(change.values ?? {})) {
@@ -288,4 +295,10 @@ class Refusal extends Error {}
 /** @param {unknown} error */
 function sentenceOf(error) {
   return error instanceof Refusal ? error.message : 'The server did not answer in time.';
+}
+
+/** A replay is judged anew by a choice: the settings are those of the live car. @param {Change} change @returns {Promise<Outcome>} */
+async function judgeBy(change) {
+  const { ok, reason = 'Refused.' } = await (await import('../replay/replay.js')).judgeBy(change);
+  return ok ? { ok } : { ok, reason };
 }

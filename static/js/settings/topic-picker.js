@@ -49,7 +49,7 @@ export async function openTopicPicker(store, model, signal) {
   let candidates = null;
   let words;
   try {
-    if (!model.body) await model.load();
+    if (!model.body && !store.replaying) await model.load();
     const known = (await model.candidates()).candidates;
     candidates = known?.[signal] ?? null;
     words = candidates === null ? 'The bridge does not list the car’s topics.' : candidates.length
@@ -59,7 +59,7 @@ export async function openTopicPicker(store, model, signal) {
   }
   if (sheet.dataset['signal'] !== signal) return; // another signal was asked for meanwhile
   setWords(field(sheet, 'words'), words);
-  const options = optionsOf(candidates, store.signal(signal)?.topic ?? null, model.body?.topics[signal]);
+  const options = optionsOf(candidates, store.signal(signal)?.topic ?? null, model.chosen.topics[signal]);
   list.replaceChildren(...options.map((option) => html('li', {}, key(option))));
 
   /** @param {Option} option */

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from server.recording.read.clock_returns import MOST_JUMPS, Jump, S, returned
 from server.recording.read.read import Recording, open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1, write_ros2
 from tests.server.recording.stepped import CONTAINERS, LENGTH_S, Container, Step, rows, write
@@ -58,6 +59,93 @@ def test_times_go_on_over_steps_at_random_places(tmp_path: Path, container: Cont
 def test_no_sensor_with_a_clock_of_its_own_is_needed(tmp_path: Path, container: Container, by_s: float) -> None:
     steps = [(20.0, by_s)]
     assert_goes_on(write(tmp_path, container, steps=steps, has_own_clock=False), steps, has_own_clock=False)
+
+
+THERE_AND_BACK: list[list[Step]] = [
+    [(15.0, 300.0), (35.0, -300.0)],
+    [(15.0, -300.0), (35.0, 300.0)],
+    [(15.0, 20.0), (35.4, -20.3)],
+    [(10.0, 120.0), (20.0, 240.0), (40.0, -360.0)],
+    [(10.0, 700.0), (20.0, -300.0), (40.0, -400.0)],
+    [(8.0, 60.0), (20.0, -60.0), (30.0, 3600.0), (50.0, -3600.0)],
+    [(8.0, 600.0), (20.0, -30.0), (40.0, -600.0)],
+]
+
+
+@pytest.mark.parametrize(
+    ("container", "steps"), [(CONTAINERS[n % len(CONTAINERS)], steps) for n, steps in enumerate(THERE_AND_BACK)]
+)
+def test_a_clock_that_is_set_ahead_and_back_again_gives_no_silence(
+    tmp_path: Path, container: Container, steps: list[Step]
+) -> None:
+    """No sensor has a clock of its own: the steps show each other."""
+    assert_goes_on(write(tmp_path, container, steps=steps, has_own_clock=False), steps, has_own_clock=False)
+
+
+@pytest.mark.parametrize(("by_s", "silence_s"), [(-300.0, 250.0), (-300.0, 310.0), (-20.0, 21.5), (-3.0, 2.5)])
+def test_a_silence_that_is_not_as_long_as_a_step_stays_one(tmp_path: Path, by_s: float, silence_s: float) -> None:
+    path = write(tmp_path, "bag", steps=[(45.0 + silence_s, by_s)], silent_s=(20.0, silence_s), has_own_clock=False)
+    with open_recording([path]) as recording:
+        assert [round(one.by_s) for one in recording.clock_steps] == [round(by_s)]
+        assert recording.duration_s == pytest.approx(LENGTH_S + silence_s, abs=0.3)
+
+
+def test_silences_between_the_steps_stay_silences(tmp_path: Path) -> None:
+    steps = [(15.0, 300.0), (85.0, -300.0)]
+    path = write(tmp_path, "bag", steps=steps, silent_s=(30.0, 40.0), has_own_clock=False)
+    assert_goes_on(path, steps, silent_s=(30.0, 40.0), has_own_clock=False)
+
+
+@pytest.mark.parametrize("cuts_s", [(25.0,), (15.0,), (15.0, 35.0), (15.0, 25.0, 35.0)])
+@pytest.mark.parametrize("by_s", [300.0, -300.0])
+def test_the_clock_is_set_ahead_in_one_part_of_a_bag_and_back_in_another(
+    tmp_path: Path, cuts_s: tuple[float, ...], by_s: float
+) -> None:
+    found, true = rows(2, [(15.0, by_s), (35.0, -by_s)], has_own_clock=False), true_times(has_own_clock=False)
+    places = [0, *(sum(at_s < cut_s - 0.003 for at_s, _ in true) for cut_s in cuts_s), len(found)]
+    folder = tmp_path / "drive"
+    for number, (start, end) in enumerate(pairwise(places)):
+        part = write_ros2(tmp_path / f"part{number}", Drive(messages=found[start:end]))
+        if number == 0:
+            part.rename(folder)
+            text = (folder / "metadata.yaml").read_text()
+            (folder / "metadata.yaml").write_text(text.replace("part0.mcap", "drive_0.mcap"))
+            part = folder
+        (part / f"part{number}.mcap").rename(folder / f"drive_{number}.mcap")
+    with open_recording([folder]) as recording:
+        times = received(recording)
+        assert [topic for _, topic in times] == [topic for _, topic in true]
+        assert all(abs(at_s - true_s) < 3 * NEAR_S for (at_s, _), (true_s, _) in zip(times, true, strict=True))
+        assert [round(one.by_s) for one in recording.clock_steps] == [by_s, -by_s]
+
+
+def jump(by_s: float, *, is_sure: bool = False) -> Jump:
+    return Jump(0, round(by_s * S), is_sure or by_s < 0)
+
+
+@pytest.mark.parametrize(
+    ("jumps", "expected"),
+    [
+        ([jump(300), jump(-300)], {0}),
+        ([jump(300), jump(-299.2)], {0}),
+        ([jump(300), jump(-298)], set()),
+        ([jump(40), jump(41), jump(-41)], {1}),
+        ([jump(300, is_sure=True), jump(300), jump(-300)], set()),  # that one is taken back already
+        ([jump(-300), jump(300), jump(300)], {1}),
+        ([jump(40), jump(300), jump(30), jump(-300), jump(50)], {1}),
+        ([jump(100), jump(200), jump(-300)], {0, 1}),
+        ([jump(300), jump(300)], set()),
+        ([jump(2.5), jump(-2.1)], set()),
+    ],
+)
+def test_a_gap_is_a_step_where_another_step_takes_it_back(jumps: list[Jump], expected: set[int]) -> None:
+    assert returned(jumps, 0) == expected
+
+
+def test_a_drive_with_thousands_of_gaps_is_compared_in_time() -> None:
+    chance = random.Random(1)
+    jumps = [jump(chance.uniform(2.0, 5000.0) * (-1 if n % 10 == 0 else 1)) for n in range(20_000)]
+    assert max(returned(jumps, 0), default=0) < MOST_JUMPS
 
 
 @pytest.mark.parametrize("container", CONTAINERS)
