@@ -6,6 +6,9 @@ const QUIET_MS = 2500;
 const DIAL_MS = 5000;
 const FIRST_WAIT_MS = 300;
 const LAST_WAIT_MS = 2000;
+/** A page sends at most 25 messages a second: frames are taken up to the first, a replay is led up to the second; what a person orders never waits. */
+export const TAKES_A_S = 20;
+export const LEADS_A_S = 24;
 
 /**
  * @typedef {Pick<WebSocket, 'binaryType' | 'send' | 'close'> & {onopen: any, onmessage: any, onclose: any, onerror: any}} Socket
@@ -25,6 +28,8 @@ export class PageSocket {
   #proof_ms = 0;
   #wait_ms = FIRST_WAIT_MS;
   #next_ms = -Infinity;
+  /** When the last messages were sent. @type {number[]} */
+  #sent_ms = [];
 
   /**
    * @param {Ear} ear
@@ -71,7 +76,13 @@ export class PageSocket {
   send(message) {
     if (!this.#socket || !this.#isOpen) return false;
     this.#socket.send(JSON.stringify(message));
+    this.#sent_ms = [...this.#sent_ms.slice(-LEADS_A_S), performance.now()];
     return true;
+  }
+
+  /** How long until fewer than `most` messages were sent within a second [ms]; not positive: that is so now. @param {number} most */
+  wait_ms(most) {
+    return 1000 + (this.#sent_ms.at(-most) ?? -Infinity) - performance.now();
   }
 
   /** Hang up; the next `look` dials again, without waiting. */

@@ -258,14 +258,19 @@ class DriveChart {
   #read(at_s) {
     if (this.store.replaying) {
       this.#hover_s = null;
-      void this.store.ask('replay', { do: 'seek', at_s: Math.max(0, at_s) }).then((answer) => {
-        if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Not shown');
-      });
+      void this.#seek(Math.max(0, at_s));
       return;
     }
     const isAgain = this.#read_s !== null && Math.abs(this.#read_s - at_s) < ((this.view[1] - this.view[0]) * AGAIN_PX) / this.panes.box.width;
     this.#read_s = isAgain ? null : Math.min(at_s, this.feed.end_s);
     this.#draw();
+  }
+
+  /** @param {number} at_s of the recording */
+  async #seek(at_s) {
+    const { lead } = await import('../replay/replay.js'); // here while a recording is shown
+    const answer = await lead({ do: 'seek', at_s });
+    if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Not shown');
   }
 
   /** @param {string} key @returns {boolean} */

@@ -31,10 +31,12 @@ export class Scrubber {
 
   /**
    * @param {Store} store
+   * @param {import('./replay-lead.js').ReplayLead} leader
    * @param {(sentence: string, title?: string) => void} say
    */
-  constructor(store, say) {
+  constructor(store, leader, say) {
     this.store = store;
+    this.leader = leader;
     this.say = say;
     this.gaps = svg('g', { class: 'gaps' });
     this.base = svg('path', { class: 'base' });
@@ -155,7 +157,7 @@ export class Scrubber {
     if (at instanceof Element && at.matches(OWN_KEYS)) return;
     if (event.key === ' ') {
       event.preventDefault();
-      this.toggle();
+      if (!event.repeat) this.toggle();
     } else if (event.key === 'ArrowLeft' || event.key === 'ArrowRight') this.#key(event);
   }
 
@@ -217,7 +219,7 @@ export class Scrubber {
   #key(event) {
     if (event.key === ' ') {
       event.preventDefault();
-      this.toggle();
+      if (!event.repeat) this.toggle();
       return;
     }
     const at_s = atByKey(event.key, this.#at_s, this.#length_s);
@@ -246,7 +248,7 @@ export class Scrubber {
       let sent = NaN;
       while (this.#wanted && this.#wanted.at_s !== sent) {
         sent = this.#wanted.at_s;
-        const answer = await this.store.ask('replay', { do: 'seek', at_s: sent });
+        const answer = await this.leader.order({ do: 'seek', at_s: sent });
         if (!answer.ok) {
           this.#wanted = null;
           this.say(answer.reason ?? 'Refused.', 'Position not changed');
@@ -257,9 +259,9 @@ export class Scrubber {
     }
   }
 
-  /** @param {import('../core/requests.js').FieldsOf<'replay'>} order */
+  /** @param {import('./replay-lead.js').Order} order */
   async #order(order) {
-    const answer = await this.store.ask('replay', order);
+    const answer = await this.leader.order(order);
     if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Replay not changed');
   }
 }

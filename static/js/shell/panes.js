@@ -117,15 +117,18 @@ class Lodger {
   }
 }
 
-/** The newest events, a line each, as many as are seen whole. */
+/** The newest events, a line each, as many as are seen whole; beside a replay, those of the recording. */
 class LogPane {
   #shown = '';
   #lines = 0;
+  /** What reads the recording, fetched with the first replay. @type {((replay: import('../core/protocol-types.js').ReplayState) => import('../replay/recorded-log.js').Line[]) | null} */
+  #recorded = null;
 
   /** @param {HTMLElement} list @param {Store} store */
   constructor(list, store) {
     this.list = list;
     this.store = store;
+    this.head = /** @type {HTMLElement} */ (list.parentElement?.querySelector('.ph .end'));
     new ResizeObserver(([entry]) => {
       this.#lines = Math.floor((entry?.contentRect.height ?? 0) / LINE_PX);
       this.draw();
@@ -133,18 +136,43 @@ class LogPane {
   }
 
   draw() {
-    const { rows, last } = this.store.log;
-    const key = `${last} ${rows.length} ${this.#lines}`;
+    const { frame, log: { rows, last } } = this.store;
+    const replay = frame?.replay;
+    setText(this.head, replay ? 'of the recording, newest first' : 'newest first');
+    if (replay) return this.#drawRecorded(replay);
+    this.#put(`${last} ${rows.length} ${this.#lines}`, () => rows.slice(0, this.#lines).map(liveLine));
+  }
+
+  /** @param {import('../core/protocol-types.js').ReplayState} replay */
+  #drawRecorded(replay) {
+    if (!this.#recorded) void this.#fetch().then((recorded) => { this.#recorded = recorded; }, () => {});
+    const lines = this.#recorded?.(replay).slice(0, this.#lines) ?? [];
+    this.#put(JSON.stringify(lines), () => lines.map(lineOf));
+  }
+
+  /** The parts of a replay: where one is shown they are here. */
+  async #fetch() {
+    const [{ recordedLine }, { recordedLines }] = await Promise.all([import('../replay/replay.js'), import('../replay/recorded-log.js')]);
+    return (/** @type {import('../core/protocol-types.js').ReplayState} */ replay) => recordedLines(recordedLine(), replay);
+  }
+
+  /** @param {string} key of what is shown @param {() => HTMLElement[]} made */
+  #put(key, made) {
     if (key === this.#shown) return;
     this.#shown = key;
-    this.list.replaceChildren(...rows.slice(0, this.#lines).map(lineOf));
+    this.list.replaceChildren(...made());
   }
 }
 
 /** @param {import('../core/event-log.js').Row} row */
-function lineOf({ event, gap }) {
+function liveLine({ event, gap }) {
   const shown = event ? eventWords(event) : { icon: 'link-off', kind: '', title: gapWords(gap), text: '' };
-  const line = html('li', {}, html('span', { class: 'n' }, timeOfDay(event?.at_ms ?? gap?.at_ms ?? null)), icon(shown.icon, `s ${shown.kind}`), html('span', { class: 't' }, ...words(shown.title)), html('span', { class: 'm' }, ...words(shown.text)));
-  setAttribute(line, 'data-kind', event?.priority ?? null);
+  return lineOf({ ...shown, at_ms: event?.at_ms ?? gap?.at_ms ?? null, priority: event?.priority ?? null });
+}
+
+/** @param {{at_ms: number | null, icon: string, kind: string, title: string, text: string, priority: string | null}} shown */
+function lineOf({ at_ms, icon: glyph, kind, title, text, priority }) {
+  const line = html('li', {}, html('span', { class: 'n' }, timeOfDay(at_ms)), icon(glyph, `s ${kind}`), html('span', { class: 't' }, ...words(title)), html('span', { class: 'm' }, ...words(text)));
+  setAttribute(line, 'data-kind', priority);
   return line;
 }
