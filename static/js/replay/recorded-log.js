@@ -1,7 +1,8 @@
-// The log beside a replay: what the recording holds up to the moment that is shown, newest first. Pure functions, no DOM.
+// The log beside a replay: what the recording holds up to the moment that is shown, newest first.
 
 import { MARKS } from '../alarms/log-layout.js';
 import { counted, timeOfDay } from '../core/format.js';
+import { recordedLine } from './replay.js';
 import { jumpsOf, lengthOfJump } from './replay-jumps-layout.js';
 
 /**
@@ -31,3 +32,6 @@ export function recordedLines(line, { at_s, start_ms }) {
   const unread = !line.is_done && at_s > line.done_s ? [said('Not read yet', `events after ${timeOfDay(start_ms + line.done_s * 1000)} are not listed`)] : [];
   return [...unread, ...left, ...lines];
 }
+
+/** Of the recording that this page shows. @param {import('../core/protocol-types.js').ReplayState} replay */
+export const shownLines = (replay) => recordedLines(recordedLine(), replay);

@@ -315,7 +315,7 @@ class Replay {
     const { frame } = this.store;
     if (!frame?.replay) return;
     this.band.draw(frame, this.line);
-    setWords(this.parts.length, tapeWords(frame.replay));
+    setText(this.parts.length, tapeWords(frame.replay));
     this.scrubber.draw(frame);
   }
 

@@ -73,7 +73,7 @@ class Panes {
     this.log.draw();
     this.signals.draw(() => signalLines(frame.signals));
     const { head, lines } = peopleLines(store.isSilent ? null : frame.replay ? frame.live?.reach : frame.reach, store.control, store.page);
-    setWords(field(this.monitor, 'head-people'), head);
+    setWords(field(this.monitor, 'head-people'), frame.replay ? `live: ${head}` : head);
     this.people.draw(() => lines);
   }
 
@@ -121,8 +121,9 @@ class Lodger {
 class LogPane {
   #shown = '';
   #lines = 0;
-  /** What reads the recording, fetched with the first replay. @type {((replay: import('../core/protocol-types.js').ReplayState) => import('../replay/recorded-log.js').Line[]) | null} */
-  #recorded = null;
+  /** Reads the recording that is shown; fetched with the first. @type {typeof import('../replay/recorded-log.js').shownLines | undefined} */
+  #recorded;
+  #isFetched = false;
 
   /** @param {HTMLElement} list @param {Store} store */
   constructor(list, store) {
@@ -139,35 +140,24 @@ class LogPane {
     const { frame, log: { rows, last } } = this.store;
     const replay = frame?.replay;
     setText(this.head, replay ? 'of the recording, newest first' : 'newest first');
-    if (replay) return this.#drawRecorded(replay);
-    this.#put(`${last} ${rows.length} ${this.#lines}`, () => rows.slice(0, this.#lines).map(liveLine));
-  }
-
-  /** @param {import('../core/protocol-types.js').ReplayState} replay */
-  #drawRecorded(replay) {
-    if (!this.#recorded) void this.#fetch().then((recorded) => { this.#recorded = recorded; }, () => {});
-    const lines = this.#recorded?.(replay).slice(0, this.#lines) ?? [];
-    this.#put(JSON.stringify(lines), () => lines.map(lineOf));
-  }
-
-  /** The parts of a replay: where one is shown they are here. */
-  async #fetch() {
-    const [{ recordedLine }, { recordedLines }] = await Promise.all([import('../replay/replay.js'), import('../replay/recorded-log.js')]);
-    return (/** @type {import('../core/protocol-types.js').ReplayState} */ replay) => recordedLines(recordedLine(), replay);
-  }
-
-  /** @param {string} key of what is shown @param {() => HTMLElement[]} made */
-  #put(key, made) {
+    if (replay && !this.#isFetched) void this.#fetch();
+    const recorded = replay && (this.#recorded?.(replay) ?? []).slice(0, this.#lines);
+    const key = recorded ? JSON.stringify(recorded) : `${last} ${rows.length} ${this.#lines}`;
     if (key === this.#shown) return;
     this.#shown = key;
-    this.list.replaceChildren(...made());
+    this.list.replaceChildren(...(recorded ?? rows.slice(0, this.#lines).map(liveOf)).map(lineOf));
+  }
+
+  async #fetch() {
+    this.#isFetched = true;
+    this.#recorded = (await import('../replay/recorded-log.js').catch(() => null))?.shownLines;
   }
 }
 
 /** @param {import('../core/event-log.js').Row} row */
-function liveLine({ event, gap }) {
+function liveOf({ event, gap }) {
   const shown = event ? eventWords(event) : { icon: 'link-off', kind: '', title: gapWords(gap), text: '' };
-  return lineOf({ ...shown, at_ms: event?.at_ms ?? gap?.at_ms ?? null, priority: event?.priority ?? null });
+  return { ...shown, at_ms: event?.at_ms ?? gap?.at_ms ?? null, priority: event?.priority ?? null };
 }
 
 /** @param {{at_ms: number | null, icon: string, kind: string, title: string, text: string, priority: string | null}} shown */
