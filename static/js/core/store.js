@@ -196,16 +196,6 @@ export class Store extends Known {
     return this.#requests.ask(kind, /** @type {any} */ ({ ...fields, ...(fence === null ? {} : { fence }) }), within_ms);
   }
 
-  /** One take waits at a time: what is taken is the newest. @param {number} seq */
-  #take(seq) {
-    if (this.#isTaking) return;
-    this.#isTaking = true;
-    this.inTurn(TAKES_A_S, () => {
-      this.#isTaking = false;
-      this.scans.offered(seq, this.now());
-    });
-  }
-
   /** Run once fewer than `most` messages were sent within a second, where that is so at once. @param {number} most @param {() => void} run */
   inTurn(most, run) {
     const wait_ms = this.socket.wait_ms(most);
@@ -221,7 +211,12 @@ export class Store extends Known {
       case 'hello':
         return this.#greeted(message, at_ms);
       case 'offer':
-        return this.#take(message.seq);
+        if (this.#isTaking) return; // one take waits at a time: what is taken is the newest
+        this.#isTaking = true;
+        return this.inTurn(TAKES_A_S, () => {
+          this.#isTaking = false;
+          this.scans.offered(message.seq, this.now());
+        });
       case 'state':
         return this.#state(message, at_ms);
       case 'cars':

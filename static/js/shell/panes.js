@@ -7,6 +7,7 @@ import { fixed, timeOfDay } from '../core/format.js';
 import { gapWords } from '../core/event-log.js';
 import { alarmInHead } from './dialogs.js';
 import { areAlarmsInSight } from './layout.js';
+import { styled } from '../core/style-sheet.js';
 import { veilOf } from './veil.js';
 import { Lines, peopleLines, signalLines } from './wall-panes.js';
 
@@ -55,6 +56,7 @@ class Panes {
     this.heads = /** @type {const} */ (['map', 'scan', 'alarms']).map((name) => ({ name, element: field(monitor, `head-${name}`) }));
     const alarms = field(monitor, 'pane-alarms');
     this.list = new Lodger(alarms, 'The list of alarms', async () => {
+      void styled('wall');
       const { mount: fill } = await import('../alarms/alarms.js');
       return () => fill(alarms, store, { inHead: () => alarmInHead(monitor) });
     });
@@ -73,7 +75,7 @@ class Panes {
     this.log.draw();
     this.signals.draw(() => signalLines(frame.signals));
     const { head, lines } = peopleLines(store.isSilent ? null : frame.replay ? frame.live?.reach : frame.reach, store.control, store.page);
-    setWords(field(this.monitor, 'head-people'), frame.replay ? `live: ${head}` : head);
+    setWords(field(this.monitor, 'head-people'), (frame.replay ? 'live: ' : '') + head);
     this.people.draw(() => lines);
   }
 
@@ -123,7 +125,6 @@ class LogPane {
   #lines = 0;
   /** Reads the recording that is shown; fetched with the first. @type {typeof import('../replay/recorded-log.js').shownLines | undefined} */
   #recorded;
-  #isFetched = false;
 
   /** @param {HTMLElement} list @param {Store} store */
   constructor(list, store) {
@@ -140,17 +141,15 @@ class LogPane {
     const { frame, log: { rows, last } } = this.store;
     const replay = frame?.replay;
     setText(this.head, replay ? 'of the recording, newest first' : 'newest first');
-    if (replay && !this.#isFetched) void this.#fetch();
+    if (replay && !this.#recorded) {
+      this.#recorded = () => [];
+      import('../replay/recorded-log.js').then(({ shownLines }) => { this.#recorded = shownLines; }, () => {});
+    }
     const recorded = replay && (this.#recorded?.(replay) ?? []).slice(0, this.#lines);
     const key = recorded ? JSON.stringify(recorded) : `${last} ${rows.length} ${this.#lines}`;
     if (key === this.#shown) return;
     this.#shown = key;
     this.list.replaceChildren(...(recorded ?? rows.slice(0, this.#lines).map(liveOf)).map(lineOf));
-  }
-
-  async #fetch() {
-    this.#isFetched = true;
-    this.#recorded = (await import('../replay/recorded-log.js').catch(() => null))?.shownLines;
   }
 }
 
