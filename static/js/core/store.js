@@ -15,7 +15,7 @@ import { readMessage } from './protocol.js';
 import { Requests } from './requests.js';
 import { ScanFeed } from './scan-feed.js';
 import { Seal } from './signer.js';
-import { PageSocket, TAKES_A_S } from './socket.js';
+import { PageSocket } from './socket.js';
 
 /**
  * @typedef {import('./protocol-types.js').State} State
@@ -33,7 +33,6 @@ export class Store extends Known {
   unreadable = 0; // frames and scans that could not be read
   log = new EventLog();
   #cars_ms = -Infinity;
-  #isTaking = false;
   deadMan = new DeadMan();
   #clock = new ServerClock();
   #delay_ms = 0; // how long the newest frame was under way
@@ -196,13 +195,6 @@ export class Store extends Known {
     return this.#requests.ask(kind, /** @type {any} */ ({ ...fields, ...(fence === null ? {} : { fence }) }), within_ms);
   }
 
-  /** Run once fewer than `most` messages were sent within a second, where that is so at once. @param {number} most @param {() => void} run */
-  inTurn(most, run) {
-    const wait_ms = this.socket.wait_ms(most);
-    if (wait_ms > 0) setTimeout(() => this.inTurn(most, run), wait_ms);
-    else run();
-  }
-
   /** @param {string} text @param {number} [at_ms] when it came */
   #heard(text, at_ms = this.now()) {
     const message = readMessage(text);
@@ -211,12 +203,7 @@ export class Store extends Known {
       case 'hello':
         return this.#greeted(message, at_ms);
       case 'offer':
-        if (this.#isTaking) return; // one take waits at a time: what is taken is the newest
-        this.#isTaking = true;
-        return this.inTurn(TAKES_A_S, () => {
-          this.#isTaking = false;
-          this.scans.offered(message.seq, this.now());
-        });
+        return this.socket.takeInTurn(() => this.scans.offered(message.seq, this.now()));
       case 'state':
         return this.#state(message, at_ms);
       case 'cars':

@@ -16,7 +16,7 @@ export class ReplayLead {
   /** Orders that wait for that. @type {((_: void) => void)[]} */
   #waiting = [];
 
-  /** @param {Pick<import('../core/store.js').Store, 'ask' | 'inTurn' | 'socket'>} store */
+  /** @param {Pick<import('../core/store.js').Store, 'ask' | 'socket'>} store */
   constructor(store) {
     this.store = store;
   }
@@ -31,7 +31,7 @@ export class ReplayLead {
     let answer;
     do {
       if (this.isAway) await new Promise((go) => this.#waiting.push(go));
-      await new Promise((/** @type {(_: void) => void} */ go) => this.store.inTurn(LEADS_A_S, go));
+      await new Promise((/** @type {(_: void) => void} */ go) => this.store.socket.inTurn(LEADS_A_S, go));
       if (this.#isOver) return LEFT;
       answer = await this.store.ask('replay', order);
     } while (!answer.ok && this.isAway && !this.#isOver);

@@ -217,22 +217,18 @@ export class Scrubber {
 
   /** @param {KeyboardEvent} event */
   #key(event) {
-    if (event.key === ' ') {
-      event.preventDefault();
-      if (!event.repeat) this.toggle();
-      return;
-    }
     const at_s = atByKey(event.key, this.#at_s, this.#length_s);
-    if (at_s === null) return;
+    if (at_s === null && event.key !== ' ') return;
     event.preventDefault();
-    this.#seek(at_s);
+    if (at_s !== null) this.#seek(at_s);
+    else if (!event.repeat) this.toggle();
   }
 
   /** @param {1 | -1} direction */
   #step(direction) {
     const mark = markBeside(this.#events, this.#at_s, direction);
     if (mark) this.#seek(mark.at_s);
-    else this.say(direction > 0 ? 'There is no alarm, mark or intervention after this moment.' : 'There is no alarm, mark or intervention before this moment.');
+    else this.say(`There is no alarm, mark or intervention ${direction > 0 ? 'after' : 'before'} this moment.`);
   }
 
   /** One seek at a time is under way; of those that come meanwhile, the last counts. @param {number} at_s */
