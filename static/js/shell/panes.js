@@ -46,6 +46,9 @@ export function mount(monitor, store) {
 }
 
 class Panes {
+  /** The sheet of the widest screens. @type {Promise<void> | undefined} */
+  dress;
+
   /** @param {HTMLElement} monitor @param {Store} store */
   constructor(monitor, store) {
     this.monitor = monitor;
@@ -56,7 +59,6 @@ class Panes {
     this.heads = /** @type {const} */ (['map', 'scan', 'alarms']).map((name) => ({ name, element: field(monitor, `head-${name}`) }));
     const alarms = field(monitor, 'pane-alarms');
     this.list = new Lodger(alarms, 'The list of alarms', async () => {
-      void styled('wall');
       const { mount: fill } = await import('../alarms/alarms.js');
       return () => fill(alarms, store, { inHead: () => alarmInHead(monitor) });
     });
@@ -69,6 +71,7 @@ class Panes {
     const isInSight = frame !== null && areAlarmsInSight();
     void this.list.want(isInSight);
     if (!isInSight) return;
+    if (innerWidth >= 1800) this.dress ??= styled('wall'); // as in wall.css
     const heads = headsOf(frame);
     const covered = veilOf(this.store);
     for (const { name, element } of this.heads) setWords(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // of a covered pane nothing is said
