@@ -75,6 +75,8 @@ class ViewSource:
         client, live = self._client, self._live_frame(kind)
         if client is None or kind == "cars":
             return live.number if live is not None else 0
+        if kind == "scan" and not client.scan:  # before the first one, also after a seek back to there
+            return 0
         if kind != "state":
             return client.numbers[kind]
         return client.numbers["state"] + (live.number if live is not None else self._live_number)

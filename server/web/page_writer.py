@@ -25,7 +25,8 @@ from server.web.fair_wakeup import FairWakeup
 EVENTS_A_BATCH = 100
 RESTARTED = 1012  # RFC 6455: the page dials again, and is greeted anew
 HELLO_WITHIN_S = 1.0  # until then no event is sent: the page's hello names the newest that it has
-BATCH_EVERY_S = 0.01  # to a page that catches up: its answers stay far below the messages that it may send a second
+OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
+BATCH_EVERY_S = 0.2  # to a page that catches up: with its other messages it sends at most 25 a second
 MAX_REPLIES = 200  # waiting for a page that does not read
 
 
@@ -54,6 +55,8 @@ class PageWriter:
         self._watches_scan = False
         self._seq = 0
         self._is_offered = False  # an offer is unanswered
+        self._offered_s = float("-inf")  # when the last offer was sent
+        self._offering: asyncio.TimerHandle | None = None  # an offer that is due later
         self._is_taking = False  # the page requested the newest
         self._replies: list[messages.ToPage] = []
         self._event = 0  # the last number sent; from the greeting on
@@ -175,6 +178,8 @@ class PageWriter:
     def close(self) -> None:
         """Leaves what wakes it."""
         self._feed.close()
+        if self._offering is not None:
+            self._offering.cancel()
         self._wakeup.leave(self._wake)
         self.watch_scan(False)
 
@@ -214,10 +219,20 @@ class PageWriter:
 
     async def _offer(self) -> None:
         fresh = [kind for kind in self._view.kinds if self._is_new(kind)]
-        if fresh:
-            self._seq += 1
-            self._is_offered = True
-            await self._send({"kind": "offer", "seq": self._seq, "of": fresh})
+        if not fresh or self._offering is not None:
+            return
+        wait_s = self._offered_s + OFFER_EVERY_S - self._now()
+        if wait_s > 0:
+            self._offering = asyncio.get_running_loop().call_later(wait_s, self._offer_is_due)
+            return
+        self._seq += 1
+        self._is_offered = True
+        self._offered_s = self._now()
+        await self._send({"kind": "offer", "seq": self._seq, "of": fresh})
+
+    def _offer_is_due(self) -> None:
+        self._offering = None
+        self._wake.set()
 
     def _is_new(self, kind: FrameKind) -> bool:
         if kind == "scan" and not self._watches_scan:
@@ -225,8 +240,10 @@ class PageWriter:
         return self._view.number(kind) > self._sent[kind]
 
     async def _send_newest(self, kind: FrameKind, *, unasked: bool = False) -> None:
-        frame = self._view.newest(kind)
-        if frame is None or (frame.number <= self._sent[kind] and not unasked):
+        number, frame = self._view.number(kind), self._view.newest(kind)
+        is_new = frame is not None and (unasked or frame.number > self._sent[kind])
+        self._sent[kind] = max(self._sent[kind], number)  # also of one without a payload: it is not offered again
+        if frame is None or not is_new:
             return
         self._sent[kind] = frame.number
         if isinstance(frame.payload, bytes):

@@ -468,6 +468,7 @@ class Canned:
         self.access = "open"
         self.cars_every_s = 0.5
         self.states_every_s = 0.1
+        self.floods = False  # each take is answered with another offer, at once
         self.fleet_events: list[Json] = []
         self.cars: list[Json] = []  # summaries of all cars, by their name
         self.tile: Callable[[int, int, int], bytes] = lambda z, x, y: b""
@@ -491,6 +492,8 @@ class Canned:
                 self.heard.append(message)
                 if message.get("kind") == "watch":
                     self._watching = message["scan"]
+                if message.get("kind") == "take" and self.floods:
+                    await socket.send_json({"kind": "offer", "seq": message["seq"], "of": ["scan"]})
                 if message.get("kind") == "hello":
                     self._page = message.get("page")
                     if self.log and not is_fleet:

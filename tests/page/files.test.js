@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import {
-  alarmWords, choiceOf, countsOf, distanceWords, factWords, lengthWords, liveOf, nameOf, originWords, pointsOf, queryOf, sizeWords, storedWords, tagsOf, warningWords, whenWords, whyNotAsItIs,
+  alarmWords, byUrgency, choiceOf, countsOf, distanceWords, factWords, lengthWords, liveOf, nameOf, originWords, pointsOf, queryOf, sizeWords, storedWords, tagsOf, warningWords, whenWords, whyNotAsItIs,
 } from '../../static/js/files/files-layout.js';
 import { listingOf, storedQueryOf } from '../../static/js/files/stored-list.js';
 
@@ -98,9 +98,9 @@ test('tags as they are typed, points as they are drawn', () => {
 test('what is recorded now, and why nothing is', () => {
   const now = { vehicle: 'car', isMonitoring: true, isSilent: false };
   const on = { state: 'recording', for_s: 252, part: 1, bytes: 18_600_000, dropped: 0, reason: null };
-  assert.deepEqual(liveOf(on, now), { name: 'Recording now', mark: 'car', facts: '04:12 min · 18.6 MB', missing: '', isOn: true, isBad: false, order: false });
+  assert.deepEqual(liveOf(on, now), { name: 'Recording now', mark: 'car', length: '04:12 min', size: '18.6 MB', lost: '', missing: '', isOn: true, isBad: false, order: false });
   assert.equal(liveOf({ ...on, part: 2 }, now)?.mark, 'car · part 2');
-  assert.equal(liveOf({ ...on, dropped: 7 }, now)?.facts, '04:12 min · 18.6 MB · 7 messages lost: the disk is too slow');
+  assert.equal(liveOf({ ...on, dropped: 7 }, now)?.lost, '7 messages lost: the disk is too slow');
   assert.equal(liveOf({ ...on, dropped: 7 }, now)?.isBad, true);
   const held = liveOf({ ...on, state: 'held', reason: 'The link is lost.' }, now);
   assert.deepEqual([held?.name, held?.mark, held?.isOn, held?.order], ['Recording held', 'The link is lost.', false, false]);
@@ -108,7 +108,7 @@ test('what is recorded now, and why nothing is', () => {
   assert.deepEqual([stopped?.name, stopped?.mark, stopped?.isBad, stopped?.order], ['Recording stopped', 'The disk is full.', true, true]);
   assert.equal(liveOf({ ...on, state: 'saving' }, now)?.order, null);
   const off = { state: 'off', for_s: null, reason: 'Recording starts manually (a setting).' };
-  assert.deepEqual([liveOf(off, now)?.name, liveOf(off, now)?.order, liveOf(off, now)?.facts], ['Not recording', true, '']);
+  assert.deepEqual([liveOf(off, now)?.name, liveOf(off, now)?.order, liveOf(off, now)?.length, liveOf(off, now)?.size], ['Not recording', true, '', '']);
   assert.equal(liveOf(off, { ...now, isMonitoring: false }), null);
   assert.equal(liveOf(undefined, now), null);
   assert.equal(liveOf(on, { ...now, isSilent: true })?.isOn, false, 'nobody knows');
@@ -138,4 +138,9 @@ test('what agents stored is listed as recordings are', () => {
   assert.deepEqual([listing.next, listing.all.count], ['a/a_2', 7]);
   assert.equal(storedQueryOf(null, 5, { kind: 'all', value: '' }, 'b'), 'limit=5&vehicle=b');
   assert.equal(storedQueryOf('a/a_2', 200, { kind: 'vehicle', value: 'a b' }), 'limit=100&cursor=a%2Fa_2&vehicle=a+b');
+});
+
+test('of a short list of alarms the criticals come first, and each priority in the order of time', () => {
+  const one = (/** @type {number} */ at_ms, /** @type {'critical' | 'warning' | 'advisory'} */ priority) => ({ at_ms, priority });
+  assert.deepEqual(byUrgency([one(1, 'warning'), one(2, 'advisory'), one(3, 'critical'), one(4, 'warning'), one(5, 'critical')]).map(({ at_ms }) => at_ms), [3, 5, 1, 4, 2]);
 });

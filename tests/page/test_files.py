@@ -370,7 +370,8 @@ async def test_the_sheet_of_a_file_is_within_every_screen(phone: Phone, canned: 
         await phone.page.set_viewport_size({"width": width, "height": height})
         await phone.page.evaluate(DRAWN)
         box = await sheet(phone).bounding_box()
-        is_docked = width >= 1200  # beside the list it always stands, and has no key that closes it
+        is_docked = (width >= 1000 and height >= 600) or (width >= 700 and height >= 1060)
+        # beside the list it always stands, and has no key that closes it
         close = await sheet(phone).get_by_role("button", name="Close").bounding_box() if not is_docked else box
         item = await sheet(phone).locator(".menu-list li").first.bounding_box()
         assert box is not None

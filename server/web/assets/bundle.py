@@ -32,7 +32,6 @@ STYLES = (
     "wide",
     "watch",
     "ledge",
-    "wall",
 )  # in this order
 ENTRY = "main.js"
 FLEET_STYLES = ("tokens", "frame", "topbar", "sheets", "fleet")

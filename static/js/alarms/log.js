@@ -72,8 +72,9 @@ class AlarmLog {
     setText(standing, String(alarms.filter((alarm) => alarm.state !== 'SHELVED').length));
     setText(shelved, String(alarms.filter((alarm) => alarm.state === 'SHELVED').length));
     setWords(load, loadWords(frame?.alarm_load));
-    setWords(trouble, frame?.log_trouble ?? '');
-    show(trouble, Boolean(frame?.log_trouble));
+    const why = frame?.replay ? 'These are the events of the live car. Those of the recording are in the list of its alarms.' : frame?.log_trouble ?? '';
+    setWords(trouble, why);
+    show(trouble, why !== '');
     const lines = byUrgency(alarms).map((alarm) => [alarm.title, standingWords(alarm), timeOfDay(alarm.raised_ms), alarm.priority]);
     const key = JSON.stringify(lines);
     if (key !== this.#standing) {

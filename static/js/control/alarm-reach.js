@@ -14,7 +14,7 @@ export function mount(root, store, openPhone) {
   function draw() {
     const { frame } = store;
     const seen = reachOf(store.isSilent ? null : frame?.replay ? frame.live?.reach : frame?.reach);
-    setWords(text, seen.text);
+    setWords(text, (frame?.replay ? 'Live: ' : '') + seen.text);
     setWords(why, seen.why);
     setIcon(mark, seen.isBad ? 'bell-off' : 'bell');
     setAttribute(root, 'data-bad', seen.isBad || null);

@@ -6,6 +6,9 @@ const QUIET_MS = 2500;
 const DIAL_MS = 5000;
 const FIRST_WAIT_MS = 300;
 const LAST_WAIT_MS = 2000;
+/** A page sends at most 25 messages a second: frames are taken up to the first, a replay is led up to the second; what a person orders never waits. */
+const TAKES_A_S = 20;
+export const LEADS_A_S = 24;
 
 /**
  * @typedef {Pick<WebSocket, 'binaryType' | 'send' | 'close'> & {onopen: any, onmessage: any, onclose: any, onerror: any}} Socket
@@ -25,6 +28,9 @@ export class PageSocket {
   #proof_ms = 0;
   #wait_ms = FIRST_WAIT_MS;
   #next_ms = -Infinity;
+  /** When the last messages were sent. @type {number[]} */
+  #sent_ms = [];
+  #isTaking = false;
 
   /**
    * @param {Ear} ear
@@ -71,7 +77,25 @@ export class PageSocket {
   send(message) {
     if (!this.#socket || !this.#isOpen) return false;
     this.#socket.send(JSON.stringify(message));
+    this.#sent_ms = [...this.#sent_ms.slice(-LEADS_A_S), performance.now()];
     return true;
+  }
+
+  /** Run once fewer than `most` messages were sent within a second; where that is so, at once. @param {number} most @param {() => void} run */
+  inTurn(most, run) {
+    const wait_ms = 1000 + (this.#sent_ms.at(-most) ?? -Infinity) - performance.now();
+    if (wait_ms > 0) setTimeout(() => this.inTurn(most, run), wait_ms);
+    else run();
+  }
+
+  /** Take a frame in turn; one take waits at a time, for what is taken is the newest. @param {() => void} take */
+  takeInTurn(take) {
+    if (this.#isTaking) return;
+    this.#isTaking = true;
+    this.inTurn(TAKES_A_S, () => {
+      this.#isTaking = false;
+      take();
+    });
   }
 
   /** Hang up; the next `look` dials again, without waiting. */

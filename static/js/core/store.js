@@ -203,7 +203,7 @@ export class Store extends Known {
       case 'hello':
         return this.#greeted(message, at_ms);
       case 'offer':
-        return this.scans.offered(message.seq, this.now());
+        return this.socket.takeInTurn(() => this.scans.offered(message.seq, this.now()));
       case 'state':
         return this.#state(message, at_ms);
       case 'cars':

@@ -87,6 +87,17 @@ export function countsOf(alarms) {
   });
 }
 
+const URGENCY = /** @type {Priority[]} */ (['critical', 'warning', 'advisory']);
+
+/**
+ * The most urgent first, then as they were raised: what is left out of a short list is the least urgent.
+ * @template {{priority: Priority, at_ms: number}} One
+ * @param {One[]} raised
+ */
+export function byUrgency(raised) {
+  return [...raised].sort((a, b) => URGENCY.indexOf(a.priority) - URGENCY.indexOf(b.priority) || a.at_ms - b.at_ms);
+}
+
 /** "2 critical alarms, 1 warning", "no alarms"; "alarms not recorded" is not the same. @param {Recording['alarms']} alarms */
 export function alarmWords(alarms) {
   if (alarms === null) return 'alarms not recorded';
@@ -188,7 +199,7 @@ export function pointsOf(line) {
  * @property {{topic: string, mb: number}[]} [too_large]
  * @property {number} [too_large_count]
  *
- * @typedef {{name: string, mark: string, facts: string, missing: string, isOn: boolean, isBad: boolean, order: boolean | null}} Live order: what a key asks for, true to record; null: no key
+ * @typedef {{name: string, mark: string, length: string, size: string, lost: string, missing: string, isOn: boolean, isBad: boolean, order: boolean | null}} Live order: what a key asks for, true to record; null: no key
  */
 
 const NAMES = /** @type {Record<string, string>} */ ({ recording: 'Recording now', held: 'Recording held', saving: 'Being saved', stopped: 'Recording stopped', off: 'Not recording' });
@@ -203,12 +214,12 @@ export function liveOf(recorder, { vehicle, isMonitoring, isSilent }) {
   if (!recorder || (recorder.state === 'off' && !isMonitoring)) return null;
   const { state, for_s, part, bytes, dropped, reason } = recorder;
   const isOn = state === 'recording';
-  const facts = [for_s === null || state === 'off' ? '' : lengthWords(for_s), bytes ? sizeWords(bytes) : '', dropped ? `${dropped} messages lost: the disk is too slow` : ''];
   const mark = isOn ? [vehicle ?? '', (part ?? 1) > 1 ? `part ${part}` : ''] : [reason ?? ''];
-  if (isSilent) return { name: 'Recording?', mark: 'The server does not answer: the recording state is unknown.', facts: '', missing: '', isOn: false, isBad: true, order: null };
+  if (isSilent) return { name: 'Recording?', mark: 'The server does not answer: the recording state is unknown.', length: '', size: '', lost: '', missing: '', isOn: false, isBad: true, order: null };
   return {
+    length: for_s === null || state === 'off' ? '' : lengthWords(for_s), size: bytes ? sizeWords(bytes) : '', lost: dropped ? `${dropped} messages lost: the disk is too slow` : '',
     missing: isOn || state === 'held' ? missingWords(recorder) : '',
-    name: NAMES[state] ?? state, mark: mark.filter(Boolean).join(' · '), facts: facts.filter(Boolean).join(' · '), isOn, isBad: state === 'stopped' || Boolean(dropped),
+    name: NAMES[state] ?? state, mark: mark.filter(Boolean).join(' · '), isOn, isBad: state === 'stopped' || Boolean(dropped),
     order: state === 'saving' || !isMonitoring ? null : !(isOn || state === 'held'),
   };
 }

@@ -13,11 +13,11 @@ export class FilesLive {
     this.store = store;
     this.name = html('div', { class: 't' });
     this.mark = html('div', { class: 'm' });
-    this.facts = html('div', { class: 'm' });
+    this.facts = [html('span'), html('span'), html('span')];
     this.missing = html('div', { class: 'm', 'data-f': 'files-missing' });
     this.key = html('button', { type: 'button', class: 'key', 'data-f': 'files-record' });
     this.dot = html('span', { class: 'thumb none' }, icon('rec', 'l'));
-    this.row = html('div', { class: 'file', 'data-live': '', hidden: true }, this.dot, html('div', { class: 'tx' }, this.name, this.mark, this.facts, this.missing), this.key);
+    this.row = html('div', { class: 'file', 'data-live': '', hidden: true }, this.dot, html('div', { class: 'tx' }, this.name, this.mark, html('div', { class: 'm facts-line' }, ...this.facts), this.missing), this.key);
     this.element = html('section', { 'aria-label': 'The recorder' }, this.row);
     this.stop = listen(this.key, 'click', () => record(this.key.dataset['on'] === 'true', store, say));
   }
@@ -33,7 +33,7 @@ export class FilesLive {
     if (store.replaying) live.order = null; // its key is with the live car
     setText(this.name, live.name);
     setWords(this.mark, live.mark);
-    setWords(this.facts, live.facts);
+    [live.length, live.size, live.lost].forEach((text, i) => setWords(/** @type {HTMLElement} */ (this.facts[i]), text));
     setWords(this.missing, live.missing);
     show(this.missing, live.missing !== '');
     setAttribute(this.row, 'data-on', live.isOn);

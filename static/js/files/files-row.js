@@ -2,6 +2,7 @@
 
 import { alarmWords, countsOf, lengthWords, nameOf, originWords, pointsOf, sizeWords, storedWords } from './files-layout.js';
 import { html, icon, listen, svg, words } from '../core/dom.js';
+import { NOTHING } from '../core/format.js';
 
 /** @typedef {import('./files-layout.js').Recording} Recording */
 
@@ -9,6 +10,7 @@ const HELD_MS = 500; // a press of this length is a long one
 const STILL_PX = 10; // a finger that moves farther scrolls
 
 const MARKS = /** @type {Record<string, [string, string]>} */ ({ critical: ['al', 'M0-5l5 5-5 5-5-5z'], warning: ['aw', 'M0-6.5l6 10.5h-12z'] });
+const COLUMNS = /** @type {const} */ (['critical', 'warning']);
 const ICONS = /** @type {Record<string, [string, string]>} */ ({ critical: ['crit', 'c-crit'], warning: ['warn', 'c-warn'], advisory: ['info', 'sub'] });
 
 /** The way it went, or in words that nobody knows. @param {Recording} row */
@@ -28,16 +30,17 @@ export function thumbnail(row) {
 }
 
 /**
- * Its alarms as the strip draws them.
+ * Its alarms as the strip draws them, each priority in its column; a column of a table that has none of it holds a dash.
  * @param {Recording} row
  */
 function counts(row) {
   const found = countsOf(row.alarms);
   if (!found.length) return [html('span', {}, alarmWords(row.alarms))];
-  return found.map(({ priority, count, words: said }) => {
+  const none = COLUMNS.filter((priority) => !found.some((one) => one.priority === priority)).map((priority) => html('span', { class: 'dash', 'data-priority': priority, 'aria-hidden': 'true' }, NOTHING));
+  return [...none, ...found.map(({ priority, count, words: said }) => {
     const [glyph, kind] = ICONS[priority] ?? ['info', 'sub'];
-    return html('span', { class: `mini ${kind}` }, icon(glyph, 's'), html('span', { class: 'n b', 'aria-hidden': 'true' }, String(count)), html('span', { class: 'unseen' }, said));
-  });
+    return html('span', { class: `mini ${kind}`, 'data-priority': priority }, icon(glyph, 's'), html('span', { class: 'n b', 'aria-hidden': 'true' }, String(count)), html('span', { class: 'unseen' }, said));
+  })];
 }
 
 /**
@@ -49,13 +52,12 @@ function counts(row) {
 export function drawRow(row, now_ms, onPress) {
   const name = nameOf(row, now_ms);
   const more = html('button', { type: 'button', class: 'btn', 'aria-label': `Actions for ${name}`, 'aria-haspopup': 'dialog' }, icon('menu', 'dots'));
-  const third = row.state === 'unreadable' ? [html('span', {}, ...words(`${sizeWords(row.size_bytes)} · ${row.problem ?? ''}`))]
-    : row.state === 'waiting' ? [html('span', {}, ...words(sizeWords(row.size_bytes))), html('span', {}, 'being read')]
-      : [html('span', {}, ...words(lengthWords(row.length_s))), html('span', {}, ...words(sizeWords(row.size_bytes))), html('span', { class: 'counts' }, ...counts(row))];
+  const length = row.state === 'read' ? html('span', {}, ...words(lengthWords(row.length_s))) : html('span', { class: 'dash', 'aria-hidden': 'true' }, NOTHING);
+  const last = row.state === 'read' ? html('span', { class: 'counts' }, ...counts(row)) : html('span', { class: 'why' }, ...words(row.state === 'waiting' ? 'being read' : row.problem ?? 'not readable'));
   const tags = row.tags.length ? [html('div', { class: 'm tags' }, ...row.tags.map((tag) => html('bdi', { class: 'file-tag' }, tag)))] : [];
   const stored = row.stored ? [html('div', { class: 'm stored', 'data-state': row.stored.state }, ...words(storedWords(row.stored)))] : [];
   const item = html('li', { class: 'file', 'data-id': row.id, 'data-state': row.state }, thumbnail(row),
-    html('div', { class: 'tx' }, html('div', { class: 't', dir: 'auto' }, name), html('div', { class: 'm' }, originWords(row, now_ms)), html('div', { class: 'm facts-line' }, ...third), ...stored, ...tags),
+    html('div', { class: 'tx' }, html('div', { class: 't', dir: 'auto' }, name), html('div', { class: 'm' }, originWords(row, now_ms)), html('div', { class: 'm facts-line' }, length, html('span', {}, ...words(sizeWords(row.size_bytes))), last), ...stored, ...tags),
     more);
   pressed(item, () => onPress(row, more));
   return item;

@@ -6,7 +6,7 @@ import { FileMaker, KINDS, PRIORITY_ICONS } from './file-maker.js';
 import { storeActions, storeItem } from './file-store.js';
 import { FileTrash } from './file-trash.js';
 import { chainLines, verify } from './file-verify.js';
-import { factWords, nameOf, warningWords } from './files-layout.js';
+import { byUrgency, factWords, nameOf, warningWords } from './files-layout.js';
 import { addressOf } from './files-model.js';
 import { keptAt } from '../core/kept-at.js';
 import { share } from './files-share.js';
@@ -14,6 +14,7 @@ import { thumbnail } from './files-row.js';
 import { duration } from '../core/format.js';
 import { html, icon, setWords, words } from '../core/dom.js';
 import { NO_ROOM, hasRoom } from '../replay/compare-room.js';
+import { jumpAt } from '../replay/replay-jumps-layout.js';
 
 /**
  * @typedef {import('./files-layout.js').Recording} Recording
@@ -24,10 +25,17 @@ import { NO_ROOM, hasRoom } from '../replay/compare-room.js';
 /** So many alarms are listed beside the list of recordings; all of them stand in its replay. */
 const MOST_RAISED = 8;
 
-/** @param {NonNullable<Recording['raised']>[number]} alarm @param {number} started_ms */
-function raisedLine({ at_ms, priority, title, text }, started_ms) {
-  return html('li', {}, html('span', { class: 'n' }, duration(Math.max(0, at_ms - started_ms) / 1000, true)), icon(PRIORITY_ICONS[priority], `s ${priority === 'critical' ? 'c-crit' : priority === 'warning' ? 'c-warn' : ''}`),
-    html('span', {}, html('b', {}, ...words(title)), ' ', ...words(text)));
+/**
+ * @param {NonNullable<Recording['raised']>[number]} alarm
+ * @param {number} started_ms
+ * @param {(at_s: number) => void} open the replay at a moment
+ */
+function raisedLine({ at_ms, priority, title, text }, started_ms, open) {
+  const at_s = Math.max(0, at_ms - started_ms) / 1000;
+  const key = html('button', { type: 'button', 'data-priority': priority }, html('span', { class: 'n' }, duration(at_s, true)), icon(PRIORITY_ICONS[priority], `s ${priority === 'critical' ? 'c-crit' : priority === 'warning' ? 'c-warn' : ''}`),
+    html('span', { class: 'tx' }, html('b', {}, ...words(title)), ' ', ...words(text)), icon('play', 's'));
+  key.addEventListener('click', () => open(jumpAt({ at_s })));
+  return html('li', {}, key);
 }
 
 export class FileSheet {
@@ -143,8 +151,9 @@ export class FileSheet {
   /** The alarms that were raised in it, once they are fetched. @param {Recording} row */
   #raised(row) {
     const list = html('ul', { class: 'file-raised', 'aria-label': 'Alarms' });
-    if (row.alarms) void this.#maker.raised(row).then((raised) => list.replaceChildren(...raised.slice(0, MOST_RAISED).map((alarm) => raisedLine(alarm, row.started_ms)),
-      ...(raised.length > MOST_RAISED ? [html('li', {}, ...words(`and ${raised.length - MOST_RAISED} more`))] : [])), () => {});
+    const open = (/** @type {number} */ at_s) => void this.#replay(at_s);
+    if (row.alarms) void this.#maker.raised(row).then((raised) => list.replaceChildren(...byUrgency(raised).slice(0, MOST_RAISED).map((alarm) => raisedLine(alarm, row.started_ms, open)),
+      ...(raised.length > MOST_RAISED ? [html('li', { class: 'more' }, ...words(`and ${raised.length - MOST_RAISED} more in the replay`))] : [])), () => {});
     return list;
   }
 

@@ -258,9 +258,7 @@ class DriveChart {
   #read(at_s) {
     if (this.store.replaying) {
       this.#hover_s = null;
-      void this.store.ask('replay', { do: 'seek', at_s: Math.max(0, at_s) }).then((answer) => {
-        if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Not shown');
-      });
+      void seek(Math.max(0, at_s), this.say);
       return;
     }
     const isAgain = this.#read_s !== null && Math.abs(this.#read_s - at_s) < ((this.view[1] - this.view[0]) * AGAIN_PX) / this.panes.box.width;
@@ -303,4 +301,11 @@ async function pick(chart) {
   } catch {
     chart.say('The list of signals could not be loaded from the server. Try again.', 'Not opened');
   }
+}
+
+/** @param {number} at_s of the recording that is shown @param {ChartPage['say']} say */
+async function seek(at_s, say) {
+  const { lead } = await import('../replay/replay.js'); // it is here
+  const answer = await lead({ do: 'seek', at_s });
+  if (!answer.ok) say(answer.reason ?? 'Refused.', 'Not shown');
 }

@@ -31,7 +31,7 @@ export class Pace {
   sides = {};
 
   /**
-   * @param {import('../core/store.js').Store} store
+   * @param {Pick<import('../core/store.js').Store, 'ask' | 'now'>} store
    * @param {(sentence: string, title?: string) => void} say
    */
   constructor(store, say) {

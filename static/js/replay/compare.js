@@ -14,6 +14,7 @@ import { openPicker } from './compare-picker.js';
 import { NO_ROOM, WIDE, hasRoom } from './compare-room.js';
 import { CompareView } from './compare-view.js';
 import { Figures, SideCard, placesOf, remarksOf } from './compare-side.js';
+import { lead } from './replay.js';
 import { markBeside } from './replay-layout.js';
 import { chartStyles } from '../home/drive-parts.js';
 import { fetchStyle } from '../core/style-sheet.js';
@@ -67,7 +68,7 @@ class Compare {
     this.store = store;
     this.say = say;
     this.monitor = need(document, '#monitor');
-    this.pace = new Pace(store, say);
+    this.pace = new Pace({ now: () => store.now(), ask: (_, order) => lead(/** @type {import('./replay-lead.js').Order} */ (order)) }, say);
     const filled = () => this.#filled();
     this.feeds = { a: new SideFeed(store, filled), b: new SideFeed(store, filled) };
     this.line = new CompareLine({ seek: (at_s) => this.#seek(at_s), step: (direction) => this.#step(direction), toggle: () => this.#toggle(), rate: (rate) => this.pace.setRate(rate), leave: () => this.leave() });

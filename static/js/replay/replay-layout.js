@@ -156,6 +156,11 @@ export function clockOf(at_s) {
   return duration(at_s, true);
 }
 
+/** Where the tape is, "04:06 of 17:51": a length alone would read as a time of day. @param {{at_s: number, length_s: number}} replay */
+export function tapeWords({ at_s, length_s }) {
+  return `${clockOf(at_s)} of ${clockOf(length_s)}`;
+}
+
 /**
  * What a reader says of the thumb: "4 minutes 6 seconds of 8 minutes 32 seconds".
  * @param {number} at_s

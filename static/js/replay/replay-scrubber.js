@@ -31,10 +31,12 @@ export class Scrubber {
 
   /**
    * @param {Store} store
+   * @param {import('./replay-lead.js').ReplayLead} leader
    * @param {(sentence: string, title?: string) => void} say
    */
-  constructor(store, say) {
+  constructor(store, leader, say) {
     this.store = store;
+    this.leader = leader;
     this.say = say;
     this.gaps = svg('g', { class: 'gaps' });
     this.base = svg('path', { class: 'base' });
@@ -155,7 +157,7 @@ export class Scrubber {
     if (at instanceof Element && at.matches(OWN_KEYS)) return;
     if (event.key === ' ') {
       event.preventDefault();
-      this.toggle();
+      if (!event.repeat) this.toggle();
     } else if (event.key === 'ArrowLeft' || event.key === 'ArrowRight') this.#key(event);
   }
 
@@ -215,22 +217,18 @@ export class Scrubber {
 
   /** @param {KeyboardEvent} event */
   #key(event) {
-    if (event.key === ' ') {
-      event.preventDefault();
-      this.toggle();
-      return;
-    }
     const at_s = atByKey(event.key, this.#at_s, this.#length_s);
-    if (at_s === null) return;
+    if (at_s === null && event.key !== ' ') return;
     event.preventDefault();
-    this.#seek(at_s);
+    if (at_s !== null) this.#seek(at_s);
+    else if (!event.repeat) this.toggle();
   }
 
   /** @param {1 | -1} direction */
   #step(direction) {
     const mark = markBeside(this.#events, this.#at_s, direction);
     if (mark) this.#seek(mark.at_s);
-    else this.say(direction > 0 ? 'There is no alarm, mark or intervention after this moment.' : 'There is no alarm, mark or intervention before this moment.');
+    else this.say(`There is no alarm, mark or intervention ${direction > 0 ? 'after' : 'before'} this moment.`);
   }
 
   /** One seek at a time is under way; of those that come meanwhile, the last counts. @param {number} at_s */
@@ -246,7 +244,7 @@ export class Scrubber {
       let sent = NaN;
       while (this.#wanted && this.#wanted.at_s !== sent) {
         sent = this.#wanted.at_s;
-        const answer = await this.store.ask('replay', { do: 'seek', at_s: sent });
+        const answer = await this.leader.order({ do: 'seek', at_s: sent });
         if (!answer.ok) {
           this.#wanted = null;
           this.say(answer.reason ?? 'Refused.', 'Position not changed');
@@ -257,9 +255,9 @@ export class Scrubber {
     }
   }
 
-  /** @param {import('../core/requests.js').FieldsOf<'replay'>} order */
+  /** @param {import('./replay-lead.js').Order} order */
   async #order(order) {
-    const answer = await this.store.ask('replay', order);
+    const answer = await this.leader.order(order);
     if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Replay not changed');
   }
 }

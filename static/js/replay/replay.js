@@ -4,17 +4,20 @@
 import { field, html, icon, listen, need, setAttribute, setText, setWords } from '../core/dom.js';
 import { ReplayBand, liveSheet } from './replay-band.js';
 import { JumpList } from './replay-jumps.js';
-import { clockOf, sketchOf, summaryOf } from './replay-layout.js';
+import { sketchOf, summaryOf, tapeWords } from './replay-layout.js';
 import { Scrubber } from './replay-scrubber.js';
 import { request } from '../control/request.js';
 import { fetchStyle, styled } from '../core/style-sheet.js';
 import { addressOf } from '../files/files-model.js';
 import { joinedChoices } from '../settings/question-layout.js';
+import { ReplayLead } from './replay-lead.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
  * @typedef {(sentence: string, title?: string) => void} Say
  * @typedef {import('../settings/question-layout.js').Change} Change
+ * @typedef {import('./replay-lead.js').Order} Order
+ * @typedef {import('./replay-lead.js').Outcome} Outcome
  */
 
 /** A long file that was never closed is read through before it is shown [ms]. */
@@ -27,6 +30,7 @@ const ID = /^[\w-]+$/;
 const HOME = '#home';
 /** The address follows the moment so often; browsers allow no more [ms]. */
 const NOTE_MS = 2000;
+const OVER = { ok: false, reason: 'This replay is over.' };
 /** An agent of an older version tells less. */
 const NO_EVENTS = { flags: [], interventions: [], modes: [] };
 
@@ -77,8 +81,20 @@ export async function openReplay(id, store, say, { at_s = 0, staysOnTab = false 
  * @returns {Promise<{ok: boolean, reason?: string}>}
  */
 export async function judgeBy(change) {
-  return current?.judgeBy(change) ?? { ok: false, reason: 'This replay is over.' };
+  return current?.judgeBy(change) ?? OVER;
 }
+
+/**
+ * Lead the recording that is shown. While its connection is opened again, the order waits until the recording is.
+ * @param {Order} order
+ * @returns {Promise<Outcome>}
+ */
+export async function lead(order) {
+  return current?.leader.order(order) ?? OVER;
+}
+
+/** The time line of the recording that is shown, as far as it is made. */
+export const recordedLine = () => current?.line ?? null;
 
 /** @param {Store} store @returns {Promise<void>} once the server greets again */
 function opened(store) {
@@ -103,7 +119,7 @@ class Replay {
   band = new ReplayBand();
   sheet = liveSheet();
   /** The time line as far as it is made. @type {import('../core/protocol-types.js').Timeline | null} */
-  #line = null;
+  line = null;
 
   /**
    * @param {string} id
@@ -117,11 +133,12 @@ class Replay {
     this.say = say;
     this.board = need(document, '#monitor');
     this.root = document.documentElement;
+    this.leader = new ReplayLead(store);
     setAttribute(this.root, 'data-replay', 'opening');
     need(this.board, '.top').prepend(this.parts.top);
     need(this.board, '.strip').after(this.band.element);
     document.body.append(this.sheet);
-    this.scrubber = new Scrubber(store, say);
+    this.scrubber = new Scrubber(store, this.leader, say);
     this.jumps = new JumpList((at_s) => this.scrubber.seek(at_s));
     need(this.board, '.view').after(this.scrubber.element);
     this.stops = [
@@ -218,6 +235,7 @@ class Replay {
     if (this.sheet.open) this.sheet.close();
     for (const part of [this.parts.top, this.band.element, this.sheet]) part.remove();
     if (current === this) current = null;
+    this.leader.end();
   }
 
   #beat() {
@@ -249,11 +267,13 @@ class Replay {
   async #reopen(choices) {
     const { is_playing, rate, at_s } = this.#ran;
     const { store } = this;
-    const answer = await store.ask('replay', { do: 'open', recording: this.id, at_s, ...choices }, OPENS_MS);
-    if (current !== this || !answer.ok) return answer;
-    if (rate !== 1) void store.ask('replay', { do: 'rate', rate });
-    if (is_playing) void store.ask('replay', { do: 'play' });
-    return answer;
+    return this.leader.reopen(async () => {
+      const answer = await store.ask('replay', { do: 'open', recording: this.id, at_s, ...choices }, OPENS_MS);
+      if (current !== this || !answer.ok) return answer;
+      if (rate !== 1) void store.ask('replay', { do: 'rate', rate });
+      if (is_playing) void store.ask('replay', { do: 'play' });
+      return answer;
+    });
   }
 
   /** @param {any} message */
@@ -264,7 +284,7 @@ class Replay {
     }
     if (message.kind !== 'timeline') return;
     const line = { ...NO_EVENTS, ...message };
-    this.#line = line;
+    this.line = line;
     this.scrubber.take(line);
     this.jumps.take(line);
   }
@@ -294,8 +314,8 @@ class Replay {
   #draw() {
     const { frame } = this.store;
     if (!frame?.replay) return;
-    this.band.draw(frame, this.#line);
-    setText(this.parts.length, clockOf(frame.replay.length_s));
+    this.band.draw(frame, this.line);
+    setText(this.parts.length, tapeWords(frame.replay));
     this.scrubber.draw(frame);
   }
 

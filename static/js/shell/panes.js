@@ -7,6 +7,7 @@ import { fixed, timeOfDay } from '../core/format.js';
 import { gapWords } from '../core/event-log.js';
 import { alarmInHead } from './dialogs.js';
 import { areAlarmsInSight } from './layout.js';
+import { styled } from '../core/style-sheet.js';
 import { veilOf } from './veil.js';
 import { Lines, peopleLines, signalLines } from './wall-panes.js';
 
@@ -45,6 +46,9 @@ export function mount(monitor, store) {
 }
 
 class Panes {
+  /** The sheet of the widest screens. @type {Promise<void> | undefined} */
+  dress;
+
   /** @param {HTMLElement} monitor @param {Store} store */
   constructor(monitor, store) {
     this.monitor = monitor;
@@ -67,13 +71,14 @@ class Panes {
     const isInSight = frame !== null && areAlarmsInSight();
     void this.list.want(isInSight);
     if (!isInSight) return;
+    if (innerWidth >= 1800) this.dress ??= styled('wall'); // as in wall.css
     const heads = headsOf(frame);
     const covered = veilOf(this.store);
     for (const { name, element } of this.heads) setWords(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // of a covered pane nothing is said
     this.log.draw();
     this.signals.draw(() => signalLines(frame.signals));
     const { head, lines } = peopleLines(store.isSilent ? null : frame.replay ? frame.live?.reach : frame.reach, store.control, store.page);
-    setWords(field(this.monitor, 'head-people'), head);
+    setWords(field(this.monitor, 'head-people'), (frame.replay ? 'live: ' : '') + head);
     this.people.draw(() => lines);
   }
 
@@ -117,15 +122,18 @@ class Lodger {
   }
 }
 
-/** The newest events, a line each, as many as are seen whole. */
+/** The newest events, a line each, as many as are seen whole; beside a replay, those of the recording. */
 class LogPane {
   #shown = '';
   #lines = 0;
+  /** Reads the recording that is shown; fetched with the first. @type {typeof import('../replay/recorded-log.js').shownLines | undefined} */
+  #recorded;
 
   /** @param {HTMLElement} list @param {Store} store */
   constructor(list, store) {
     this.list = list;
     this.store = store;
+    this.head = /** @type {HTMLElement} */ (list.parentElement?.querySelector('.ph .end'));
     new ResizeObserver(([entry]) => {
       this.#lines = Math.floor((entry?.contentRect.height ?? 0) / LINE_PX);
       this.draw();
@@ -133,18 +141,30 @@ class LogPane {
   }
 
   draw() {
-    const { rows, last } = this.store.log;
-    const key = `${last} ${rows.length} ${this.#lines}`;
+    const { frame, log: { rows, last } } = this.store;
+    const replay = frame?.replay;
+    setText(this.head, replay ? 'of the recording, newest first' : 'newest first');
+    if (replay && !this.#recorded) {
+      this.#recorded = () => [];
+      import('../replay/recorded-log.js').then(({ shownLines }) => { this.#recorded = shownLines; }, () => {});
+    }
+    const recorded = replay && (this.#recorded?.(replay) ?? []).slice(0, this.#lines);
+    const key = recorded ? JSON.stringify(recorded) : `${last} ${rows.length} ${this.#lines}`;
     if (key === this.#shown) return;
     this.#shown = key;
-    this.list.replaceChildren(...rows.slice(0, this.#lines).map(lineOf));
+    this.list.replaceChildren(...(recorded ?? rows.slice(0, this.#lines).map(liveOf)).map(lineOf));
   }
 }
 
 /** @param {import('../core/event-log.js').Row} row */
-function lineOf({ event, gap }) {
+function liveOf({ event, gap }) {
   const shown = event ? eventWords(event) : { icon: 'link-off', kind: '', title: gapWords(gap), text: '' };
-  const line = html('li', {}, html('span', { class: 'n' }, timeOfDay(event?.at_ms ?? gap?.at_ms ?? null)), icon(shown.icon, `s ${shown.kind}`), html('span', { class: 't' }, ...words(shown.title)), html('span', { class: 'm' }, ...words(shown.text)));
-  setAttribute(line, 'data-kind', event?.priority ?? null);
+  return { ...shown, at_ms: event?.at_ms ?? gap?.at_ms ?? null, priority: event?.priority ?? null };
+}
+
+/** @param {{at_ms: number | null, icon: string, kind: string, title: string, text: string, priority: string | null}} shown */
+function lineOf({ at_ms, icon: glyph, kind, title, text, priority }) {
+  const line = html('li', {}, html('span', { class: 'n' }, timeOfDay(at_ms)), icon(glyph, `s ${kind}`), html('span', { class: 't' }, ...words(title)), html('span', { class: 'm' }, ...words(text)));
+  setAttribute(line, 'data-kind', priority);
   return line;
 }
