@@ -95,7 +95,7 @@ test('a dialog tells with what it began, and never speaks in the present of what
   assert.equal(dialogWords({ ...near, measured: {}, limit: {}, trip_text: '4.1 m' }), 'Active for 3.5 s, since 12:00:00. Brake.');
   const lost = { ...near, verdict: 'unknown', text: 'No link to the car.' };
   assert.equal(dialogWords(lost), 'Not checked now: No link to the car. Active for 3.5 s, since 12:00:00 with 4.8 m. Brake.');
-  assert.equal(dialogWords({ ...lost, active: false }), 'It has returned to normal; it began at 12:00:00 with 4.8 m. Brake.');
+  assert.equal(dialogWords({ ...lost, active: false }), 'It has returned to normal; it began at 12:00:00 with 4.8 m.', 'nothing is to be done about what has ended');
 });
 
 test('a dialog tells how bad it was, where that is not what is measured now', () => {
@@ -103,6 +103,6 @@ test('a dialog tells how bad it was, where that is not what is measured now', ()
   const fast = { ...ALARM, active: true, verdict: 'fault', trip_text: ALARM.text, raised_ms: noon_ms, for_s: 3.5, advice: 'Brake.', measured: speed(12.6), limit: speed(11), worst: { ...speed(12.84), side: 'above' } };
   assert.equal(dialogWords(fast), 'Active for 3.5 s, since 12:00:00. Highest 12.8 m/s. Brake.');
   assert.equal(dialogWords({ ...fast, measured: speed(12.81) }), 'Active for 3.5 s, since 12:00:00. Brake.', 'what reads the same is not said twice');
-  assert.equal(dialogWords({ ...fast, active: false, measured: speed(12.84) }), 'It has returned to normal; it began at 12:00:00. Highest 12.8 m/s. Brake.');
+  assert.equal(dialogWords({ ...fast, active: false, measured: speed(12.84) }), 'It has returned to normal; it began at 12:00:00. Highest 12.8 m/s.');
   assert.match(dialogWords({ ...fast, worst: { ...speed(3.9), side: 'below' } }), /Lowest 3\.9 m\/s\./);
 });

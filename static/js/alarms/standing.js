@@ -29,7 +29,7 @@ export function dialogWords(alarm) {
   const at = timeOfDay(alarm.raised_ms);
   const began = alarm.trip_text && alarm.trip_text !== alarm.text ? ` with ${bare(alarm.trip_text)}` : '';
   const worst = worstWords(alarm);
-  if (!alarm.active) return [`It has returned to normal; it began at ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
+  if (!alarm.active) return [`It has returned to normal; it began at ${at}${began}.`, worst].filter(Boolean).join(' ');
   const isBlind = alarm.verdict === 'unknown';
   const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.verdict === 'ok' ? `Returning to normal: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
   return [cause, `Active for ${age(alarm.for_s)} s, since ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
