@@ -32,14 +32,14 @@ export function titleOf({ title, active }) {
 }
 
 /** What waits for a person comes first, and of it what is active. */
-const PLACE = { UNACKED: 0, RTN_UNACKED: 1, ACKED: 2, SHELVED: 3 };
+const PLACE = /** @type {Record<Alarm['state'], number>} */ ({ UNACKED: 0, RTN_UNACKED: 1, ACKED: 2, NORMAL: 2, SHELVED: 3 });
 
 /**
  * The one order of strip, list, dialog, snackbar and log: unacknowledged first, then by danger, then the newest.
  * @param {Alarm[]} alarms
  */
 export function byUrgency(alarms) {
-  const place = (/** @type {Alarm} */ { state }) => (state in PLACE ? PLACE[state] : PLACE.ACKED);
+  const place = (/** @type {Alarm} */ { state }) => PLACE[state] ?? PLACE.ACKED;
   return [...alarms].sort((a, b) => place(a) - place(b) || RANK[b.priority] - RANK[a.priority] || b.raised_ms - a.raised_ms);
 }
 
