@@ -179,7 +179,8 @@ def goes_on(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Fin
     facts = snapshot.slowing
     ended_s = facts.ended_at_longest_s
     if ended_s is not None and snapshot.now_s - ended_s < ENDED_REPORTED_S:
-        return fault(f"The order ended after {limits.longest_s:.0f} s: the car is no longer held", brief="hold ended")
+        text = f"The order ended after {limits.longest_s:.0f} s: the car is no longer held, and may drive off"
+        return fault(text, brief="hold ended")
     if facts.ordered_s is None:
         return absent("The car is not held", brief="not ordered")
     left_s = limits.longest_s - (snapshot.now_s - facts.ordered_s)

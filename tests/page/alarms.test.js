@@ -1,7 +1,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { layOut, soundOf, stripOf, tilesOf } from '../../static/js/alarms/alarm-layout.js';
+import { byUrgency, layOut, soundOf, stripOf, tilesOf } from '../../static/js/alarms/alarm-layout.js';
+import { rowsOf } from '../../static/js/alarms/alarms-layout.js';
 import { showTiles } from '../../static/js/alarms/checks.js';
+import { badgeOf } from '../../static/js/shell/badge.js';
+import { asideOf } from '../../static/js/replay/replay-layout.js';
 import { dialogOf, linkWords, lossKey } from '../../static/js/shell/dialogs.js';
 import { chainOf } from '../../static/js/core/link.js';
 import { eventWords } from '../../static/js/alarms/log-layout.js';
@@ -17,6 +20,43 @@ test('one dialog: the most severe, then the newest', () => {
   assert.equal(layOut([alarm({ state: 'ACKED' })]).dialog, null);
   assert.equal(layOut([alarm({ state: 'RTN_UNACKED', active: false })]).dialog?.id, 'speed_limit');
   assert.equal(layOut([warning({ state: 'SHELVED' })]).shelved, 1);
+});
+
+test('strip, list, dialog, snackbar, title and sound have one order: unacknowledged, danger, newness', () => {
+  const states = /** @type {const} */ ({ UNACKED: true, RTN_UNACKED: false, ACKED: true });
+  const pairs = Object.entries(states).flatMap(([name, active]) => ['critical', 'warning'].flatMap((priority) => [1, 2].map((raised_ms) => alarm({
+    id: `${name} ${priority} ${raised_ms}`, title: `${name} ${priority} ${raised_ms}`, state: name, active, priority, raised_ms,
+    place: priority === 'critical' ? 'dialog' : 'snackbar', sound: priority === 'critical' ? 'high' : 'medium',
+  }))));
+  const wanted = pairs.map(({ id }) => id).sort((a, b) => {
+    const [[stateA, priorityA, newA], [stateB, priorityB, newB]] = /** @type {[string[], string[]]} */ ([a.split(' '), b.split(' ')]);
+    const names = Object.keys(states);
+    return names.indexOf(stateA ?? '') - names.indexOf(stateB ?? '') || (priorityA ?? '').localeCompare(priorityB ?? '') || Number(newB) - Number(newA);
+  });
+  const shuffled = wanted.map((_, n) => pairs[(n * 7 + 3) % pairs.length]);
+  assert.deepEqual(byUrgency(shuffled).map(({ id }) => id), wanted);
+  for (let from = 0; from < wanted.length; from += 1) { // as one after the other is acknowledged or goes
+    const left = shuffled.filter(({ id }) => wanted.indexOf(id) >= from);
+    const first = left.find(({ id }) => id === wanted[from]);
+    const frame = state({ alarms: left });
+    const chain = chainOf({ frame, isSilent: false, silence_s: 0.1, lag_s: 0.1, heard_ms: 0 });
+    const ended = first.active ? '' : ': ended';
+    assert.equal(rowsOf(left, [], true)[0]?.id, first.id);
+    assert.equal(stripOf(frame, { isSilent: false, chain, paused_s: 0 }).text, `${first.title}${ended}`);
+    assert.match(badgeOf(frame, { isSilent: false, isMonitoring: true, word: 'Live' }).title, new RegExp(`^\\(\\d+\\) ${first.title}${ended} `));
+    assert.equal(asideOf(/** @type {any} */ ({ phase: 'monitoring', cut: null, alarms: left }))?.text.split(' (')[0], `Live: ${first.title}${ended}`);
+    const asking = first.state === 'ACKED' ? null : first;
+    const { dialog, snackbars } = layOut(left);
+    assert.equal(dialog?.id ?? snackbars[0]?.id ?? null, asking?.id ?? null);
+    assert.equal(soundOf(frame, { isServerLost: false, isLossAcknowledged: false }), asking?.active ? asking.sound : null);
+  }
+});
+
+test('what has ended is asked about only once nothing active is unacknowledged', () => {
+  const ended = alarm({ state: 'RTN_UNACKED', active: false });
+  assert.equal(layOut([ended, warning()]).dialog, null, 'its dialog would cover the warning');
+  assert.equal(layOut([ended, warning({ state: 'ACKED' })]).dialog?.id, ended.id);
+  assert.equal(layOut([warning(), alarm({ raised_ms: -1 })]).dialog?.id, 'speed_limit', 'what is active is, whatever is newer');
 });
 
 test('the loudest unacknowledged alarm is heard', () => {

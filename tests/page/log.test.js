@@ -98,7 +98,7 @@ test('a dialog tells with what it began, and never speaks in the present of what
   assert.match(dialogWords({ ...near, trip_text: 'Lidar error', causes: ['Lidar'] }), / Began 12:00:00: Lidar error\./, 'a name');
   const lost = { ...near, verdict: 'unknown', text: 'No link to the car.' };
   assert.equal(dialogWords(lost), 'Not checked now: No link to the car. Active for 3.5 s. Began 12:00:00: 4.8 m. Brake.');
-  assert.equal(dialogWords({ ...lost, active: false }), 'It has returned to normal. Began 12:00:00: 4.8 m. Brake.');
+  assert.equal(dialogWords({ ...lost, active: false }), 'It has returned to normal. Began 12:00:00: 4.8 m.', 'nothing is to be done about what has ended');
 });
 
 test('a dialog tells how bad it was, where that is not what is measured now', () => {
@@ -106,6 +106,6 @@ test('a dialog tells how bad it was, where that is not what is measured now', ()
   const fast = { ...ALARM, active: true, verdict: 'fault', trip_text: ALARM.text, raised_ms: noon_ms, for_s: 3.5, advice: 'Brake.', measured: speed(12.6), limit: speed(11), worst: { ...speed(12.84), side: 'above' } };
   assert.equal(dialogWords(fast), 'Active for 3.5 s. Began 12:00:00. Highest 12.8 m/s. Brake.');
   assert.equal(dialogWords({ ...fast, measured: speed(12.81) }), 'Active for 3.5 s. Began 12:00:00. Brake.', 'what reads the same is not said twice');
-  assert.equal(dialogWords({ ...fast, active: false, measured: speed(12.84) }), 'It has returned to normal. Began 12:00:00. Highest 12.8 m/s. Brake.');
+  assert.equal(dialogWords({ ...fast, active: false, measured: speed(12.84) }), 'It has returned to normal. Began 12:00:00. Highest 12.8 m/s.');
   assert.match(dialogWords({ ...fast, worst: { ...speed(3.9), side: 'below' } }), /Lowest 3\.9 m\/s\./);
 });

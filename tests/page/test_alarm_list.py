@@ -163,7 +163,7 @@ async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(p
     await phone.open(returned.address)
     await phone.live()
     strip = phone.f("strip")
-    await expect(strip).to_contain_text("Laser slower than expected")  # it stands, the other ones do not any more
+    await expect(strip).to_have_text("Connection was lost, now back1 of 4")  # acknowledged is the one that is active
     await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "none")
     box = await strip.bounding_box()
     assert box

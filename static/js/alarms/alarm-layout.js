@@ -25,12 +25,16 @@ const LINK_ACTIONS = /** @type {const} */ (['reconnect', 'exit', 'change_address
 
 export { titleOf };
 
+/** What waits for a person comes first, and of it what is active. */
+const PLACE = /** @type {Record<Alarm['state'], number>} */ ({ UNACKED: 0, RTN_UNACKED: 1, ACKED: 2, NORMAL: 2, SHELVED: 3 });
+
 /**
- * What still stands before what has returned; then by danger, then the newest.
+ * The one order of strip, list, dialog, snackbar and log: unacknowledged first, then by danger, then the newest.
  * @param {Alarm[]} alarms
  */
 export function byUrgency(alarms) {
-  return [...alarms].sort((a, b) => Number(b.active) - Number(a.active) || RANK[b.priority] - RANK[a.priority] || b.raised_ms - a.raised_ms);
+  const place = (/** @type {Alarm} */ { state }) => PLACE[state] ?? PLACE.ACKED;
+  return [...alarms].sort((a, b) => place(a) - place(b) || RANK[b.priority] - RANK[a.priority] || b.raised_ms - a.raised_ms);
 }
 
 /**
@@ -42,7 +46,8 @@ export function layOut(alarms) {
   const asking = sorted.filter(isAsking);
   const standing = sorted.filter((alarm) => alarm.state !== 'SHELVED');
   return {
-    dialog: asking.find((alarm) => alarm.place === 'dialog') ?? null,
+    // One that has ended is asked about in its turn: its dialog would cover what is active and unacknowledged.
+    dialog: asking.find((alarm, n) => alarm.place === 'dialog' && (alarm.active || n === 0)) ?? null,
     snackbars: asking.filter((alarm) => alarm.place === 'snackbar'),
     standing,
     shelved: sorted.length - standing.length,

@@ -1,5 +1,6 @@
 // The list of alarms as words: which row stands where, how its state reads, what its keys are, what fits a page of it. Pure functions, no DOM.
 
+import { byUrgency } from './alarm-layout.js';
 import { snackWords } from './standing.js';
 import { fixed, timeOfDay } from '../core/format.js';
 
@@ -11,21 +12,10 @@ import { fixed, timeOfDay } from '../core/format.js';
  * @typedef {{key: string, id: string, kind: Kind, icon: string, priority: string, title: string, words: string, at: string, state: string, silent: string, keys: Key[], alarm: Alarm | null}} Row
  */
 
-const ORDER = /** @type {Kind[]} */ (['unacknowledged', 'returned', 'acknowledged', 'shelved', 'suppressed']);
-const RANK = { critical: 0, warning: 1, advisory: 2 };
 export const ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
 const KINDS = /** @type {Record<Alarm['state'], Kind>} */ ({ UNACKED: 'unacknowledged', RTN_UNACKED: 'returned', ACKED: 'acknowledged', SHELVED: 'shelved' });
 /** So long a row must have been in sight whole before one tap answers it together with others [ms]. */
 export const SEEN_MS = 1000;
-
-/**
- * What waits for the operator first, and of it what still stands; then by danger, then the newest.
- * @param {Alarm[]} alarms
- */
-export function byDanger(alarms) {
-  const place = (/** @type {Alarm} */ alarm) => ORDER.indexOf(kindOf(alarm));
-  return [...alarms].sort((a, b) => place(a) - place(b) || RANK[a.priority] - RANK[b.priority] || b.raised_ms - a.raised_ms);
-}
 
 /** @param {Pick<Alarm, 'state'>} alarm @returns {Kind} */
 export function kindOf({ state }) {
@@ -40,7 +30,7 @@ export function kindOf({ state }) {
  * @returns {Row[]}
  */
 export function rowsOf(alarms, suppressed, mayAct) {
-  return [...byDanger(alarms).map((alarm) => rowOf(alarm, mayAct)), ...suppressed.map(suppressedRow)];
+  return [...byUrgency(alarms).map((alarm) => rowOf(alarm, mayAct)), ...suppressed.map(suppressedRow)];
 }
 
 /** @param {Alarm} alarm @param {boolean} mayAct @returns {Row} */

@@ -30,7 +30,7 @@ export function dialogWords(alarm) {
   const trip = alarm.trip_text && alarm.trip_text !== alarm.text ? `: ${lowered(bare(alarm.trip_text), alarm.causes ?? [])}` : '';
   const began = `Began ${at}${trip}.`;
   const worst = worstWords(alarm);
-  if (!alarm.active) return ['It has returned to normal.', began, worst, alarm.advice].filter(Boolean).join(' ');
+  if (!alarm.active) return ['It has returned to normal.', began, worst].filter(Boolean).join(' ');
   const isBlind = alarm.verdict === 'unknown';
   const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.verdict === 'ok' ? `Returning to normal: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
   return [cause, `Active for ${age(alarm.for_s)} s.`, began, worst, alarm.advice].filter(Boolean).join(' ');

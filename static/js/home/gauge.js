@@ -96,6 +96,11 @@ class Gauge {
       setAttribute(part, 'x', block.x);
       setAttribute(part, 'width', block.width);
     }
+    // The dotted line and the age stand beneath the digits, within the red block.
+    const isAged = speedInk.ink === 'ageing' && isSpeedKnown;
+    setAttribute(speed, 'y', isAged ? 223 : 231);
+    setAttribute(box, 'y', isAged ? 138 : 146);
+    setAttribute(box, 'height', isAged ? 114 : 98);
     const isBack = isSpeedKnown && speed_mps < 0 && digits.startsWith('−');
     setAttribute(unit, 'x', block.unitX);
     setText(unit, isSpeedKnown ? (isBack ? `${unitWord} back` : unitWord) : '');
@@ -153,8 +158,8 @@ function build(root) {
   const bug = svg('g');
   const acceleration = svg('tspan', { class: 'num' });
   const accelerationUnit = svg('tspan', { class: 'unit', 'font-size': 15, dx: 5 }, 'm/s²');
-  const box = svg('rect', { class: 'box', y: 146, height: 98 });
-  const speed = svg('text', { class: 'speed', x: 190, y: 231, 'text-anchor': 'middle' });
+  const box = svg('rect', { class: 'box' });
+  const speed = svg('text', { class: 'speed', x: 190, 'text-anchor': 'middle' });
   const struck = svg('rect', { class: 'struck', y: 146, height: 90 });
   const unit = svg('text', { class: 'unit', y: 240 });
   const note = svg('text', { class: 'note', x: 190, y: 249, 'text-anchor': 'middle' });

@@ -1,6 +1,6 @@
 // Where things stand on the time line of a replay, and in which words: pure functions, no DOM.
 
-import { titleOf } from '../alarms/alarm-layout.js';
+import { byUrgency, titleOf } from '../alarms/alarm-layout.js';
 import { counted, duration } from '../core/format.js';
 
 export const RATES = /** @type {const} */ ([0.25, 0.5, 1, 2, 4, 8, 16]);
@@ -274,11 +274,11 @@ export function liveWords(live) {
 export function asideOf(live) {
   if (!live) return { kind: 'warn', text: 'Live: unknown', asking: null };
   if (live.phase === 'lost' || (live.phase === 'monitoring' && live.cut !== null)) {
-    const asking = live.alarms.find((alarm) => alarm.priority === 'critical' && alarm.state === 'UNACKED') ?? null;
+    const asking = byUrgency(live.alarms).find((alarm) => alarm.priority === 'critical' && alarm.state === 'UNACKED') ?? null;
     return { kind: 'crit', text: `Live: ${live.phase === 'lost' || live.cut === 'server-bridge' ? 'connection lost' : 'the car fell silent'}`, asking };
   }
-  const urgent = live.alarms.filter((alarm) => alarm.priority !== 'advisory' && alarm.state !== 'SHELVED');
-  const worst = [...urgent].sort((a, b) => RANK[b.priority] - RANK[a.priority])[0];
+  const urgent = byUrgency(live.alarms).filter((alarm) => alarm.priority !== 'advisory' && alarm.state !== 'SHELVED');
+  const [worst] = urgent;
   if (!worst) return live.phase === 'monitoring' && live.paused ? { kind: 'warn', text: 'Live: monitoring is paused', asking: null } : null;
   const asking = urgent.find((alarm) => alarm.priority === 'critical' && alarm.state === 'UNACKED') ?? null;
   const more = urgent.length > 1 ? ` (${urgent.length} alarms)` : '';

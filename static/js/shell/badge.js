@@ -1,6 +1,6 @@
 // What the browser shows of the page when another one is in front of it: title, icon and, once installed, the app's badge.
 
-import { layOut } from '../alarms/alarm-layout.js';
+import { layOut, titleOf } from '../alarms/alarm-layout.js';
 import { need, setAttribute } from '../core/dom.js';
 
 const NAME = 'catgraph';
@@ -21,7 +21,7 @@ export function badgeOf(frame, { isSilent, isMonitoring, word }) {
   const paused = frame.replay ? 'REPLAY · ' : frame.session.paused ? 'Paused · ' : '';
   if (!urgent[0]) return { title: `${paused}${NAME}`, icon: frame.replay ? 'replay' : 'plain', count: 0 };
   const icon = urgent[0].priority === 'critical' ? 'critical' : 'warning';
-  return { title: `(${urgent.length}) ${frame.replay ? 'LIVE ' : ''}${urgent[0].title} · ${paused}${NAME}`, icon, count: urgent.length };
+  return { title: `(${urgent.length}) ${frame.replay ? 'LIVE ' : ''}${titleOf(urgent[0])} · ${paused}${NAME}`, icon, count: urgent.length };
 }
 
 /** @param {import('../core/store.js').Store} store */

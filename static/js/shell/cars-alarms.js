@@ -94,7 +94,7 @@ export class CarsAlarms {
     setAttribute(strip, 'data-known', false);
     setAttribute(strip, 'data-opens', 'cars');
     setIcon(need(strip, '.i'), first.icon);
-    setWords(field(strip, 'strip-text'), `${first.name}: ${first.worst?.title ?? ''}`);
+    setWords(field(strip, 'strip-text'), `${this.cars.shortOf(first.name)}: ${first.worst?.title ?? ''}`);
     setWords(field(strip, 'strip-end'), asking.length > 1 ? counted(asking.length, 'car') : '');
   }
 
@@ -108,10 +108,12 @@ export class CarsAlarms {
     }
     if (!this.#shown || keyOf(this.#shown) !== keyOf(row)) this.#meant.moved();
     this.#shown = row;
-    setText(this.title, `${row.name}: ${row.worst.title}`);
+    const short = this.cars.shortOf(row.name); // whole in the list of cars
+    const { title, text } = row.worst;
+    setWords(this.title, text || title);
     const for_s = ((this.store.cars?.time_ms ?? 0) - row.worst.raised_ms) / 1000 + this.store.carsLag_s;
-    setWords(this.text, `For ${age(Math.max(0, for_s))} s. In control: ${row.operator}.`);
-    setText(this.open, `Open ${row.name}`);
+    setWords(this.text, `${short}: ${title}, for ${age(Math.max(0, for_s))} s. In control: ${row.operator}.`);
+    setText(this.open, `Open ${short}`);
     if (!card.isConnected) snacks.prepend(card);
   }
 

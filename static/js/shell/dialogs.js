@@ -1,6 +1,6 @@
 // One dialog at a time: which, and what stands in it. Alarms and broken links open by themselves and close by themselves.
 
-import { isAboutLink, layOut } from '../alarms/alarm-layout.js';
+import { isAboutLink, layOut, titleOf } from '../alarms/alarm-layout.js';
 import { drawBigChain } from './chain.js';
 import { field, html, listen, need, setAttribute, setIcon, setText, setWords, show, words } from '../core/dom.js';
 import { areAlarmsInSight } from './layout.js';
@@ -166,6 +166,7 @@ class Dialogs {
     const wanted = standing ? this.sheets[standing.kind] : null;
     setAttribute(document.body, 'data-asking', standing?.kind === 'alarm' && standing.alarm.priority === 'critical');
     const place = standing ? placeOf(standing.kind) : document.body;
+    setAttribute(document.body, 'data-held', standing !== null && place === document.body); // what stands under it takes no press
     if (wanted?.open && wanted.parentElement !== place) wanted.close(); // the window has another size now
     if (wanted && (!wanted.open || wanted.matches(':modal'))) { // a sheet that was being loaded may lie over it
       for (const sheet of /** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog[open]'))) {
@@ -174,7 +175,10 @@ class Dialogs {
     }
     for (const sheet of Object.values(this.sheets)) if (sheet !== wanted && sheet.open) sheet.close();
     if (!standing || !wanted) return;
-    if (standing.kind === 'alarm') fillAlarm(wanted, standing.alarm, { isPane: place !== document.body, mayAct: !this.store.isViewer });
+    if (standing.kind === 'alarm') {
+      fillAlarm(wanted, standing.alarm, { isPane: place !== document.body, mayAct: !this.store.isViewer });
+      setAttribute(wanted, 'data-named', layOut(this.store.frame?.alarms ?? []).worst === standing.alarm); // by the strip
+    }
     else fillLink(wanted, standing.kind, this.store);
     if (standing.kind === 'lost') setText(field(wanted, 'title'), standing.alarm?.title ?? 'Connection lost');
     if (standing.kind === 'failed') setWords(field(wanted, 'change'), this.router.suggestion ? `Use ${this.router.suggestion}` : 'Change the address');
@@ -229,7 +233,8 @@ function fillAlarm(sheet, alarm, { isPane, mayAct }) {
   show(field(sheet, 'silence'), isPane && mayAct && keysOf(alarm).includes('silence'));
   sheet.dataset['priority'] = alarm.priority;
   setIcon(need(sheet, 'h2 .i'), alarm.priority === 'critical' ? 'crit' : 'warn');
-  setText(field(sheet, 'title'), alarm.title);
+  setAttribute(sheet, 'data-ended', !alarm.active);
+  setText(field(sheet, 'title'), titleOf(alarm));
   const { measured, limit } = alarm;
   show(field(sheet, 'versus'), measured !== null && limit !== null);
   if (measured && limit) {

@@ -26,7 +26,9 @@ export function mount(root, store) {
     setIcon(mark, seen.icon);
     setWords(text, seen.text);
     setWords(end, seen.end);
-    setAttribute(frame, 'data-mode', modeOf(store));
+    const mode = modeOf(store);
+    setAttribute(frame, 'data-mode', mode);
+    setAttribute(document.documentElement, 'data-framed', mode !== 'none');
   }
 
   if (store.frame) draw(); // before the first frame it is not shown

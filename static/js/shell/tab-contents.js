@@ -1,6 +1,7 @@
 // What fills each tab when it first comes to the front; the tabs themselves are declared in server/web/tabs.py.
 
 import { need } from '../core/dom.js';
+import { fetchStyle } from '../core/style-sheet.js';
 import { LazyTab } from './lazy-tab.js';
 
 /**
@@ -18,9 +19,9 @@ import { LazyTab } from './lazy-tab.js';
  * @property {boolean} [isNear] fetch it as soon as an edge of it is seen, for example in a swipe
  */
 
-/** Home is part of the page itself. @type {Record<string, Row>} */
+/** Home is part of the page itself. Without its sheet the map would draw an old position as a new one. @type {Record<string, Row>} */
 const CONTENTS = {
-  map: { fetch: () => import('../map/map.js'), state: 'none-words', isNear: true },
+  map: { fetch: async () => (await Promise.all([import('../map/map.js'), fetchStyle('/static/css/map-drawn.css')]))[0], state: 'none-words', isNear: true },
   scan: { fetch: () => import('../scan/scan.js'), state: 'none-words' },
   files: { fetch: () => import('../files/files.js') },
   settings: { fetch: () => import('../settings/settings.js') },

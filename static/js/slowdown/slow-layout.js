@@ -71,9 +71,10 @@ export function holdOf(now) {
 /**
  * The slide.
  * @param {Seen} seen
+ * @param {boolean} [isAsked] it stands in the sheet of an alarm, from which nothing is armed
  * @returns {{kind: 'off' | 'armed' | 'go', title: string, why: string, label: string}} off: pressed, it says why, or arms
  */
-export function slideOf(seen) {
+export function slideOf(seen, isAsked = false) {
   const { now, isSilent, isViewer } = seen;
   /** @param {string} title @param {string} why */
   const off = (title, why) => ({ kind: /** @type {const} */ ('off'), title, why, label: `${title}: ${why}` });
@@ -87,7 +88,7 @@ export function slideOf(seen) {
     if (isViewer) return off('Slow-down armed', 'not for viewers');
     return { kind: 'armed', title: 'Slide to slow', why: seen.car || 'the car', label: `Slide to slow ${seen.vehicle || 'the car'}. With a keyboard hold Enter for 1 second` };
   }
-  if (now.state === 'not_armed') return off('Slow-down not armed', isViewer ? 'not for viewers' : 'press to arm');
+  if (now.state === 'not_armed') return isAsked && !isViewer ? off('Acknowledge first', 'then arm it') : off('Slow-down not armed', isViewer ? 'not for viewers' : 'press to arm');
   const why = bare(now.why ?? 'not available');
   return off('Slow-down off', why.length > BRIEF ? 'press for the reason' : why);
 }

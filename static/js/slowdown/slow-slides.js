@@ -41,8 +41,8 @@ export class SlowSlides {
 
   /** @param {import('./slow-layout.js').Seen} seen */
   draw(seen) {
-    const view = { ...(this.store.now() < this.#sending_ms && !orderOf(seen.now) ? SENDING : slideOf(seen)), vehicle: this.store.vehicle };
-    for (const slide of this.slides) slide.draw(view);
+    const isSending = this.store.now() < this.#sending_ms && !orderOf(seen.now);
+    for (const key of this.slides) key.draw({ ...(isSending ? SENDING : slideOf(seen, key.slide.closest('dialog') !== null)), vehicle: this.store.vehicle });
   }
 
   /** The reason that an alarm's sheet shows when the slow-down cannot be used. */
