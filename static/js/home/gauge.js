@@ -5,6 +5,7 @@ import { accelerationAngle, band, digitsBox, faceOf, orderMark, speedAngle } fro
 import { ABSENT, isAbsent } from '../core/ink.js';
 import { orderOf } from '../slowdown/slow-layout.js';
 import { speedIn, speedUnit, speedWords, spokenSpeedUnit } from '../core/units.js';
+import { proposalOf, unseenOf, unseenWords } from '../core/unseen.js';
 import { age, signed } from '../core/format.js';
 
 const VIEW = '0 0 380 250';
@@ -80,7 +81,7 @@ class Gauge {
   draw() {
     this.#drawFace();
     const { root, store } = this;
-    const { speed, box, struck, unit, note, why, speedMeter } = this.parts;
+    const { speed, box, struck, unit, note, unseen, why, speedMeter } = this.parts;
     const scale = this.#scale();
     const speedInk = store.ink('speed');
     const speed_mps = number(store.signal('speed')?.value?.speed_mps);
@@ -99,10 +100,12 @@ class Gauge {
     const isBack = isSpeedKnown && speed_mps < 0 && digits.startsWith('−');
     setAttribute(unit, 'x', block.unitX);
     setText(unit, isSpeedKnown ? (isBack ? `${unitWord} back` : unitWord) : '');
-    const words = noteOf(speedInk, isSpeedKnown);
+    const words = [noteOf(speedInk, isSpeedKnown), proposalOf(store)].filter(Boolean).join(', ');
+    const way = speedInk.ink === 'ageing' || speedInk.ink === 'stale' ? unseenWords(unseenOf(store)) : '';
     setText(note, words);
+    setText(unseen, way);
     show(why, words !== '');
-    setAttribute(why, 'aria-label', `Speed: ${words}. Show its source`);
+    setAttribute(why, 'aria-label', `Speed: ${[words, way].filter(Boolean).join(', ')}. Show its source`);
     const isSpeedNow = isSpeedKnown && speedInk.ink !== 'stale';
     const isOrdered = this.#drawOrder(isSpeedNow ? speed_mps : null, scale);
     meter(speedMeter, isSpeedNow ? Math.abs(speedIn(speed_mps)) : null, speedIn(scale.speed_max_mps), `${digits} ${spokenSpeedUnit()}${isOrdered}`);
@@ -158,11 +161,12 @@ function build(root) {
   const struck = svg('rect', { class: 'struck', y: 146, height: 90 });
   const unit = svg('text', { class: 'unit', y: 240 });
   const note = svg('text', { class: 'note', x: 190, y: 249, 'text-anchor': 'middle' });
+  const unseen = svg('text', { class: 'note', x: 190, y: 142, 'text-anchor': 'middle', 'data-f': 'unseen' });
   const arc = svg('path', { class: 'ordarc' });
   const ordered = svg('tspan', { class: 'num' });
   const order = svg('text', { class: 'ord' }, 'ordered ', ordered);
   const top = svg('svg', { viewBox: VIEW, 'aria-hidden': 'true' }, bug, arc, order,
-    svg('text', { class: 'aval', x: 190, y: 124, 'text-anchor': 'middle' }, acceleration, accelerationUnit), box, speed, struck, unit, note);
+    svg('text', { class: 'aval', x: 190, y: 124, 'text-anchor': 'middle' }, acceleration, accelerationUnit), box, speed, struck, unit, note, unseen);
   const speedMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Speed', 'aria-valuemin': 0 });
   const why = html('button', { type: 'button', class: 'why', 'data-age-of': 'speed', hidden: true });
   const accelerationMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Acceleration' });
@@ -170,7 +174,7 @@ function build(root) {
     face, html('div', { class: 'clip' }, white), html('div', { class: 'clip' }, turn), html('div', { class: 'clip right' }, faster),
     html('div', { class: 'clip left' }, slower), pointer, top, speedMeter, accelerationMeter, why,
   );
-  return { face, white, red, turn, faster, slower, pointer, bug, acceleration, accelerationUnit, box, speed, struck, unit, note, why, arc, ordered, order, speedMeter, accelerationMeter };
+  return { face, white, red, turn, faster, slower, pointer, bug, acceleration, accelerationUnit, box, speed, struck, unit, note, unseen, why, arc, ordered, order, speedMeter, accelerationMeter };
 }
 
 /**

@@ -2,9 +2,8 @@
 
 import { countWords, rowsOf } from '../alarms/alarms-layout.js';
 import { field, html, icon, listen, setAttribute, setText, setWords, words } from '../core/dom.js';
-import { eventWords } from '../alarms/log-layout.js';
+import { eventWords, gapLine } from '../alarms/log-layout.js';
 import { fixed, timeOfDay } from '../core/format.js';
-import { gapWords } from '../core/event-log.js';
 import { alarmInHead } from './dialogs.js';
 import { areAlarmsInSight } from './layout.js';
 import { veilOf } from './veil.js';
@@ -133,8 +132,8 @@ class LogPane {
   }
 
   draw() {
-    const { rows, last } = this.store.log;
-    const key = `${last} ${rows.length} ${this.#lines}`;
+    const { rows, last, measured } = this.store.log;
+    const key = `${last} ${measured} ${rows.length} ${this.#lines}`;
     if (key === this.#shown) return;
     this.#shown = key;
     this.list.replaceChildren(...rows.slice(0, this.#lines).map(lineOf));
@@ -143,7 +142,7 @@ class LogPane {
 
 /** @param {import('../core/event-log.js').Row} row */
 function lineOf({ event, gap }) {
-  const shown = event ? eventWords(event) : { icon: 'link-off', kind: '', title: gapWords(gap), text: '' };
+  const shown = event ? eventWords(event) : { icon: 'link-off', kind: '', title: gapLine(gap), text: '' };
   const line = html('li', {}, html('span', { class: 'n' }, timeOfDay(event?.at_ms ?? gap?.at_ms ?? null)), icon(shown.icon, `s ${shown.kind}`), html('span', { class: 't' }, ...words(shown.title)), html('span', { class: 'm' }, ...words(shown.text)));
   setAttribute(line, 'data-kind', event?.priority ?? null);
   return line;
