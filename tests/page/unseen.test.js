@@ -73,22 +73,22 @@ test('the bound at the glass is that of the last speed', () => {
 });
 
 test('a speed is proposed above 200 ms, from the car to the glass, and never rounded up', () => {
-  assert.equal(proposalOf(glass()), '11.1 m/s keeps 2.78 m');
-  assert.equal(proposalOf(glass({ frame: { link: { late_s: 0.2 } } })), '');
-  assert.equal(proposalOf(glass({ frame: { link: { late_s: 0.1 } }, lag_s: 0.5 })), '5.5 m/s keeps 2.78 m'); // 0.4 s of it from the server here
-  assert.equal(proposalOf(glass({ frame: { link: { late_s: 1.5 } } })), '1.8 m/s keeps 2.78 m');
+  assert.deepEqual(proposalOf(glass()), ['≤ 11.1 m/s', 'for 2.78 m']);
+  assert.deepEqual(proposalOf(glass({ frame: { link: { late_s: 0.2 } } })), []);
+  assert.deepEqual(proposalOf(glass({ frame: { link: { late_s: 0.1 } }, lag_s: 0.5 })), ['≤ 5.5 m/s', 'for 2.78 m']); // 0.4 s of it from the server here
+  assert.deepEqual(proposalOf(glass({ frame: { link: { late_s: 1.5 } } })), ['≤ 1.8 m/s', 'for 2.78 m']);
   chooseSpeedUnit('km/h');
-  assert.equal(proposalOf(glass()), '40.0 km/h keeps 2.78 m');
+  assert.deepEqual(proposalOf(glass()), ['≤ 40.0 km/h', 'for 2.78 m']);
   chooseSpeedUnit('m/s');
 });
 
 test('no speed is proposed unless the setting says so, nor while nothing comes', () => {
-  assert.equal(proposalOf(glass({ limit: () => 0 })), '');
-  assert.equal(proposalOf(glass({ limit: () => null })), '');
-  assert.equal(proposalOf(glass({ isSilent: true })), '');
-  assert.equal(proposalOf(glass({ chain: { cut: 2 } })), '');
-  assert.equal(proposalOf(glass({ frame: null })), '');
-  assert.equal(proposalOf(glass({ frame: { link: { late_s: null } } })), 'delay not known');
+  assert.deepEqual(proposalOf(glass({ limit: () => 0 })), []);
+  assert.deepEqual(proposalOf(glass({ limit: () => null })), []);
+  assert.deepEqual(proposalOf(glass({ isSilent: true })), []);
+  assert.deepEqual(proposalOf(glass({ chain: { cut: 2 } })), []);
+  assert.deepEqual(proposalOf(glass({ frame: null })), []);
+  assert.deepEqual(proposalOf(glass({ frame: { link: { late_s: null } } })), ['delay', 'not known']);
 });
 
 test('a blind time has its metres once the first values after it came', () => {

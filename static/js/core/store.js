@@ -203,8 +203,7 @@ export class Store extends Known {
     switch (message.kind) {
       case 'hello':
         return this.#greeted(message, at_ms);
-      case 'offer':
-        return this.scans.offered(message.seq, this.now());
+      case 'offer': return this.scans.offered(message.seq, this.now());
       case 'state':
         return this.#state(message, at_ms);
       case 'cars':
@@ -214,8 +213,7 @@ export class Store extends Known {
       case 'duty':
         this.duty = message;
         return this.#emitter.emit('duty');
-      case 'events':
-        return this.sync.take(message.events);
+      case 'events': return this.sync.take(message.events);
       case 'timeline': case 'beside': case 'beside_ended': case 'replay':
         if (message.kind === 'replay') this.replaying = false; // it ended: what comes now is live
         return this.#emitter.emit('replay', message);

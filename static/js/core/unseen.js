@@ -51,14 +51,15 @@ export function unseenOf(store) {
 }
 
 /**
- * The speed to hold on a late link, where the setting asks for it: "11.1 m/s keeps 2.78 m".
+ * The speed to hold on a late link, where the setting asks for it, in two short lines: "≤ 11.1 m/s", "for 2.78 m".
  * @param {import('./store.js').Store} store
+ * @returns {string[]} none: nothing is proposed
  */
 export function proposalOf(store) {
   const { frame } = store;
-  if (!frame || !store.limit('unseen.proposes_speed') || store.isSilent || store.chain.cut !== null) return '';
+  if (!frame || !store.limit('unseen.proposes_speed') || store.isSilent || store.chain.cut !== null) return [];
   const { late_s } = frame.link;
-  if (late_s === null) return 'delay not known';
+  if (late_s === null) return ['delay', 'not known'];
   const kept_mps = keptSpeed(Math.round(1000 * (late_s + store.lag_s - Math.max(0, store.silence_s))) / 1000);
-  return kept_mps === null ? '' : `${(Math.floor(speedIn(kept_mps) * 10) / 10).toFixed(1)} ${speedUnit()} keeps ${KEPT_M} m`;
+  return kept_mps === null ? [] : [`≤ ${(Math.floor(speedIn(kept_mps) * 10) / 10).toFixed(1)} ${speedUnit()}`, `for ${KEPT_M} m`];
 }
