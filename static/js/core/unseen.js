@@ -16,9 +16,9 @@ export const LATE_ABOVE_S = 0.2;
  * @returns {number | null}
  */
 export function unseenMetres(speed_mps, age_s, acceleration_mps2) {
-  if (typeof speed_mps !== 'number' || typeof age_s !== 'number' || typeof acceleration_mps2 !== 'number') return null;
-  const found_m = Math.abs(speed_mps) * age_s + (acceleration_mps2 * age_s * age_s) / 2;
-  return Number.isFinite(found_m) && age_s >= 0 && acceleration_mps2 > 0 ? found_m : null;
+  const [v, t, a] = /** @type {number[]} */ ([speed_mps, age_s, acceleration_mps2]);
+  const isKnown = [v, t, a].every(Number.isFinite) && t >= 0 && a > 0;
+  return isKnown ? Math.abs(v) * t + (a * t * t) / 2 : null;
 }
 
 /**
@@ -27,7 +27,7 @@ export function unseenMetres(speed_mps, age_s, acceleration_mps2) {
  * @returns {number | null}
  */
 export function keptSpeed(late_s) {
-  return typeof late_s === 'number' && late_s > LATE_ABOVE_S && late_s < Infinity ? KEPT_M / late_s : null;
+  return Number.isFinite(late_s) && Number(late_s) > LATE_ABOVE_S ? KEPT_M / Number(late_s) : null;
 }
 
 /**
