@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from monitor.check import EXPERT, Limits, threshold
+from monitor.unseen import UnseenLimits
 
 GAUGE, VEHICLE, FLEET, STORE, DRIVING = "Gauge", "Vehicle", "Fleet", "Store", "Driving mode"  # headings of Settings
 
@@ -288,6 +289,7 @@ GROUPS: dict[str, type[Limits]] = {
     "attention": AttentionLimits,
     "store": StoreLimits,
     "driving": DrivingLimits,
+    "unseen": UnseenLimits,
     "gauge": GaugeLimits,
     "obstacle": ObstacleLimits,
     "mounting": MountingLimits,

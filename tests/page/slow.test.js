@@ -37,8 +37,8 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
   assert.equal(words(slow('armed'), { mayControl: false, holder: 'Ben' }), 'armed: Slide to slow the car', 'any operator stops the car');
   assert.equal(words(slow('armed'), { isSilent: true }), 'off: State unknown no answer');
   const asked = (/** @type {any} */ now, more = {}) => slideOf(seen(now, more), true);
-  assert.equal(asked(slow('safe')).label, 'Acknowledge first: then arm it', 'nothing is armed from the sheet of an alarm');
-  assert.equal(asked(slow('safe'), { isViewer: true }).why, 'not for viewers');
+  assert.equal(asked(slow('not_armed')).label, 'Acknowledge first: then arm it', 'nothing is armed from the sheet of an alarm');
+  assert.equal(asked(slow('not_armed'), { isViewer: true }).why, 'not for viewers');
   assert.deepEqual(asked(slow('armed')), slideOf(seen(slow('armed'))), 'but a slide slows from it');
   assert.equal(words(null), 'off: State unknown no answer');
   assert.equal(words(ordered()), 'go: Slowing to 0.0 m/s');

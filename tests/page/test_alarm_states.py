@@ -182,7 +182,7 @@ async def test_strip_snackbar_and_list_name_the_same_alarm_first(phone: Phone, c
 async def test_under_a_dialog_no_dead_key_looks_live_and_its_slide_says_what_comes_first(
     phone: Phone, canned: Canned
 ) -> None:
-    canned.state = live() | {"alarms": [speeding()], "decelerate": slow("safe")}
+    canned.state = live() | {"alarms": [speeding()], "decelerate": slow("not_armed")}
     page = await opened(phone, canned)
     slide = page.locator("#sheet-alarm .slide")
     await expect(slide).to_have_text("Acknowledge first\nthen arm it", use_inner_text=True)

@@ -103,7 +103,7 @@ async def test_a_card_takes_the_map_of_a_desk_no_height(phone: Phone, canned: Ca
 
 
 @pytest.mark.gate
-@pytest.mark.parametrize(("state", "most"), [("armed", 2), ("safe", 5)])
+@pytest.mark.parametrize(("state", "most"), [("armed", 2), ("not_armed", 5)])
 async def test_with_three_cars_the_right_one_is_slowed(phone: Phone, canned: Canned, state: str, most: int) -> None:
     fleet(canned)
     await opened(phone, canned)

@@ -5,6 +5,7 @@ What nobody knows is None, and is shown as "not known".
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -14,6 +15,7 @@ from server.analysis.alarm_load import Load
 from server.recording.catalog.annotations import Annotations
 from server.recording.drive.facts import DriveFacts, DriveLog, figures_of
 from server.recording.drive.people import Span
+from server.recording.drive.unseen import UnseenTime, blind_times, late_times
 from server.recording.read.read import Recording
 from server.recording.verification import Verification
 from server.version import catgraph_version
@@ -49,7 +51,9 @@ def report_json(
         "chain": [one.as_json() for one in verified],
         "figures": figures_of(facts),
         "load": None if load is None or log is None else _load(load),
-        "blind": [{"from_s": round(a, 2), "to_s": round(b, 2)} for a, b in facts.motion.blind_spans()[:MOST_ROWS]],
+        "blind": [_unseen(one) for one in blind_times(facts)[:MOST_ROWS]],
+        "late": [_unseen(one) | {"late_s": one.late_s} for one in late_times(facts)[:MOST_ROWS]],
+        "unseen_by": _unseen_by(facts),
         "damage": list(recording.damage),
         "left_out": [line for line in metadata.get("left_out", "").split("\n") if line][:MOST_ROWS],
         "not_received": [line for line in metadata.get("not_received", "").split("\n") if line][:MOST_ROWS],
@@ -99,6 +103,20 @@ def _load(load: Load) -> dict[str, Any]:
         "chattering": list(load.chattering),
         "standing": load.standing,
         "verdict": load.verdict,
+    }
+
+
+def _unseen(one: UnseenTime) -> dict[str, float | None]:
+    metres = None if one.metres is None else math.ceil(one.metres * 100) / 100
+    return {"from_s": round(one.from_s, 2), "to_s": round(one.to_s, 2), "unseen_m": metres}
+
+
+def _unseen_by(facts: DriveFacts) -> dict[str, Any]:
+    """By what the metres unseen are counted."""
+    return {
+        "acceleration_mps2": max((value for _, value in facts.accelerations), default=None),
+        "is_recorded": facts.are_settings_recorded,
+        "with_delay": bool(facts.late),
     }
 
 

@@ -10,6 +10,7 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from monitor.load import BEARABLE_IN_10_MIN, FLOOD_IN_10_MIN
+from monitor.unseen import unseen_words
 from server.analysis import report_text
 from server.analysis.drive import drawings
 from server.analysis.drive.axis import day_time
@@ -51,7 +52,8 @@ def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str
         "slow_downs": _slow_downs(found["slow_downs"]),
         "link": drawings.link_plot(facts, 340, 150),
         "link_head": _link_head(found["link_delay"]),
-        "blind": [(day_time(facts.start_ms + a * 1000), report_text.length(b - a)) for a, b in _blind(found)],
+        "blind": _blind(found, facts.start_ms),
+        "blind_head": _blind_head(found),
         "lost": _lost(found),
         "nothing_lost": "none: nothing is missing that was to be recorded"
         if found["alarms"] is not None
@@ -257,8 +259,29 @@ def _link_head(delay: Mapping[str, float] | None) -> str:
     return "" if delay is None else f"delay in ms; p90 {delay['p90_s'] * 1000:.0f}, most {delay['most_s'] * 1000:.0f}"
 
 
-def _blind(found: Mapping[str, Any]) -> list[tuple[float, float]]:
-    return [(one["from_s"], one["to_s"]) for one in found["blind"][:50]]
+def _blind(found: Mapping[str, Any], start_ms: int) -> list[tuple[str, str, str, str]]:
+    """When, what, how far the car may have driven, how long."""
+    rows = [(one, "no message from the car") for one in found["blind"][:50]]
+    rows += [(one, f"messages up to {one['late_s']:.1f} s late") for one in found["late"][:50]]
+    return [
+        (
+            day_time(start_ms + one["from_s"] * 1000),
+            what,
+            unseen_words(one["unseen_m"]),
+            report_text.length(one["to_s"] - one["from_s"]),
+        )
+        for one, what in sorted(rows, key=lambda row: float(row[0]["from_s"]))
+    ]
+
+
+def _blind_head(found: Mapping[str, Any]) -> str:
+    """How the metres are counted."""
+    by = found["unseen_by"]
+    if by["acceleration_mps2"] is None or not (found["blind"] or found["late"]):
+        return ""
+    setting = "" if by["is_recorded"] else " (as set today)"
+    delay = "" if by["with_delay"] else ", delay of the link not known"
+    return f"metres: last speed and at most {by['acceleration_mps2']:.1f} m/s²{setting}{delay}"
 
 
 def _lost(found: Mapping[str, Any]) -> list[str]:

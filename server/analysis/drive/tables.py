@@ -8,6 +8,7 @@ from typing import Any
 
 import orjson
 
+from monitor.unseen import unseen_words
 from server.analysis.drive.drive_report import DriveReport
 from server.analysis.drive.form import as_csv
 from server.recording.export.formats.csv_zip import when
@@ -105,10 +106,15 @@ def _things(found: Mapping[str, Any]) -> Iterator[list[Any]]:
         yield _row(
             "slow-down", one["ordered_ms"], one["released_ms"], what=one["why"], by=one["by"], details=one["proof"]
         )
-    for one in found["blind"]:
-        start = found["start_ms"]
-        about = {"value": round(one["to_s"] - one["from_s"], 2), "unit": "s"}
-        yield _row("blind", start + one["from_s"] * 1000, start + one["to_s"] * 1000, what="no message", **about)
+    for section, what in (("blind", "no message"), ("late", "messages late")):
+        for one in found[section]:
+            start = found["start_ms"]
+            about = {
+                "value": round(one["to_s"] - one["from_s"], 2),
+                "unit": "s",
+                "details": unseen_words(one["unseen_m"]),
+            }
+            yield _row(section, start + one["from_s"] * 1000, start + one["to_s"] * 1000, what=what, **about)
     for name in ("damage", "left_out", "not_received"):
         for line in found[name]:
             yield _row("missing", what=name, value=line)

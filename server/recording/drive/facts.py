@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from server.judge.active_settings import ActiveSettings
 from server.judge.drive import Drive
 from server.judge.offline import OfflineRun
 from server.judge.recorded_events import NewSettings
@@ -53,6 +54,8 @@ class DriveFacts:
     motion: Motion
     late: Sequence[tuple[float, float]]  # s since the beginning, delay of the link [s]
     limits: Sequence[tuple[float, float]] = ()  # s since the beginning, speed limit in force from then on [m/s]
+    accelerations: Sequence[tuple[float, float]] = ()  # the same of what the car can do [m/s²]
+    are_settings_recorded: bool = False  # else they are those of today
 
     @property
     def length_s(self) -> float:
@@ -69,16 +72,25 @@ def read_facts(recording: Recording) -> DriveFacts:
     has_speed = any("speed" in epoch.published for epoch in drive.epochs)
     motion = Motion(drive.length_s, speed="speed" if has_speed else "odometry")
     OfflineRun(recording, drive, observer=motion, with_checks=False).advance(math.inf, to_last_message=True)
-    return replace(facts_of(recording, motion), limits=limits_of(drive))
+    return replace(
+        facts_of(recording, motion),
+        limits=limits_of(drive),
+        accelerations=_in_force(drive, lambda tuning: tuning.limits.unseen.acceleration_mps2),
+        are_settings_recorded=drive.settings_from_recording,
+    )
 
 
 def limits_of(drive: Drive) -> list[tuple[float, float]]:
     """Without settings in the recording nobody knows which limit was in force."""
     if not drive.settings_from_recording:
         return []
+    return _in_force(drive, lambda tuning: tuning.limits.speed_limit.max_mps)
+
+
+def _in_force(drive: Drive, of: Callable[[ActiveSettings], float]) -> list[tuple[float, float]]:
+    """From when on [s since the beginning] a setting had which value."""
     moments = [0.0, *(at_s for at_s, event in drive.recorded.events if isinstance(event, NewSettings))]
-    limits = [epoch.tuning.limits.speed_limit.max_mps for epoch in drive.epochs]
-    return list(zip(moments, limits, strict=False))
+    return list(zip(moments, (of(epoch.tuning) for epoch in drive.epochs), strict=False))
 
 
 def facts_of(recording: Recording, motion: Motion) -> DriveFacts:

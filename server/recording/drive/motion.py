@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -40,6 +40,16 @@ class Course:
         """The last value not after a moment; None where there is none, or it is older than `longest_s`."""
         place = bisect_right(self.at_s, at_s) - 1
         return self.values[place] if place >= 0 and at_s - self.at_s[place] <= longest_s else None
+
+    def last(self, at_s: float) -> tuple[float, float] | None:
+        """The last moment not after this one that has a value, and the value; None: there is none."""
+        place = bisect_right(self.at_s, at_s) - 1
+        return (self.at_s[place], self.values[place]) if place >= 0 else None
+
+    def between(self, from_s: float, to_s: float) -> list[tuple[float, float]]:
+        """Moments and values after one moment and before another."""
+        first, last = bisect_right(self.at_s, from_s), bisect_left(self.at_s, to_s)
+        return list(zip(self.at_s[first:last], self.values[first:last], strict=True))
 
 
 class Motion(Observer):

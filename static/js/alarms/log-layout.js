@@ -1,6 +1,8 @@
 // The alarm log as words: how an event reads, what a filter leaves, which day it was. Pure functions, no DOM.
 
+import { gapWords } from '../core/event-log.js';
 import { age } from '../core/format.js';
+import { unseenWords } from '../core/unseen.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').LogEvent} AlarmEvent
@@ -77,6 +79,14 @@ export function joined(here, older, filter) {
   const known = new Set(here.map(({ event }) => event?.n));
   const before = older.filter((event) => !known.has(event.n)).map((event) => ({ event, gap: null }));
   return [...here, ...before].filter(({ event }) => !event || fits(event, filter));
+}
+
+/**
+ * A blind time with how far the car may have driven in it: "Blind 14 s: 2 alarms raised, 1 cleared, ≤ 81.2 m unseen".
+ * @param {import('../core/event-log.js').Gap} gap
+ */
+export function gapLine(gap) {
+  return gap.unseen_m === undefined ? gapWords(gap) : `${gapWords(gap)}, ${unseenWords(gap.unseen_m)}`;
 }
 
 /**

@@ -1,7 +1,6 @@
 // The alarm log: what stands and who has seen it, then what happened, newest first, with the times in which this page was blind.
 
-import { MARKS, KINDS, dayWords, eventWords, joined, lowest, tookWords } from './log-layout.js';
-import { gapWords } from '../core/event-log.js';
+import { MARKS, KINDS, dayWords, eventWords, gapLine, joined, lowest, tookWords } from './log-layout.js';
 import { html, icon, listen, setAttribute, setText, setWords, show, words } from '../core/dom.js';
 import { byUrgency } from './alarm-layout.js';
 import { OlderEvents, queryOf } from './older-events.js';
@@ -92,7 +91,7 @@ class AlarmLog {
     setAttribute(older, 'data-busy', this.older.isBusy || null);
     setAttribute(older, 'hidden', next === null || (next === undefined && (lowest(rows) ?? 2) <= 1));
     const today = new Date(Date.now()).toDateString(); // the headings of the days change at midnight
-    const key = JSON.stringify([rows.length, last, events.length, this.filter, today]);
+    const key = JSON.stringify([rows.length, last, this.store.log.measured, events.length, this.filter, today]);
     if (key === this.#happened) return;
     number.replaceChildren('no. ', html('span', { class: 'n' }, String(last ?? 0)));
     const all = joined(rows, events, this.filter);
@@ -160,7 +159,7 @@ function withDay(row, above, all) {
  */
 function drawRow({ event, gap }, all) {
   if (!event) {
-    return html('li', { class: 'gap hatched' }, html('span'), html('span', { class: 'tag' }, icon('link-off', 's'), ...words(gapWords(gap))));
+    return html('li', { class: 'gap hatched' }, html('span'), html('span', { class: 'tag' }, icon('link-off', 's'), ...words(gapLine(gap))));
   }
   const { icon: glyph, kind, title, text } = eventWords(event);
   const details = [text, tookWords(event, all)].filter(Boolean).join(' · ');

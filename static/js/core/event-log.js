@@ -2,7 +2,7 @@
 
 /**
  * @typedef {import('./protocol-types.js').LogEvent} AlarmEvent
- * @typedef {{blind_s: number, raised: number, cleared: number, at_ms: number}} Gap
+ * @typedef {{blind_s: number, raised: number, cleared: number, at_ms: number, unseen_m?: number | null}} Gap unseen_m: how far the car may have driven, once the first values came; null: not known
  * @typedef {{event: AlarmEvent, gap: null} | {event: null, gap: Gap}} Row
  */
 
@@ -18,6 +18,10 @@ export class EventLog {
   #boot = null;
   /** @type {{until: number, gap: Gap} | null} what is being caught up with */
   #blind = null;
+  /** The gap after which no values came yet. @type {Gap | null} */
+  open = null;
+  /** How many gaps got their metres. */
+  measured = 0;
 
   /**
    * The server greeted: it has events up to `last_event`. Answers the number from which this page wants them.
@@ -36,14 +40,22 @@ export class EventLog {
     }
     // A server that lost its journal counts afresh: what it has is all new.
     if (isRestarted && last_event < this.last) this.last = 0;
-    this.#blind = { until: last_event, gap: { blind_s, raised: 0, cleared: 0, at_ms } };
+    this.#blind = { until: last_event, gap: this.open = { blind_s, raised: 0, cleared: 0, at_ms } };
     return this.last;
   }
 
   /** Forget everything: what comes is of another car. */
   clear() {
     this.rows = [];
-    this.last = this.#boot = this.#blind = null;
+    this.last = this.#boot = this.#blind = this.open = null;
+  }
+
+  /** The first values after a gap came. @param {number | null} unseen_m the most that the car can have driven since the last ones; null: not known */
+  seen(unseen_m) {
+    if (!this.open) return;
+    this.open.unseen_m = unseen_m;
+    this.open = null;
+    this.measured += 1;
   }
 
   /** What is kept, oldest first. */

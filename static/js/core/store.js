@@ -16,6 +16,7 @@ import { Requests } from './requests.js';
 import { ScanFeed } from './scan-feed.js';
 import { Seal } from './signer.js';
 import { PageSocket } from './socket.js';
+import { unseenOf } from './unseen.js';
 
 /**
  * @typedef {import('./protocol-types.js').State} State
@@ -213,8 +214,7 @@ export class Store extends Known {
       case 'duty':
         this.duty = message;
         return this.#emitter.emit('duty');
-      case 'events':
-        return this.sync.take(message.events);
+      case 'events': return this.sync.take(message.events);
       case 'timeline': case 'beside': case 'beside_ended': case 'replay':
         if (message.kind === 'replay') this.replaying = false; // it ended: what comes now is live
         return this.#emitter.emit('replay', message);
@@ -247,7 +247,9 @@ export class Store extends Known {
     // What a part keeps, it keeps for one run of the server and one car.
     frame.server.boot = `${frame.server.boot} ${this.vehicle}`;
     const delay_ms = this.#clock.note(frame.server.time_ms, now_ms);
+    const unseen_m = this.log.open && unseenOf(this);
     if (!this.deadMan.frame(now_ms, delay_ms)) return; // a memory, not service
+    this.log.seen(unseen_m);
     const isFirst = this.take(frame, Date.now() - (this.now() - now_ms));
     this.#delay_ms = delay_ms;
     this.socket.proof(now_ms);

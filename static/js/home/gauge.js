@@ -5,6 +5,7 @@ import { accelerationAngle, band, digitsBox, faceOf, orderMark, speedAngle } fro
 import { ABSENT, isAbsent } from '../core/ink.js';
 import { orderOf } from '../slowdown/slow-layout.js';
 import { speedIn, speedUnit, speedWords, spokenSpeedUnit } from '../core/units.js';
+import { proposalOf, unseenOf, unseenWords } from '../core/unseen.js';
 import { age, signed } from '../core/format.js';
 
 const VIEW = '0 0 380 250';
@@ -106,12 +107,25 @@ class Gauge {
     setText(unit, isSpeedKnown ? (isBack ? `${unitWord} back` : unitWord) : '');
     const words = noteOf(speedInk, isSpeedKnown);
     setText(note, words);
-    show(why, words !== '');
-    setAttribute(why, 'aria-label', `Speed: ${words}. Show its source`);
+    const said = [words, ...this.#drawWay(speedInk.ink)].filter(Boolean).join(', ');
+    show(why, said !== '');
+    setAttribute(why, 'aria-label', `Speed: ${said}. Show its source`);
     const isSpeedNow = isSpeedKnown && speedInk.ink !== 'stale';
     const isOrdered = this.#drawOrder(isSpeedNow ? speed_mps : null, scale);
     meter(speedMeter, isSpeedNow ? Math.abs(speedIn(speed_mps)) : null, speedIn(scale.speed_max_mps), `${digits} ${spokenSpeedUnit()}${isOrdered}`);
     this.#drawAcceleration(scale);
+  }
+
+  /** Writes how far the car may have driven since, and the speed that a late link allows; returns both. @param {import('../core/ink.js').Freshness} ink of the speed */
+  #drawWay(ink) {
+    const { unseen, keeps, keptWay } = this.parts;
+    const metres = unseenOf(this.store);
+    const way = ink !== 'ageing' && ink !== 'stale' ? '' : metres === null ? 'unseen not known' : unseenWords(metres); // short: it stands within the arc
+    const [speed = '', of = ''] = proposalOf(this.store);
+    setText(unseen, way);
+    setText(keeps, speed);
+    setText(keptWay, of);
+    return [way, `${speed} ${of}`.trim()];
   }
 
   /** @param {Scale} scale */
@@ -163,11 +177,13 @@ function build(root) {
   const struck = svg('rect', { class: 'struck', y: 146, height: 90 });
   const unit = svg('text', { class: 'unit', y: 240 });
   const note = svg('text', { class: 'note', x: 190, y: 249, 'text-anchor': 'middle' });
+  const unseen = svg('text', { class: 'way', x: 190, y: 142, 'text-anchor': 'middle', 'data-f': 'unseen' });
+  const [keeps, keptWay] = [232, 248].map((y) => svg('text', { class: 'way', x: 0, y }));
   const arc = svg('path', { class: 'ordarc' });
   const ordered = svg('tspan', { class: 'num' });
   const order = svg('text', { class: 'ord' }, 'ordered ', ordered);
   const top = svg('svg', { viewBox: VIEW, 'aria-hidden': 'true' }, bug, arc, order,
-    svg('text', { class: 'aval', x: 190, y: 124, 'text-anchor': 'middle' }, acceleration, accelerationUnit), box, speed, struck, unit, note);
+    svg('text', { class: 'aval', x: 190, y: 124, 'text-anchor': 'middle' }, acceleration, accelerationUnit), box, speed, struck, unit, note, unseen, keeps, keptWay);
   const speedMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Speed', 'aria-valuemin': 0 });
   const why = html('button', { type: 'button', class: 'why', 'data-age-of': 'speed', hidden: true });
   const accelerationMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Acceleration' });
@@ -175,7 +191,7 @@ function build(root) {
     face, html('div', { class: 'clip' }, white), html('div', { class: 'clip' }, turn), html('div', { class: 'clip right' }, faster),
     html('div', { class: 'clip left' }, slower), pointer, top, speedMeter, accelerationMeter, why,
   );
-  return { face, white, red, turn, faster, slower, pointer, bug, acceleration, accelerationUnit, box, speed, struck, unit, note, why, arc, ordered, order, speedMeter, accelerationMeter };
+  return { face, white, red, turn, faster, slower, pointer, bug, acceleration, accelerationUnit, box, speed, struck, unit, note, unseen, keeps, keptWay, why, arc, ordered, order, speedMeter, accelerationMeter };
 }
 
 /**

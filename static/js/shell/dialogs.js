@@ -7,6 +7,7 @@ import { areAlarmsInSight } from './layout.js';
 import { Meant } from '../core/meant.js';
 import { isAsked } from './sheet.js';
 import { shownIn } from '../core/units.js';
+import { unseenOf, unseenWords } from '../core/unseen.js';
 import { dialogWords } from '../alarms/standing.js';
 import { keysOf, silentWords } from '../alarms/alarms-layout.js';
 import { age, counted, fixed, timeOfDay } from '../core/format.js';
@@ -262,7 +263,8 @@ function fillLink(sheet, kind, store) {
     text.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
     text.dataset['shown'] = key;
   }
-  setWords(field(sheet, 'more'), more);
+  const way = kind === 'lost' ? unseenWords(unseenOf(store)) : '';
+  setWords(field(sheet, 'more'), way ? `${more} Since the last value: ${way}.` : more);
 }
 
 /**

@@ -2,9 +2,8 @@
 
 import { countWords, rowsOf } from '../alarms/alarms-layout.js';
 import { field, html, icon, listen, setAttribute, setText, setWords, words } from '../core/dom.js';
-import { eventWords } from '../alarms/log-layout.js';
+import { eventWords, gapLine } from '../alarms/log-layout.js';
 import { fixed, timeOfDay } from '../core/format.js';
-import { gapWords } from '../core/event-log.js';
 import { alarmInHead } from './dialogs.js';
 import { areAlarmsInSight } from './layout.js';
 import { styled } from '../core/style-sheet.js';
@@ -141,7 +140,7 @@ class LogPane {
   }
 
   draw() {
-    const { frame, log: { rows, last } } = this.store;
+    const { frame, log: { rows, last, measured } } = this.store;
     const replay = frame?.replay;
     setText(this.head, replay ? 'of the recording, newest first' : 'newest first');
     if (replay && !this.#recorded) {
@@ -149,7 +148,7 @@ class LogPane {
       import('../replay/recorded-log.js').then(({ shownLines }) => { this.#recorded = shownLines; }, () => {});
     }
     const recorded = replay && (this.#recorded?.(replay) ?? []).slice(0, this.#lines);
-    const key = recorded ? JSON.stringify(recorded) : `${last} ${rows.length} ${this.#lines}`;
+    const key = recorded ? JSON.stringify(recorded) : `${last} ${measured} ${rows.length} ${this.#lines}`;
     if (key === this.#shown) return;
     this.#shown = key;
     this.list.replaceChildren(...(recorded ?? rows.slice(0, this.#lines).map(liveOf)).map(lineOf));
@@ -158,7 +157,7 @@ class LogPane {
 
 /** @param {import('../core/event-log.js').Row} row */
 function liveOf({ event, gap }) {
-  const shown = event ? eventWords(event) : { icon: 'link-off', kind: '', title: gapWords(gap), text: '' };
+  const shown = event ? eventWords(event) : { icon: 'link-off', kind: '', title: gapLine(gap), text: '' };
   return { ...shown, at_ms: event?.at_ms ?? gap?.at_ms ?? null, priority: event?.priority ?? null };
 }
 

@@ -5,6 +5,7 @@ import { drawBigChain } from './chain.js';
 import { rewinder } from '../core/draw-proof.js';
 import { field, html, mirror, need, setAttribute, setText, setWords, show, words } from '../core/dom.js';
 import { speedWords } from '../core/units.js';
+import { unseenOf, unseenWords } from '../core/unseen.js';
 import { age, fixed, timeOfDay } from '../core/format.js';
 
 /** What is known of the recorder under the veil: what it did then, or what is safe for good. @type {Record<string, string>} */
@@ -72,7 +73,7 @@ export function mount(root, store) {
       sentence.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
       written = `${bold}|${plain}`;
     }
-    setWords(then, thenWords(store.frame));
+    setWords(then, [thenWords(store.frame), store.frame ? unseenWords(unseenOf(store)) : ''].filter(Boolean).join(', '));
     const recording = RECORDED[store.frame?.recording.state ?? 'off'] ?? '';
     setText(rec, recording);
     for (const part of [recName, rec]) show(part, recording !== '');
