@@ -203,8 +203,7 @@ export class Store extends Known {
     switch (message.kind) {
       case 'hello':
         return this.#greeted(message, at_ms);
-      case 'offer':
-        return this.socket.takeInTurn(() => this.scans.offered(message.seq, this.now()));
+      case 'offer': return this.socket.takeInTurn(() => this.scans.offered(message.seq, this.now()));
       case 'state':
         return this.#state(message, at_ms);
       case 'cars':
