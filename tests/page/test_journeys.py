@@ -51,6 +51,7 @@ async def test_what_is_recorded_is_ended_listed_and_replayed(phone: Phone, tmp_p
         await expect(now).to_contain_text("Recording now")
         await expect(phone.f("rec-for")).to_have_text(re.compile(r"00:(0[5-9]|[1-5]\d)"), timeout=30_000)
         await now.get_by_role("button", name="End the recording").tap()
+        await phone.f("yes", "#sheet-record").tap()  # the car moves
         await expect(now).to_contain_text("Not recording", timeout=30_000)
         saved = page.locator("#panel-files [data-f=recordings] .file")
         await expect(saved).to_have_count(1, timeout=30_000)

@@ -14,80 +14,95 @@ export function isWanted({ isOpen, isFirstTab, state }) {
   return isOpen || (!isFirstTab && !hasOwn);
 }
 
-/**
- * @param {HTMLElement} monitor
- * @param {import('./tabs.js').Tabs} tabs
- */
+/** @param {HTMLElement} monitor @param {import('./tabs.js').Tabs} tabs */
 export function mount(monitor, tabs) {
-  const { navigation } = /** @type {{navigation?: {currentEntry: {index: number} | null} & EventTarget}} */ (/** @type {unknown} */ (window));
+  const { navigation } = /** @type {{navigation?: Navigated}} */ (/** @type {unknown} */ (window));
   if (!navigation) return () => {}; // nothing tells Back from a link
-  const at = () => navigation.currentEntry?.index ?? 0;
-  /** Open dialogs, the last opened last. @type {HTMLDialogElement[]} */
-  let open = [];
-  let index = at();
-  /** Why the history goes back, where it is by this module. @type {'tidying' | 'leaving' | null} */
-  let own = null;
-  /** A screen or a board lay over the page, when all was at rest last. */
-  let isCovered = false;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  let timer;
-  const isFirstTab = () => Boolean(monitor.hidden) || tabs.index === 0;
+  const back = new Back(monitor, tabs, navigation);
+  const [opened, made, front] = [0, 1, 2].map(() => new MutationObserver(() => back.look())); // one target, one set of options each
+  opened?.observe(document.body, { subtree: true, attributeFilter: ['open'] });
+  made?.observe(document.body, { childList: true }); // a sheet that is taken away while it is open
+  front?.observe(monitor, { attributeFilter: ['data-front', 'data-over', 'hidden'] });
+  const stop = listen(window, 'popstate', (event) => back.popped(event), { capture: true });
+  return () => {
+    stop();
+    for (const one of [opened, made, front]) one?.disconnect();
+  };
+}
 
-  function look() {
+/** @typedef {{currentEntry: {index: number} | null}} Navigated */
+
+class Back {
+  /** Open dialogs, the last opened last. @type {HTMLDialogElement[]} */
+  #open = [];
+  #index;
+  /** Why the history goes back, where it is by this module. @type {'tidying' | 'leaving' | null} */
+  #own = null;
+  /** A screen or a board lay over the page, when all was at rest last. */
+  #isCovered = false;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  #timer;
+
+  /** @param {HTMLElement} monitor @param {import('./tabs.js').Tabs} tabs @param {Navigated} navigation */
+  constructor(monitor, tabs, navigation) {
+    this.monitor = monitor;
+    this.tabs = tabs;
+    this.navigation = navigation;
+    this.#index = this.#at;
+    if (history.state?.over) history.replaceState({ ...history.state, over: undefined }, ''); // of the page before a reload
+    this.look();
+  }
+
+  get #at() {
+    return this.navigation.currentEntry?.index ?? 0;
+  }
+
+  get #isFirstTab() {
+    return Boolean(this.monitor.hidden) || this.tabs.index === 0;
+  }
+
+  /** Something was opened or closed. */
+  look() {
     const now = /** @type {HTMLDialogElement[]} */ ([...document.querySelectorAll(OPEN)]);
-    open = [...open.filter((one) => now.includes(one)), ...now.filter((one) => !open.includes(one))];
-    clearTimeout(timer);
-    timer = setTimeout(agree); // after whatever is being opened or closed has its own entry
+    this.#open = [...this.#open.filter((one) => now.includes(one)), ...now.filter((one) => !this.#open.includes(one))];
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => this.#agree()); // after whatever is being opened or closed has its own entry
   }
 
   /** Let the history have the entry exactly where it is wanted. */
-  function agree() {
-    if (own === 'tidying') return; // it is under way
-    own = null; // there was nowhere to leave to
-    isCovered = Boolean(monitor.dataset['over']) || document.querySelector('.drive-board, .saved-board') !== null;
+  #agree() {
+    if (this.#own === 'tidying') return; // it is under way
+    this.#own = null; // there was nowhere to leave to
+    this.#isCovered = Boolean(this.monitor.dataset['over']) || document.querySelector('.drive-board, .saved-board') !== null;
     const { state } = history;
     const isThere = state?.over === true;
-    const wanted = isWanted({ isOpen: open.length > 0, isFirstTab: isFirstTab(), state });
+    const wanted = isWanted({ isOpen: this.#open.length > 0, isFirstTab: this.#isFirstTab, state });
     if (wanted && !isThere) history.pushState({ ...state, over: true }, '');
-    else if (!wanted && isThere) backBy('tidying');
-    index = at();
+    else if (!wanted && isThere) this.#goBack('tidying');
+    this.#index = this.#at;
   }
 
   /** @param {'tidying' | 'leaving'} why */
-  function backBy(why) {
-    own = why;
+  #goBack(why) {
+    this.#own = why;
     history.back();
   }
 
   /** @param {PopStateEvent} event */
-  function popped(event) {
-    const isBack = at() < index;
-    const why = own;
-    index = at();
-    own = null;
-    const top = open.at(-1);
-    if (!isBack) look();
-    else if (why === 'leaving') backBy('leaving');
-    else if (why === 'tidying') look();
+  popped(event) {
+    const isBack = this.#at < this.#index;
+    const why = this.#own;
+    this.#index = this.#at;
+    this.#own = null;
+    const top = this.#open.at(-1);
+    if (!isBack || why === 'tidying') this.look();
+    else if (why === 'leaving') this.#goBack('leaving');
     else if (top) {
       event.stopImmediatePropagation(); // what lies beneath stays
       if (top.dispatchEvent(new Event('cancel', { cancelable: true }))) top.close();
-      look();
-    } else if (isCovered) look(); // it closes itself
-    else if (!isFirstTab()) tabs.go(0);
-    else backBy('leaving'); // an entry of what was closed in another way
+      this.look();
+    } else if (this.#isCovered) this.look(); // it closes itself
+    else if (!this.#isFirstTab) this.tabs.go(0);
+    else this.#goBack('leaving'); // an entry of what was closed in another way
   }
-
-  if (history.state?.over) history.replaceState({ ...history.state, over: undefined }, ''); // of the page before a reload
-  const [opened, made, front] = [new MutationObserver(look), new MutationObserver(look), new MutationObserver(look)]; // one target, one set of options each
-  opened.observe(document.body, { subtree: true, attributeFilter: ['open'] });
-  made.observe(document.body, { childList: true }); // a sheet that is taken away while it is open
-  front.observe(monitor, { attributeFilter: ['data-front', 'data-over', 'hidden'] });
-  look();
-  const stop = listen(window, 'popstate', popped, { capture: true });
-  return () => {
-    stop();
-    for (const one of [opened, made, front]) one.disconnect();
-    clearTimeout(timer);
-  };
 }
