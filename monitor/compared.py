@@ -48,6 +48,9 @@ class Compared:
 NOTHING_COMPARED = Compared()
 
 
+MOVING = frozenset({Twist, Odometry, GpsFix})  # values that say how the car moves
+
+
 class SourceFollower:
     """Follows the motion that one source shows."""
 
@@ -151,6 +154,8 @@ class Comparisons:
 
     def receive(self, signal: str, reading: Reading[Any]) -> None:
         """A reading of the signal itself."""
+        if type(reading.value) not in MOVING:
+            return
         follower = self._own.get(signal)
         if follower is None:
             follower = self._own[signal] = SourceFollower()

@@ -68,16 +68,18 @@ class Frames:
         self._axes: dict[tuple[str, str], tuple[int, Axes]] = {}  # by topic and frame
         self._located: dict[str, str] = {}  # topic → the frame whose place its transforms gave
         self._asked: set[tuple[str, str]] = set()  # topics and frames that were asked for
+        self._size = 0  # frames of all trees
         self._noted = (0, 0)  # of how many frames and sensors the needed names were noted
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = ("_trees", "_changes", "_located", "_asked")
+        kept = ("_trees", "_changes", "_located", "_asked", "_size")
         return {"_kept": {}, "_axes": {}, "_noted": (0, 0)} | {name: getattr(self, name) for name in kept}
 
     def forget(self) -> None:
         """The link opens again: what is latched is sent again, and may be of another calibration by now."""
         self._trees.clear()
         self._asked.clear()
+        self._size = 0
         self._changes += 1
 
     def receive(self, topic: str, message: Any) -> None:
@@ -91,6 +93,7 @@ class Frames:
         before = tree.version
         tree.add(message, is_static=is_static(topic))
         self._changes += tree.version - before
+        self._size = sum(tree.size for tree in self._trees.values())
 
     @property
     def notes(self) -> list[str]:
@@ -129,7 +132,7 @@ class Frames:
     def note_needed(self, names: set[bytes]) -> None:
         """Change `names` to those of which a serialized message of transforms that may count holds one, if it is not of
         the same frames as before; of all where a name may be spelled in another way there."""
-        known = (sum(tree.size for tree in self._trees.values()), len(self._asked))
+        known = (self._size, len(self._asked))
         if names and known == self._noted:
             return
         self._noted = known
