@@ -53,7 +53,6 @@ class MessageIntake:
         self._button = marks.button(now(), read_s=self._read_s)
         self._now = now
         self._connection: Connection | None = None
-        recording.on_closing(self._settle)
         self.reset()
 
     def _read_s(self, sent_s: float) -> float | None:
@@ -213,7 +212,7 @@ class MessageIntake:
             for topic, one in self._doubtful.overdue(now_s):
                 self._record_late(self._connection, topic, one)
 
-    def _settle(self) -> None:
+    def settle(self) -> None:
         """A part of the recording ends: what is in doubt belongs into it."""
         if self._connection is not None:
             for topic, one in self._doubtful.all():

@@ -52,6 +52,7 @@ class Tick:
         self._part: object = None  # of the recording, that messages were recorded in
         self._log_keeper = LogKeeper(parts.event_log, bus)
         self._open_files = OpenFilesWatch()
+        parts.recording.on_closing(parts.intake.settle)
         self._clock_watch = ClockWatch(parts.event_log, wall_ms=wall_ms)
         self.summary = SummaryPublisher(vehicle, parts, bus, server, now=now, wall_ms=wall_ms)
 

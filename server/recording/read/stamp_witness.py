@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from server.recording.read.clock_steps import BACK_NS, Arrivals, Ints, S
+from server.recording.read.clock_returns import S
+from server.recording.read.clock_steps import BACK_NS, Arrivals, Ints
 from server.recording.read.source import Channel
 
 COMPARED = 5  # messages of a channel on each side

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from server.recording.mcap.mcap_file import McapFile
-from server.recording.read.clock_returns import Jump, returned
+from server.recording.read.clock_returns import Jump, S, returned
 from server.recording.read.clock_steps import (
     FIRST_NS,
     GAP_NS,
@@ -20,7 +20,6 @@ from server.recording.read.clock_steps import (
     LEAST,
     UNKNOWN_NS,
     Found,
-    S,
     Stretch,
     find_steps,
     follows,

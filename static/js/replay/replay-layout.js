@@ -284,3 +284,19 @@ export function asideOf(live) {
   const more = urgent.length > 1 ? ` (${urgent.length} alarms)` : '';
   return { kind: worst.priority === 'critical' ? 'crit' : 'warn', text: `Live: ${titleOf(worst)}${more}`, asking };
 }
+
+/** @typedef {{topics?: Record<string, string | null>, units?: Record<string, string | null>}} Change null: as found */
+
+/**
+ * What is chosen for a replay, after one more choice.
+ * @param {{topics: Record<string, string>, units: Record<string, string>}} before
+ * @param {Change} change
+ */
+export function joinedChoices(before, { topics = {}, units = {} }) {
+  return { topics: joined(before.topics, topics), units: joined(before.units, units) };
+}
+
+/** @param {Record<string, string>} before @param {Record<string, string | null>} change @returns {Record<string, string>} */
+function joined(before, change) {
+  return Object.fromEntries(Object.entries({ ...before, ...change }).flatMap(([name, value]) => (value === null ? [] : [[name, value]])));
+}

@@ -4,18 +4,17 @@
 import { field, html, icon, listen, need, setAttribute, setText, setWords } from '../core/dom.js';
 import { ReplayBand, liveSheet } from './replay-band.js';
 import { JumpList } from './replay-jumps.js';
-import { sketchOf, summaryOf, tapeWords } from './replay-layout.js';
+import { joinedChoices, sketchOf, summaryOf, tapeWords } from './replay-layout.js';
 import { Scrubber } from './replay-scrubber.js';
 import { request } from '../control/request.js';
 import { fetchStyle, styled } from '../core/style-sheet.js';
 import { addressOf } from '../files/files-model.js';
-import { joinedChoices } from '../settings/question-layout.js';
 import { ReplayLead } from './replay-lead.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
  * @typedef {(sentence: string, title?: string) => void} Say
- * @typedef {import('../settings/question-layout.js').Change} Change
+ * @typedef {import('./replay-layout.js').Change} Change
  * @typedef {import('./replay-lead.js').Order} Order
  * @typedef {import('./replay-lead.js').Outcome} Outcome
  */
