@@ -5,6 +5,7 @@ import { chipOf } from '../control/control-layout.js';
 import { openDuty } from '../control/duty.js';
 import { counted } from '../core/format.js';
 import { field, listen, setAttribute, setIcon, setText, show } from '../core/dom.js';
+import { styled } from '../core/style-sheet.js';
 
 /** The car that this phone opens where the address names none; early.js reads it. */
 const KEPT = 'catgraph.car';
@@ -67,7 +68,7 @@ export class Cars {
 
   openList() {
     this.onListed();
-    import('./cars-sheet.js').then(({ openCars }) => openCars(this.store, { rows: () => this.rows(), open: (name) => this.open(name), openControl: () => this.openControl(), openDuty: () => void openDuty(this.store, this.say) }))
+    Promise.all([import('./cars-sheet.js'), styled('drawers')]).then(([{ openCars }]) => openCars(this.store, { rows: () => this.rows(), open: (name) => this.open(name), openControl: () => this.openControl(), openDuty: () => void openDuty(this.store, this.say) }))
       .catch(() => this.say('The list of cars could not be loaded.', 'Not opened'));
   }
 }
