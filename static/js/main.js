@@ -128,6 +128,7 @@ async function begin() {
   // What outlasts this visit, and what nobody presses at once, is loaded when the page is complete.
   setTimeout(() => import('./drive/ledge.js').then(({ mount }) => mount(page.monitor, page.store, page.say)).catch(() => page.say('The Mark key could not be loaded from the server. Reload the page.', 'Not complete')), 3000);
   setTimeout(() => import('./boot/service-worker.js').then(({ Shell }) => new Shell(page.store, page.say)).catch(() => {}), 2000);
+  setTimeout(() => import('./shell/sheet-head.js').then(({ mount }) => mount(page.monitor, page.store)).catch(() => {}), 2000);
   setTimeout(prefetch, 10_000);
 }
 

@@ -12,7 +12,7 @@ import { trendsOf } from '../home/trend-feed.js';
 import { pickPhoto } from './photo-input.js';
 import { partOf } from './mark-server.js';
 import { quietly } from './marks.js';
-import { addSheet, closeSheet, isAsked, mustWait } from '../shell/sheet.js';
+import { addSheet, closeSheet, mustWait, openSheet } from '../shell/sheet.js';
 import { shape } from './drive-parts.js';
 
 const STEPS_S = /** @type {const} */ ([-1, -0.1, 0.1, 1]);
@@ -27,7 +27,6 @@ const TYPED_MS = 400;
  */
 export function openMarkSheet(id, marks, say, openList) {
   if (mustWait() || !marks.get(id)) return;
-  for (const other of /** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog[open]'))) if (isAsked(other)) other.close();
   new MarkSheet(id, marks, say, openList);
 }
 
@@ -58,11 +57,10 @@ class MarkSheet {
     this.photoKey = html('button', { type: 'button', class: 'key wide', 'data-f': 'sheet-photo', 'data-operator': '' }, shape('camera'), 'Photo');
     this.sheet = this.#build();
     const stop = addSheet(this.sheet);
-    document.querySelector('#monitor')?.append(this.sheet); // beneath the alarms, beside the rail
     this.stops = [stop, ...this.#listeners()];
     this.sheet.addEventListener('close', () => this.#closed(), { once: true });
     this.draw();
-    this.sheet.show();
+    openSheet(this.sheet);
     this.title.focus({ preventScroll: true });
   }
 
@@ -89,7 +87,6 @@ class MarkSheet {
       marks.onChange(() => quietly(() => this.draw())),
       marks.store.on('draw', () => quietly(() => this.draw())),
       listen(sheet, 'click', (event) => this.#pressed(event)),
-      listen(sheet, 'keydown', (event) => event.key === 'Escape' && closeSheet(sheet)), // it is no modal dialog: the browser leaves it open
       listen(this.words, 'input', () => {
         clearTimeout(this.#typing);
         this.#typing = setTimeout(() => this.#keepWords(), TYPED_MS);

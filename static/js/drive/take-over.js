@@ -5,7 +5,7 @@ import { html, icon, listen, setAttribute, setText, setWords, show } from '../co
 import { timeOfDay } from '../core/format.js';
 import { speedWords } from '../core/units.js';
 import { request, sentenceOf } from '../control/request.js';
-import { addSheet, closeSheet, isAsked, mustWait } from '../shell/sheet.js';
+import { addSheet, closeSheet, mustWait, openSheet } from '../shell/sheet.js';
 import { AFTER_S, TakeOverPlot } from './take-over-plot.js';
 import { CATEGORIES, KINDS, STARTERS, alarmWords, startedWords } from './mode-words.js';
 import { styled } from '../core/style-sheet.js';
@@ -28,7 +28,6 @@ const drafts = new Map();
 export async function openTakeOver(id, store, say) {
   await styled('drive');
   if (mustWait() || document.querySelector('#sheet-take-over')) return;
-  for (const other of /** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog[open]'))) if (isAsked(other)) other.close();
   new TakeOver(id, store, say);
 }
 
@@ -64,10 +63,9 @@ class TakeOver {
     this.later = html('button', { type: 'button', class: 'key wide', 'data-f': 'later' }, 'Later');
     this.sheet = this.#build();
     this.stops = [addSheet(this.sheet), ...this.#listeners()];
-    document.querySelector('#monitor')?.append(this.sheet); // beneath the alarms, beside the rail
     this.sheet.addEventListener('close', () => this.#closed(), { once: true });
     this.draw();
-    this.sheet.show();
+    openSheet(this.sheet);
     this.title.focus({ preventScroll: true });
     void this.#ask();
   }
@@ -90,7 +88,6 @@ class TakeOver {
     return [
       store.on('draw', () => this.#look()),
       store.on('switch', () => closeSheet(sheet)),
-      listen(sheet, 'keydown', (event) => event.key === 'Escape' && closeSheet(sheet)), // it is no modal dialog
       listen(sheet, 'click', (event) => this.#pressed(event)),
       listen(this.words, 'input', () => {
         this.draft.what = this.words.value;

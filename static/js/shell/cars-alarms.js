@@ -114,7 +114,7 @@ export class CarsAlarms {
     const for_s = ((this.store.cars?.time_ms ?? 0) - row.worst.raised_ms) / 1000 + this.store.carsLag_s;
     setWords(this.text, `${short}: ${title}, for ${age(Math.max(0, for_s))} s. In control: ${row.operator}.`);
     setText(this.open, `Open ${short}`);
-    if (!card.isConnected) snacks.prepend(card);
+    if (!card.isConnected) field(snacks, 'warning').before(card); // after what has a time limit
   }
 
   /** Names a car and its alarm, once each occurrence, where the browser has a voice. @param {CarRow} row */

@@ -27,7 +27,7 @@ const STORED = 'catgraph.keys';
 /** What came in sight a moment ago was not read yet [ms]. */
 const READ_MS = 1000;
 /** Who types or chooses there has another meaning for a key. */
-const OWN_KEYS = 'input, select, textarea, [contenteditable], [role="slider"], [role="application"]';
+const OWN_KEYS = '.view > .sheet, input, select, textarea, [contenteditable], [role="slider"], [role="application"]';
 
 /**
  * What a key asks for; null where it is not one of ours, or belongs to what has the focus.

@@ -6,14 +6,18 @@ import { listen, need, setAttribute, show } from '../core/dom.js';
 const LIVE = ['home', 'map', 'scan'];
 /** A lower phone has not room for everything [px]. */
 const LOW_PX = 700;
-/** On a lower one the list of alarms, or a check, needs the room [px]. */
+/** On a lower one the list of alarms, or a check, needs the room; an open sheet does on any phone [px]. */
 const LIST_PX = 800;
+/** On a phone on its side, or over its keyboard, a notice needs it [px]. */
+const LEAST_PX = 520;
 
-/** On a low phone the steps of a slow-down and a warning leave no room: they come first. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */
+/** On a low phone the steps of a slow-down and a warning leave no room: they come first; on its side a warning alone does. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */
 function isCramped(monitor, store) {
-  if (innerWidth < LOW_PX && innerHeight < LIST_PX && monitor.dataset['over'] === 'headed') return true;
+  if (innerWidth < LOW_PX && (monitor.dataset['sheet'] !== undefined || (innerHeight < LIST_PX && monitor.dataset['over'] === 'headed'))) return true;
   const state = store.frame?.decelerate?.state;
-  return innerHeight < LOW_PX && innerWidth < LOW_PX && (state === 'ordered' || state === 'holding') && document.body.hasAttribute('data-snack');
+  const isSlowing = state === 'ordered' || state === 'holding';
+  const isNarrow = innerWidth < LOW_PX;
+  return document.body.hasAttribute('data-snack') && (isSlowing ? innerHeight < (isNarrow ? LOW_PX : LEAST_PX) : isNarrow && innerHeight < LEAST_PX);
 }
 
 /** What is marked is the live drive: in a replay there is no such place. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */
@@ -33,7 +37,7 @@ export function mount(monitor, store) {
   const place = () => placeLedge(monitor, store);
   const seen = new MutationObserver(place);
   seen.observe(document.body, { attributeFilter: ['data-snack'] });
-  seen.observe(monitor, { attributeFilter: ['data-over', 'data-front'] });
+  seen.observe(monitor, { attributeFilter: ['data-over', 'data-front', 'data-sheet'] });
   const stops = [store.on('draw', place), listen(window, 'resize', place), () => seen.disconnect()];
   if (store.frame) place(); // before the first frame it is not shown
   return () => stops.forEach((stop) => stop());

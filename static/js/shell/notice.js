@@ -7,21 +7,20 @@ const STAYS_MS = 8000;
 const OFFERS_MS = 15_000; // what can be pressed must be found and reached first
 
 /**
- * Tell the style sheets how much of the view is covered, so that what must be read is laid out above it.
- * @param {HTMLElement} root where snackbars stand
+ * Tells the style sheets what notices stand on, how much room they need, and what is left of the view.
+ * @param {HTMLElement} root where notices stand
  */
 function makeRoom(root) {
   const view = need(document, '#monitor > .view');
   const { style } = document.documentElement;
-  const seen = new ResizeObserver(() => {
-    const box = view.getBoundingClientRect();
-    const covered_px = root.offsetHeight === 0 ? 0 : Math.max(0, Math.ceil(box.bottom - root.getBoundingClientRect().top));
-    style.setProperty('--snack', `${covered_px}px`);
-    style.setProperty('--view', `${Math.floor(box.height)}px`);
-    style.setProperty('--room', `${Math.floor(box.height) - covered_px}px`);
-  });
-  seen.observe(root);
-  seen.observe(view);
+  const place = () => {
+    const tops = [...document.querySelectorAll('#monitor > :is(.ledge, .rail, .scrub)')].map((one) => one.getBoundingClientRect()).filter(({ height }) => height).map(({ top }) => top);
+    style.setProperty('--dock', `${Math.ceil(innerHeight - Math.min(innerHeight, ...tops))}px`);
+    style.setProperty('--snack', `${root.offsetHeight}px`);
+    style.setProperty('--view', `${view.offsetHeight}px`);
+  };
+  const seen = new ResizeObserver(place);
+  for (const one of [root, view, ...document.querySelectorAll('#monitor > :is(.ledge, .rail)')]) seen.observe(one);
 }
 
 /** @typedef {{label: string, act: () => void, onClosed?: () => void}} Way what a notice offers, as one key; `onClosed`: it was closed by hand */

@@ -1,14 +1,29 @@
 // Opens and closes the sheets the operator asked for. Alarms take precedence: see dialogs.js.
 
-import { field, listen, need } from '../core/dom.js';
+import { field, listen, need, setAttribute } from '../core/dom.js';
+import { isFloor } from './layout.js';
 
-/** @param {HTMLDialogElement} sheet */
+/**
+ * While a car is monitored a sheet stands in the view, and nothing else is barred: bar, strip and rail act as before.
+ * Where no car is shown it lies over the page.
+ * @param {HTMLDialogElement} sheet
+ */
 export function openSheet(sheet) {
-  for (const other of /** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog[open]'))) {
-    if (other !== sheet && isAsked(other)) other.close();
-  }
-  if (!sheet.open) sheet.showModal();
+  for (const other of sheetsOpen()) if (other !== sheet && isAsked(other)) other.close();
+  if (sheet.open) return;
+  const view = document.querySelector('#monitor:not([hidden]) > .view');
+  (view ?? document.body).append(sheet);
+  if (!view) return sheet.showModal();
+  sheet.show();
+  setAttribute(need(document, '#monitor'), 'data-sheet', sheet.id);
+  sheet.addEventListener('close', () => setAttribute(need(document, '#monitor'), 'data-sheet', asked()?.id), { once: true });
 }
+
+/** @returns {NodeListOf<HTMLDialogElement>} */
+const sheetsOpen = () => document.querySelectorAll('dialog[open]');
+
+/** The sheet that stands in the view. */
+const asked = () => [...sheetsOpen()].find((sheet) => isAsked(sheet) && sheet.closest('.view'));
 
 /** Whether a dialog stands over the page that no sheet may cover: an alarm, a broken link. */
 export function mustWait() {
@@ -28,8 +43,27 @@ export function isAsked(sheet) {
   return (sheet.dataset['asked'] !== undefined || ASKED.includes(sheet.id)) && sheet.dataset['docked'] === undefined; // what is docked covers nothing
 }
 
+/** Closes what stands in the view when it is left: by Escape, by another tab or screen, by a press beside it where it is no drawer. */
 export function mountSheets() {
-  const stops = ASKED.map((id) => mountSheet(/** @type {HTMLDialogElement} */ (need(document, `#${id}`))));
+  const monitor = need(document, '#monitor');
+  const leave = () => asked()?.close();
+  const seen = new MutationObserver(leave);
+  seen.observe(monitor, { attributeFilter: ['hidden', 'data-front', 'data-over'] });
+  const stops = [
+    ...ASKED.map((id) => mountSheet(/** @type {HTMLDialogElement} */ (need(document, `#${id}`)))),
+    listen(document, 'keydown', (event) => {
+      const sheet = event.key === 'Escape' && !document.querySelector('dialog:modal') ? asked() : undefined;
+      if (!sheet) return;
+      event.stopPropagation(); // it closes nothing else
+      if (sheet.dispatchEvent(new Event('cancel', { cancelable: true }))) sheet.close();
+    }, { capture: true }),
+    listen(need(monitor, '.view'), 'click', (event) => {
+      if (isFloor() || !asked() || event.target.closest('dialog')) return;
+      event.stopPropagation();
+      leave();
+    }, { capture: true }),
+    () => seen.disconnect(),
+  ];
   return () => stops.forEach((stop) => stop());
 }
 
@@ -49,7 +83,7 @@ export function addSheet(sheet) {
 }
 
 /**
- * It closes by its own key, by Escape or back (the browser's doing), and by a press outside of it.
+ * It closes by its own key, by Escape or back, and, where it lies over the page, by a press above it.
  * @param {HTMLDialogElement} sheet
  */
 function mountSheet(sheet) {

@@ -1,6 +1,7 @@
 // The key that releases the car from a slow-down, and the sheet that confirms it.
 
 import { field, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { openSheet } from '../shell/sheet.js';
 import { holdOf, keepWords, nameOf, releaseOf, seenOf } from './slow-layout.js';
 
 export class ReleaseKey {
@@ -45,7 +46,7 @@ export class ReleaseKey {
     setText(field(this.sheet, 'release-title'), `Release ${nameOf(this.store.vehicle) || 'the car'}?`);
     const standing = this.store.frame?.alarms.filter((alarm) => alarm.priority === 'critical' && alarm.active) ?? [];
     setWords(field(this.sheet, 'alarms'), standing.length ? `Still active: ${standing.map(({ title }) => title).join(', ')}.` : '');
-    if (!this.sheet.open) this.sheet.showModal();
+    openSheet(this.sheet);
   }
 
   async #release() {

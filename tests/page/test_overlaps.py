@@ -1,0 +1,203 @@
+"""Nothing lies over what can be pressed or over a safety text, with every notice, sheet and alarm up, in any window."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.async_api import Page, expect
+
+from tests.page.canned import Canned, Json, alarm, live, slow
+from tests.page.conftest import Phone
+from tests.page.screenshots import car
+
+OVERLAPS = Path(__file__).with_name("overlaps.js").read_text(encoding="utf-8").split("\n", 1)[1].rstrip()
+WIDTHS = (320, 360, 412, 480, 640, 699, 700, 740, 820, 915, 999, 1000, 1180, 1199, 1200, 1440, 1799, 1800, 1920, 2560)
+HEIGHTS = (360, 412, 480, 600, 640, 720, 780, 900, 1059, 1180, 1440)
+SIZES = [(width, height) for width in WIDTHS for height in HEIGHTS]
+GATE = [(360, 640), (820, 1180), (1440, 900)]
+DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+#: A notice goes by itself; its twin stays.
+KEPT = """() => {
+  const note = document.querySelector('.snacks > .note');
+  const twin = note.cloneNode(true);
+  note.replaceWith(twin);
+}"""
+LONG = "The newest fix of the phone (Ann-Kathrin, of 3 phones) is 12 s old and comes too late over the radio. " * 2
+
+
+def warned(**more: Any) -> Json:
+    return live() | {"alarms": [alarm("phone_missing", "Phone position missing", text=LONG)]} | more
+
+
+def critical() -> Json:
+    return alarm(
+        "speed_limit", "Speed above limit", priority="critical", place="dialog", sound="high", actions=["acknowledge"],
+        measured={"value": 12.6, "unit": "m/s"}, limit={"value": 11.0, "unit": "m/s"},
+        text="12.6 m/s. The safety driver must slow the car.",
+    )  # fmt: skip
+
+
+async def opened(phone: Phone, canned: Canned, tab: str = "home") -> Page:
+    """The page with what it fetches once its first values stand."""
+    await phone.open("about:blank")
+    await phone.open(f"{canned.address}/#{tab}")
+    await phone.live()
+    await expect(phone.page.locator("link[href$='drawers.css']")).to_be_attached()
+    await expect(phone.page.locator("#monitor > .ledge > *").first).to_be_attached()
+    return phone.page
+
+
+async def noticed(page: Page, canned: Canned) -> None:
+    """A notice of the page itself, which stays."""
+    canned.refuses["pause"] = "Ben is in control."
+    await page.evaluate("document.querySelector('#monitor [data-f=pause]').click()")
+    await expect(page.locator(".snacks > .note")).to_be_attached()
+    await page.evaluate(KEPT)
+
+
+async def walk(page: Page, sizes: list[tuple[int, int]]) -> dict[str, list[str]]:
+    """What lies over what at each of these sizes, where something does."""
+    found = {}
+    for width, height in sizes:
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.evaluate(DRAWN)
+        wrong = await page.evaluate(OVERLAPS)
+        if wrong:  # a part that moves with the next state of the car, or is fetched
+            await page.wait_for_timeout(400)
+            wrong = await page.evaluate(OVERLAPS)
+        if wrong:
+            found[f"{width} × {height}"] = wrong
+    return found
+
+
+def several(canned: Canned) -> None:
+    """A warning, a request for control and another car's critical alarm."""
+    canned.vehicle = "Ocelot"
+    fast: Json = {"title": "Speed above limit", "priority": "critical", "state": "UNACKED"}
+    canned.cars = [car("Ocelot", 4.2, holder="You"), car("Serval", 12.6, **fast)]
+    canned.state = warned(decelerate=slow("safe"))
+    canned.state["control"] |= {"requests": [{"name": "Ben", "page": "other", "left_s": 22.0}]}
+
+
+async def nothing_lies_over_another(
+    phone: Phone, canned: Canned, sizes: list[tuple[int, int]], tab: str, *, is_critical: bool = False
+) -> None:
+    several(canned)
+    page = await opened(phone, canned, tab)
+    await noticed(page, canned)
+    for kind in ("asks:not(.other)", "other", "note"):
+        await expect(page.locator(f".snacks > .{kind}")).to_be_attached()
+    if is_critical:
+        canned.state["alarms"].append(critical())
+        await expect(page.locator("#sheet-alarm")).to_be_visible()
+    assert await walk(page, sizes) == {}
+
+
+@pytest.mark.gate
+async def test_no_notice_lies_over_a_key_a_gauge_or_another_alarm(phone: Phone, canned: Canned) -> None:
+    await nothing_lies_over_another(phone, canned, GATE, "home")
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("tab", ["home", "map", "scan", "files", "settings"])
+async def test_none_does_in_any_window(phone: Phone, canned: Canned, tab: str) -> None:
+    await nothing_lies_over_another(phone, canned, SIZES if tab == "home" else SIZES[::3], tab)
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("tab", ["home", "map", "files"])
+async def test_nor_beside_a_critical_alarm(phone: Phone, canned: Canned, tab: str) -> None:
+    await nothing_lies_over_another(phone, canned, SIZES[1::3], tab, is_critical=True)
+
+
+async def click(page: Page, selector: str) -> None:
+    await page.evaluate("selector => document.querySelector(selector).click()", selector)
+
+
+#: What the operator opens, by the key that opens it.
+SHEETS = {
+    "sheet-menu": "#monitor [data-f=menu]",
+    "sheet-slow": "#monitor > .rail [data-f=slow]",
+    "sheet-stop": "#monitor > .rail [data-f=stop]",
+    "sheet-cars": "#monitor [data-f=who]",
+    "sheet-keys": "#sheet-menu [data-f=keys]",
+    "sheet-preferences": "#sheet-menu [data-screen=preferences]",
+    "sheet-this-phone": "#sheet-menu [data-f=this-phone]",
+    "sheet-duty": "#sheet-menu [data-f=duty]",
+}
+#: Of the head of the open sheet: what it shows, and how far it lies from the strip and the rail [px].
+HEAD = """() => {
+  const box = (selector) => document.querySelector(selector).getBoundingClientRect();
+  const sheet = document.querySelector('.view > dialog[open]');
+  const at = sheet.getBoundingClientRect();
+  const head = sheet.querySelector('.sheet-head');
+  const [strip, rail, speed] = ['strip', 'rail'].map((one) => box(`#monitor > .${one}`)).concat(box('.gauge .speed'));
+  const covers = (a, b) => a.left < b.right - 1 && a.right > b.left + 1 && a.top < b.bottom - 1 && a.bottom > b.top + 1;
+  return {
+    strip: covers(at, strip), rail: covers(at, rail), bar: covers(at, box('#monitor > .top')),
+    isModal: sheet.matches(':modal'),
+    isCarShown: head.checkVisibility()
+      ? [/4\\.2\\s*m\\/s/, /\\d s/, /Phone position missing/].every((one) => one.test(head.innerText))
+      : speed.height > 12 && !covers(at, speed),
+    isSeen: at.top >= 0 && at.bottom <= innerHeight && at.height > 60,
+  };
+}"""
+
+
+async def sheets_leave_the_car_in_sight(
+    phone: Phone, canned: Canned, sizes: list[tuple[int, int]], sheets: list[str]
+) -> None:
+    canned.state = warned(decelerate=slow("safe"))
+    page = await opened(phone, canned)
+    for name in sheets:
+        await click(page, SHEETS[name])
+        await expect(page.locator(f"#{name}")).to_have_attribute("open", "")
+        await expect(page.locator(f"#{name} > .sheet-head")).to_be_attached()
+        found = {}
+        for width, height in sizes:
+            await page.set_viewport_size({"width": width, "height": height})
+            await page.evaluate(DRAWN)
+            seen = await page.evaluate(HEAD)
+            good = {"strip": False, "rail": False, "bar": False, "isModal": False, "isCarShown": True, "isSeen": True}
+            if seen != good:
+                found[f"{width} × {height}"] = seen
+        assert found == {}, name
+        if sizes is not GATE:
+            assert await walk(page, sizes) == {}, name
+
+
+@pytest.mark.gate
+async def test_a_sheet_leaves_strip_rail_and_speed_in_sight(phone: Phone, canned: Canned) -> None:
+    await sheets_leave_the_car_in_sight(phone, canned, GATE, ["sheet-menu", "sheet-slow"])
+
+
+@pytest.mark.gate
+async def test_what_a_sheet_leaves_in_sight_acts_and_escape_closes_the_sheet_alone(
+    phone: Phone, canned: Canned
+) -> None:
+    page = await opened(phone, canned)
+    menu = page.locator("#sheet-menu")
+    await page.evaluate("dispatchEvent(new CustomEvent('catgraph-open', { detail: { screen: 'signals' } }))")
+    await expect(phone.f("screen")).to_be_visible()
+    await phone.f("menu").tap()
+    await phone.f("pause").tap()
+    async with asyncio.timeout(20):
+        while not any(one["kind"] == "pause" for one in canned.heard):
+            await asyncio.sleep(0.05)
+    await expect(menu).to_be_visible()
+    await page.keyboard.press("Escape")
+    await expect(menu).to_be_hidden()
+    await expect(phone.f("screen")).to_be_visible()
+    await phone.f("menu").tap()
+    await expect(menu).to_be_visible()
+    await phone.f("strip").tap()  # it leads to another screen
+    await expect(menu).to_be_hidden()
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("name", SHEETS)
+async def test_each_sheet_does_in_any_window(phone: Phone, canned: Canned, name: str) -> None:
+    await sheets_leave_the_car_in_sight(phone, canned, SIZES[2::5], [name])
