@@ -74,7 +74,7 @@ export function comparedWords(measured, limit) {
   if (limit.label === 'Of') return `${fixed(measured.value, 0)} of ${fixed(limit.value, 0)}`;
   const before = measured.label === 'Silent for' ? 'no message for ' : / for$/.test(measured.label) ? `${measured.label.toLowerCase()} ` : '';
   const [now, least] = [measured, limit].map(({ value, unit }) => `${fixed(value)} ${unit}`.trim());
-  return `${before}${now} (${LIMITS.has(limit.label) ? 'limit' : limit.label.toLowerCase()} ${least})`;
+  return `${before}${now} (${LIMITS.has(limit.label ?? '') ? 'limit' : limit.label.toLowerCase()} ${least})`;
 }
 
 /** @param {Suppressed} one @returns {Row} */

@@ -95,6 +95,7 @@ class Back {
     this.#index = this.#at;
     this.#own = null;
     const top = this.#open.at(-1);
+    if (isBack && !this.monitor.hidden) history.replaceState(history.state, '', `#${this.tabs.front}`); // the tab of that entry may be another: no link was followed
     if (!isBack || why === 'tidying') this.look();
     else if (why === 'leaving') this.#goBack('leaving');
     else if (top) {
