@@ -124,8 +124,8 @@ async function begin() {
   page.front();
   void unfold(page);
   release();
-  mountDesk(page);
   // What outlasts this visit, and what nobody presses at once, is loaded when the page is complete.
+  setTimeout(() => mountDesk(page), innerWidth < 700 ? 2000 : 0); // a phone shows no panes
   setTimeout(() => import('./drive/ledge.js').then(({ mount }) => mount(page.monitor, page.store, page.say)).catch(() => page.say('The Mark key could not be loaded from the server. Reload the page.', 'Not complete')), 3000);
   setTimeout(() => import('./boot/service-worker.js').then(({ Shell }) => new Shell(page.store, page.say)).catch(() => {}), 2000);
   setTimeout(() => import('./shell/sheet-head.js').then(({ mount }) => mount(page.monitor, page.store)).catch(() => {}), 2000);
@@ -317,7 +317,7 @@ function listenEverywhere(page, arming) {
   });
 }
 
-/** Fetches and mounts what only a wide window or a keyboard uses. @param {Page} page */
+/** Fetches and mounts what only a wide window, a keyboard or Back uses. @param {Page} page */
 function mountDesk({ monitor, say, store, tabs }) {
   import('./shell/desk.js').then(({ mount }) => mount(monitor, store, tabs, say)).catch(() => say('The list of alarms and the log beside the values, and the keys of a keyboard, could not be loaded from the server. Reload the page.', 'Not complete'));
 }

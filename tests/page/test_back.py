@@ -8,8 +8,8 @@ from playwright.async_api import Page, expect
 from tests.page.canned import Canned
 from tests.page.conftest import Phone
 
-GUARDED = "history.state?.over === true"
-PLAIN = "history.state?.over !== true"
+GUARDED = "() => history.state?.over === true"
+PLAIN = "() => history.state?.over !== true"
 
 
 async def opened(phone: Phone, address: str) -> Page:

@@ -65,7 +65,7 @@ async def test_a_journey_by_keyboard_alone(phone: Phone, canned: Canned) -> None
     await tab_to(page, ".rail [data-f=slow]")
     await page.keyboard.press("Enter")
     await expect(page.locator("#sheet-slow")).to_be_visible()
-    await tab_to(page, "#sheet-slow .main", 12)
+    await expect(page.locator("#sheet-slow .main")).to_be_focused()
     await page.keyboard.press("Enter")
     await until_heard(canned, "arm")
     canned.state = live() | {"decelerate": slow("armed")}
