@@ -232,6 +232,7 @@ class PageWriter:
 
     def _offer_is_due(self) -> None:
         self._offering = None
+        self._offered_s = float("-inf")  # it has waited: no rounding of the clock makes it wait again
         self._wake.set()
 
     def _is_new(self, kind: FrameKind) -> bool:

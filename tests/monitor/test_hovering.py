@@ -17,6 +17,7 @@ from monitor import catalog
 from monitor.catalog import CHECKS, AllLimits
 from monitor.checks.slow_down import SlowDownLimits
 from monitor.instruments import DrivingLimits, StoreLimits
+from monitor.unseen import UnseenLimits
 from monitor.link import LinkFacts
 from monitor.phones import PhoneReport
 from monitor.recorder import RecorderFacts
@@ -320,6 +321,7 @@ NO_LIMIT = {
     "attention.escalates_s": "of the attention queue, not judged",
     "attention.unheard_s": "of the attention queue, not judged",
     **{f"driving.{name}": "of who drives, which is no check" for name in DrivingLimits.model_fields},
+    **{f"unseen.{name}": "shown beside values, not judged" for name in UnseenLimits.model_fields},
     "gauge.speed_max_mps": "drawn, not judged",
     "gauge.acceleration_max_mps2": "drawn, not judged",
 }

@@ -244,17 +244,17 @@ def awaiting(*topics: str, seconds: float, fixes: tuple[tuple[str, GpsFix], ...]
         (
             awaiting("/gps/fix", seconds=11.0),
             "fault",
-            "Nothing from /gps/fix for 11 s, nor before; the position of /gps/filtered goes on without it",
+            "Nothing from /gps/fix for 11 s, nor before; the position of /gps/filtered continues without it",
         ),
         (
             awaiting("/b/fix", seconds=60.0, position="/a/fix"),
             "fault",
-            "Nothing from /b/fix for 60 s, nor before; the position of /a/fix goes on without it",
+            "Nothing from /b/fix for 60 s, nor before; the position of /a/fix continues without it",
         ),
         (
             awaiting("/b/fix", seconds=60.0, fixes=(FIX,), position="/a/fix"),
             "fault",
-            "Nothing from /b/fix for 60 s, nor before; the position of /a/fix goes on without it",
+            "Nothing from /b/fix for 60 s, nor before; the position of /a/fix continues without it",
         ),
         (awaiting("/gps/fix", seconds=9.0), "unknown", "No message from /gps/fix yet"),
         (awaiting("/gps/filtered", seconds=60.0, position="/gps/fix"), "unknown", "No message from /gps/filtered yet"),

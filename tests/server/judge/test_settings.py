@@ -397,7 +397,8 @@ async def test_candidates_come_from_what_the_car_offers(bridge: RosBridge, serve
     async with driving(bridge), viewer(server) as one, http_client(base_url=server) as client:
         await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
         found = (await client.get("/api/signals")).json()["candidates"]
-        assert found["speed"] == [{"topic": "/catvehicle/vel", "type": "geometry_msgs/Twist", "why": "its name"}]
+        vel = {"topic": "/catvehicle/vel", "type": "geometry_msgs/Twist", "why": "its name", "frame": None}
+        assert found["speed"] == [vel]
         assert [(one["topic"], one["type"]) for one in found["scan"]] == [("/scan", "sensor_msgs/LaserScan")]
         assert found["fuel"] == []
 

@@ -26,7 +26,7 @@ async def test_a_viewer_that_stops_reading_finds_nothing_old(bridge: RosBridge, 
         while len(one.states) < 20:
             await one.hear(await ws.recv())
         ws.transport.pause_reading()
-        await asyncio.sleep(gap_s)
+        await asyncio.sleep(gap_s + 0.05)  # between two states
         ws.transport.resume_reading()
         resumed_s, seen = time.time(), len(one.states)
         while len(one.states) == seen:

@@ -179,7 +179,7 @@ async def test_the_page_for_no_server_belongs_to_its_shell(static: Path, monkeyp
         answer = await client.get(kept)
         assert answer.status_code == 200
         assert "default-src 'none'" in answer.headers["content-security-policy"]
-        assert "This phone monitors nothing now." in answer.text
+        assert "This device monitors nothing now." in answer.text
         named = re.findall(r'(?:src|href)="(/static/[^"]+)"', answer.text)
         assert [address for address in named if address not in script] == [], "all that it needs is kept with it"
         assert (await client.get("/offline?v=000000000000")).status_code == 404
