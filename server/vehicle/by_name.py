@@ -19,27 +19,28 @@ class TopicsByName:
     def __init__(self) -> None:
         self.found: dict[str, str] = {}  # topic → type, by the fields of its first message
         self._first_s: float | None = None
-        self._is_used = False  # `found` was mapped
+        self.is_used = False  # `found` was mapped
 
     def receive(self, topic: str, message: Any, picked: Mapping[str, str], now_s: float) -> bool:
         """A message of a topic that was subscribed to by its name; whether its topics are to be mapped by it."""
         if topic in self.found or len(self.found) >= MOST_TOPICS:
             return self.is_due(now_s)
-        self.found[topic] = type_of(
-            message, topic, next((signal for signal, name in picked.items() if name == topic), None)
-        )
+        signal = next((signal for signal, name in picked.items() if name == topic), None)
+        self.found[topic] = type_of(message, topic, signal)
         if self._first_s is None:
             self._first_s = now_s
-        return self._is_used
+        return self.is_used or signal is not None
 
     def is_due(self, now_s: float) -> bool:
         """Whether the topics are to be mapped for the first time."""
-        return not self._is_used and self._is_complete(now_s)
+        return not self.is_used and self._is_complete(now_s)
 
-    def offered(self, now_s: float) -> Mapping[str, str] | None:
-        """The topics as a bridge would offer them (topic → type); None: more may come within a moment."""
-        self._is_used = self._is_used or self._is_complete(now_s)
-        return self.found if self._is_used else None
+    def offered(self, picked: Mapping[str, str], now_s: float) -> Mapping[str, str]:
+        """The topics as a bridge would offer them (topic → type); while more may come within a moment only those that
+        are compared with no others."""
+        self.is_used = self.is_used or self._is_complete(now_s)
+        chosen = picked.values()
+        return self.found if self.is_used else {name: kind for name, kind in self.found.items() if name in chosen}
 
     def _is_complete(self, now_s: float) -> bool:
         return self._first_s is not None and now_s - self._first_s >= ALL_CAME_S

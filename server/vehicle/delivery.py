@@ -239,6 +239,11 @@ class Delivery:
         row = self._rows.get(topic)
         return row is None or not row.came
 
+    def was_single(self, topic: str) -> bool:
+        """Whether one message came of a topic since it was subscribed to."""
+        row = self._rows.get(topic)
+        return row is not None and row.got == 1
+
     def not_received(self, now_s: float) -> Mapping[str, tuple[str, ...]]:
         """Topic → its publishers, for topics without messages after a renewal while other topics arrive."""
         return {

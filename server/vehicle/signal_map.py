@@ -97,12 +97,17 @@ class SignalMap:
         """The same of a bridge that does not name its topics: of those of which messages came, topic → type."""
         by_name = self.by_name = self.by_name or TopicsByName()
         self._picked = picked
-        offered = by_name.offered(now_s)
-        if offered is not None:
+        offered = by_name.offered(picked, now_s)
+        if offered:
             self.update(offered, picked, delivery, now_s)
             self.sources = {signal: replace(one, note=one.note or NOTE) for signal, one in self.sources.items()}
         self.watched = {**by_name.beside({one.topic: one for one in self.decoded}), **self.watched}
         return by_name.found
+
+    @property
+    def is_mapped_by_name(self) -> bool:
+        """Whether the topics of a bridge that does not name them were chosen from."""
+        return self.by_name is not None and self.by_name.is_used
 
     def _settle(self, now_s: float) -> bool:
         """Whether the candidates have shown themselves only now, as far as they will before the operator is asked."""

@@ -131,9 +131,9 @@ class SubscriptionTable:
             if topic not in wanted
         }
 
-    def subscribe_by_name(self, picked: Mapping[str, str]) -> None:
-        """Without rosapi, by the names that are known and those that the operator picked."""
-        wanted = wanted_topics.by_name(picked, self.load)
+    def subscribe_by_name(self, picked: Mapping[str, str], used: Collection[str] = ()) -> None:
+        """Without rosapi, by the names that are known, or that the operator picked. `used`: what is decoded."""
+        wanted = wanted_topics.by_name(picked, self.load, used=used)
         self.judged = len(wanted)
         button = Subscription(topic=car_marks.TOPIC, type=None, queue_length=10)
         self._apply({**wanted, button.topic: button}, [*wanted], [button.topic])
@@ -147,6 +147,12 @@ class SubscriptionTable:
         for row in self.rows:
             if row.type is None and self._delivery.never_received(row.topic):
                 self._renew(row.topic, is_quiet=True)
+
+    def renew_single(self, topics: Collection[str]) -> None:
+        """One message came of each of these before it was known to be wanted: a bridge may have kept it."""
+        for topic in topics:
+            if self._delivery.was_single(topic):
+                self._renew(topic, is_quiet=True)
 
     def is_cbor(self, topic: str) -> bool:
         """Whether a topic is subscribed to as CBOR."""

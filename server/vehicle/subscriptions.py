@@ -17,7 +17,7 @@ from server.rosbridge.rosapi_client import Asks
 from server.vehicle import car_marks, discovery
 from server.vehicle.missing_watch import MissingWatch
 from server.vehicle.ros_watch import RosWatch
-from server.vehicle.signal_map import SignalMap
+from server.vehicle.signal_map import Delivers, SignalMap
 from server.vehicle.subscription_table import SubscriptionTable
 from server.vehicle.type_definitions import TypeDefinitions
 from server.vehicle.undelivered import CLIENT_COUNT
@@ -255,19 +255,25 @@ class Subscriptions:
         """Chooses the topic of each signal and subscribes to them; without rosapi of those of which messages come."""
         offer, known = self._offer, (self._tuning.settings.topics, self._missing.delivery, self._now())
         if offer is None:
-            if self._tuning.recognise(self.signals.update_by_name(*known), None):
-                self._recognised(self._tuning.profile.title)
-            return self._subscribe()
+            return self._map_by_name(*known)
         self.signals.update(offer.topics, *known)
         self._subscribe()
         before, self._unfit = self._unfit, car_marks.unfit(offer.topics.get(car_marks.TOPIC))
         if self._unfit not in (None, before):
             self._noted(self._unfit)
 
+    def _map_by_name(self, picked: Mapping[str, str], delivery: Delivers, now_s: float) -> None:
+        was_mapped, before = self.signals.is_mapped_by_name, self.by_topic
+        if self._tuning.recognise(self.signals.update_by_name(picked, delivery, now_s), None):
+            self._recognised(self._tuning.profile.title)
+        self._subscribe()
+        if self.signals.is_mapped_by_name and not was_mapped:
+            self.table.renew_single([topic for topic in self.by_topic if topic not in before])
+
     def _subscribe(self) -> None:
         self.by_topic = pipeline.by_topic(self.signals.decoded)
         if self.signals.by_name is not None:
-            self.table.subscribe_by_name(self._tuning.settings.topics)
+            self.table.subscribe_by_name(self._tuning.settings.topics, self.by_topic)
         elif self._link is not None:
             needs, watched = self._missing.needs_client_count, self.signals.watched
             self.table.subscribe(self.by_topic, self.offered, needs_client_count=needs, watched=watched)

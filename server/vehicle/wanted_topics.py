@@ -110,11 +110,14 @@ def rows_of(found: Recorded, *, fit: Collection[str], compression: Compression) 
     }
 
 
-def by_name(picked: Mapping[str, str], load: LinkLoad) -> dict[str, Subscription]:
-    """Without rosapi: what the operator picked, and every name of the table, its type left to the bridge."""
+def by_name(picked: Mapping[str, str], load: LinkLoad, *, used: Collection[str]) -> dict[str, Subscription]:
+    """Without rosapi: what the operator picked, else every name of the table, its type left to the bridge. `used`: what
+    is compared with the pick stays."""
     wanted: dict[str, Subscription] = {}
     for row in TOPICS:
-        for name in (*row.names, *((picked[row.signal],) if row.signal in picked else ())):
+        is_picked = row.signal in picked
+        names = [picked[row.signal], *(name for name in row.names if name in used)] if is_picked else row.names
+        for name in names:
             before = wanted.get(name)
             wanted[name] = Subscription(
                 topic=name,

@@ -163,7 +163,7 @@ async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(p
     await phone.open(returned.address)
     await phone.live()
     strip = phone.f("strip")
-    await expect(strip).to_have_text("Connection was lost, now back1 of 4")  # acknowledged is the one that is active
+    await expect(strip).to_have_text("Connection lost: ended1 of 4")  # acknowledged is the one that is active
     await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "none")
     box = await strip.bounding_box()
     assert box
@@ -179,7 +179,7 @@ async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(p
     assert acknowledged(returned) == [("gps_jump", 4)]
     returned.state["alarms"] = returned.state["alarms"][:1]
     await expect(rows).to_have_count(2)
-    await expect(strip).to_have_text("Connection was lost, now back1 of 2")
+    await expect(strip).to_have_text("Connection lost: ended1 of 2")
     await expect(strip).to_have_attribute("data-returned", "")
     ended = phone.page.locator("[data-f=alarms-ended]")
     await expect(ended).to_have_text("Acknowledge all that ended 1")

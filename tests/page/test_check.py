@@ -89,7 +89,7 @@ async def test_an_alarm_opens_with_its_numbers_its_history_and_a_threshold_to_ch
     await expect(story).to_contain_text("Highest 12.8 m/s. The safety driver must slow the car.")
     await expect(phone.f("check-figures")).to_contain_text("Speed12.6m/s")
     await expect(phone.f("check-total")).to_have_text("1 time, 9.0 s in all")
-    await expect(phone.f("check-history")).to_contain_text("highest 11.9 m/s, Desk 1 in 1.1 s")
+    await expect(phone.f("check-history")).to_contain_text("highest 11.9 m/s, acknowledged by Desk 1 after 1.1 s")
     await story.locator("[data-do=acknowledge]").tap()
     await expect(phone.page.locator(".check-thresholds")).to_contain_text("ends below 10.5 m/s after 2 s")
     await phone.f("check-change").tap()

@@ -13,9 +13,8 @@ from monitor.runner import Monitor, Transition
 from monitor.state import State
 from monitor.values import PhoneFix
 from server.analysis.faults import Faults
-from server.judge import pipeline
+from server.judge import pipeline, profiles
 from server.judge.comparisons import comparison_sources
-from server.judge.profiles import GENERIC
 from server.judge.reception_stats import Reception
 from server.judge.topics import map_signals
 from server.simulator.car import SimulatedCar
@@ -51,6 +50,7 @@ def judged(
     car = SimulatedCar(seed=seed, plan=own)
     offered = {p.topic: p.type for p in car.published}
     chosen = map_signals(offered)
+    kind = profiles.choose(profiles.load(), offered, 1)  # its pedals have the unit of their kind of car
     sources = pipeline.by_topic((*chosen.values(), *comparison_sources(offered, chosen)))
     monitor = Monitor(limits=catalog.changed(AllLimits(), limits or {}))
     reception, state = Reception(), State()
@@ -104,7 +104,7 @@ def judged(
                 None,
                 reception=reception,
                 state=state,
-                profile=GENERIC,
+                profile=kind,
                 tyre_rad_per_unit=-0.00536,  # the car that is simulated
             )
             note(pipeline.judge(monitor, state, now_s, changed))

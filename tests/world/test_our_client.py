@@ -19,6 +19,7 @@ import pytest
 
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
+from server.rosbridge.raw_frame import RawFrame
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
 from tests.world.bridge_player import FILES, Player, name_of, playing
@@ -56,17 +57,25 @@ class Watched(Session):
         self.named: set[str] = set()
         super().__init__(*what, **more)
         intake = self._parts.intake
-        take, take_junk = intake.message_received, intake.junk_received
+        take, take_raw, take_junk = intake.message_received, intake.frame_received, intake.junk_received
 
         def message_received(topic: str, message: Any, note: str | None) -> None:
             self.messages.append((topic, message))
             take(topic, message, note)
+
+        def frame_received(frame: RawFrame) -> bool:
+            is_done = take_raw(frame)
+            if is_done:  # not parsed: of transforms that move, a few a second are
+                assert frame.topic == "/tf"
+                self.messages.append((frame.topic, frame.message()))
+            return is_done
 
         def junk_received(why: str) -> None:
             self.junk.append(why)
             take_junk(why)
 
         intake.message_received, intake.junk_received = message_received, junk_received  # type: ignore[method-assign]
+        intake.frame_received = frame_received  # type: ignore[method-assign]
 
     def look(self) -> dict[str, Any]:
         state = json.loads(orjson.dumps(self.frame()))

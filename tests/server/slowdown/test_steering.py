@@ -32,8 +32,15 @@ def ratio(profile: Profile, settings: Settings | None = None) -> float:
     return found
 
 
-def received(number: float, profile: Profile, tyre_rad_per_unit: float) -> Steering:
-    """What becomes of a message of the steering topic."""
+def received(number: float, profile: Profile, tyre_rad_per_unit: float, chosen: str | None = None) -> Steering:
+    """What becomes of a message of the steering topic. `chosen`: its unit, by the operator."""
+    found = value_of(number, profile, tyre_rad_per_unit, chosen)
+    assert found is not None
+    return found
+
+
+def value_of(number: float, profile: Profile, tyre_rad_per_unit: float, chosen: str | None = None) -> Steering | None:
+    """The same; None: its unit is not known."""
     state = State()
     sources = pipeline.by_topic(map_signals({"/catvehicle/steering": "geometry_msgs/Wrench"}, {}).values())
     pipeline.receive(
@@ -45,11 +52,10 @@ def received(number: float, profile: Profile, tyre_rad_per_unit: float) -> Steer
         state=state,
         profile=profile,
         tyre_rad_per_unit=tyre_rad_per_unit,
+        units={} if chosen is None else {"steering": chosen},
     )
     reading = state.get("steering")
-    assert reading is not None
-    value: Steering = reading.value
-    return value
+    return None if reading is None else reading.value
 
 
 @pytest.mark.parametrize(
@@ -71,7 +77,8 @@ def test_the_angle_follows_from_kind_and_ratio_and_a_team_may_set_it() -> None:
     assert received(-20.0, cars["catvehicle"], -0.00536).tyre_rad == pytest.approx(0.1072)
     turned = received(0.1072, cars["catvehicle-sim"], 1.0)
     assert (turned.tyre_rad, turned.percent) == (pytest.approx(0.1072), pytest.approx(-20.0))
-    assert received(-20.0, GENERIC, 0.0) == Steering(percent=-20.0)
+    assert value_of(-20.0, GENERIC, 0.0) is None  # percent or degrees: nothing says which
+    assert received(-20.0, GENERIC, 0.0, "percent") == Steering(percent=-20.0)
     own = from_toml("[limits.steering]\ntyre_rad_per_unit = 0.0625\n")  # a steering wheel of 16:1, positive = left
     assert received(1.6, GENERIC, ratio(GENERIC, own)).tyre_rad == pytest.approx(0.1)
 

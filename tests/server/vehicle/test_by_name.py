@@ -16,7 +16,7 @@ from tests.server.vehicle.test_sources import car, odometry, of_laser
 from tests.server.viewer import viewer
 
 ODOM, TWIST, SCAN, FIX = "nav_msgs/Odometry", "geometry_msgs/Twist", "sensor_msgs/LaserScan", "sensor_msgs/NavSatFix"
-ROSAPI = "/rosapi"
+ROSAPI, MODE = "/rosapi", "/catvehicle/control_mode"
 
 
 def shown(state: dict[str, Any]) -> dict[str, str]:
@@ -97,6 +97,41 @@ async def test_what_comes_later_is_a_candidate_and_swaps_nothing() -> None:
             await one.state(lambda s: True)
         state = await one.state(lambda s: True)
         assert state["signals"]["scan"]["topic"] == "/front/scan"
+
+
+@pytest.mark.virtual_time
+async def test_what_came_once_before_the_topics_are_chosen_is_not_lost() -> None:
+    """A mode of operation that its publisher sent once: the bridge gives it to each subscription."""
+
+    def publish(bridge: RosBridge, at_s: float) -> None:
+        if at_s < 0.01:
+            bridge.end_node(ROSAPI)
+            bridge.advertise(MODE, "std_msgs/String", latch=True)
+            bridge.publish(MODE, {"data": "auto"})
+        bridge.publish("/vel", twist(3.0))
+
+    async with car({"/vel": TWIST, MODE: "std_msgs/String"}, publish) as (_, base), viewer(base) as one:
+        state = await one.state(lambda s: s["signals"]["speed"]["value"] is not None)
+        if state["signals"]["mode"]["value"] is None:
+            state = await one.state(lambda s: s["signals"]["mode"]["value"] is not None, within_s=5.0)
+        assert state["signals"]["mode"]["topic"] == MODE
+
+
+@pytest.mark.virtual_time
+async def test_a_pick_is_used_at_once_and_the_names_are_used_again_without_it() -> None:
+    def publish(bridge: RosBridge, at_s: float) -> None:
+        bridge.publish("/vel", twist(3.0))
+        bridge.publish("/my/vel", twist(5.0))
+        bridge.publish("/fix", fix(5.0 * at_s, at_s))
+
+    topics = {"/vel": TWIST, "/my/vel": TWIST, "/fix": FIX}
+    async with car(topics, Without(publish)) as (_, base), viewer(base) as one:
+        await one.state(lambda s: s["signals"]["speed"]["topic"] == "/vel")
+        assert (await one.ask(kind="set", topics={"speed": "/my/vel"}))["ok"]
+        state = await one.state(lambda s: (s["signals"]["speed"]["value"] or {}).get("speed_mps") == 5.0, within_s=1.0)
+        assert shown(state) == {"speed": "/my/vel", "position": "/fix"}
+        assert (await one.ask(kind="set", topics={"speed": None}))["ok"]
+        await one.state(lambda s: (s["signals"]["speed"]["value"] or {}).get("speed_mps") == 3.0, within_s=1.0)
 
 
 MESSAGES: list[tuple[str, Any, str]] = [
