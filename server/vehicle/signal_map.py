@@ -48,6 +48,7 @@ class SignalMap:
         self.questions: Sequence[Question] = ()
         self.watched: Mapping[str, Source] = {}  # topic → what it may carry, of signals that none carries yet
         self.by_name: TopicsByName | None = None  # of a bridge that does not name its topics
+        self.new_by_name: tuple[str, ...] = ()  # of those, what the first choice among them uses
         self._picked: Mapping[str, str] = {}
         self._evidence = Evidence(place)
         self._choice: Choice | None = None
@@ -97,17 +98,17 @@ class SignalMap:
         """The same of a bridge that does not name its topics: of those of which messages came, topic → type."""
         by_name = self.by_name = self.by_name or TopicsByName()
         self._picked = picked
+        was_used, before = by_name.is_used, {one.topic for one in self.decoded}
         offered = by_name.offered(picked, now_s)
         if offered:
             self.update(offered, picked, delivery, now_s)
             self.sources = {signal: replace(one, note=one.note or NOTE) for signal, one in self.sources.items()}
         self.watched = {**by_name.beside({one.topic: one for one in self.decoded}), **self.watched}
+        is_first = by_name.is_used and not was_used
+        self.new_by_name = (
+            tuple({one.topic: None for one in self.decoded if one.topic not in before}) if is_first else ()
+        )
         return by_name.found
-
-    @property
-    def is_mapped_by_name(self) -> bool:
-        """Whether the topics of a bridge that does not name them were chosen from."""
-        return self.by_name is not None and self.by_name.is_used
 
     def _settle(self, now_s: float) -> bool:
         """Whether the candidates have shown themselves only now, as far as they will before the operator is asked."""

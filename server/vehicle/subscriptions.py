@@ -17,7 +17,7 @@ from server.rosbridge.rosapi_client import Asks
 from server.vehicle import car_marks, discovery
 from server.vehicle.missing_watch import MissingWatch
 from server.vehicle.ros_watch import RosWatch
-from server.vehicle.signal_map import Delivers, SignalMap
+from server.vehicle.signal_map import SignalMap
 from server.vehicle.subscription_table import SubscriptionTable
 from server.vehicle.type_definitions import TypeDefinitions
 from server.vehicle.undelivered import CLIENT_COUNT
@@ -129,10 +129,8 @@ class Subscriptions:
 
     def published(self) -> frozenset[str]:
         """The signals that the car has in a form that can be read; not yet one whose publisher has only just come."""
-        now_s, delivery = self._now(), self._missing.delivery
-        return pipeline.published(
-            source for source in self.signals.sources.values() if not delivery.has_its_time(source.topic, now_s)
-        )
+        has_its_time, now_s = self._missing.delivery.has_its_time, self._now()
+        return pipeline.published(one for one in self.signals.sources.values() if not has_its_time(one.topic, now_s))
 
     def type_of(self, topic: str) -> str | None:
         """The type of a topic that is subscribed to, as the bridge spells it; None: it does not say."""
@@ -255,20 +253,15 @@ class Subscriptions:
         """Chooses the topic of each signal and subscribes to them; without rosapi of those of which messages come."""
         offer, known = self._offer, (self._tuning.settings.topics, self._missing.delivery, self._now())
         if offer is None:
-            return self._map_by_name(*known)
+            if self._tuning.recognise(self.signals.update_by_name(*known), None):
+                self._recognised(self._tuning.profile.title)
+            self._subscribe()
+            return self.table.renew_single(self.signals.new_by_name)
         self.signals.update(offer.topics, *known)
         self._subscribe()
         before, self._unfit = self._unfit, car_marks.unfit(offer.topics.get(car_marks.TOPIC))
         if self._unfit not in (None, before):
             self._noted(self._unfit)
-
-    def _map_by_name(self, picked: Mapping[str, str], delivery: Delivers, now_s: float) -> None:
-        was_mapped, before = self.signals.is_mapped_by_name, self.by_topic
-        if self._tuning.recognise(self.signals.update_by_name(picked, delivery, now_s), None):
-            self._recognised(self._tuning.profile.title)
-        self._subscribe()
-        if self.signals.is_mapped_by_name and not was_mapped:
-            self.table.renew_single([topic for topic in self.by_topic if topic not in before])
 
     def _subscribe(self) -> None:
         self.by_topic = pipeline.by_topic(self.signals.decoded)
