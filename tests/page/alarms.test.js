@@ -56,6 +56,7 @@ test('what has ended is asked about only once nothing active is unacknowledged',
   const ended = alarm({ state: 'RTN_UNACKED', active: false });
   assert.equal(layOut([ended, warning()]).dialog, null, 'its dialog would cover the warning');
   assert.equal(layOut([ended, warning({ state: 'ACKED' })]).dialog?.id, ended.id);
+  assert.equal(layOut([ended, alarm({ id: 'disk', priority: 'advisory', place: 'list', sound: 'none' })]).dialog?.id, ended.id, 'what the list alone shows holds nothing back');
   assert.equal(layOut([warning(), alarm({ raised_ms: -1 })]).dialog?.id, 'speed_limit', 'what is active is, whatever is newer');
 });
 

@@ -72,6 +72,32 @@ test('a replay that is dragged while it plays keeps the bound, and an order of a
   void isLed;
 });
 
+for (const each_ms of [2, 10, 35]) {
+  test(`a scrubber that is dragged without end leaves room for the frames: answers each ${each_ms} ms`, async (t) => {
+    const { store, socket, sent, pass } = opened(t);
+    const lead = new ReplayLead(store);
+    let isDragged = true;
+    let answered = 0;
+    let seq = 0;
+    void (async () => {
+      for (let i = 0; isDragged; i += 1) await lead.order({ do: 'seek', at_s: i });
+    })();
+    for (let ms = 0; ms < 6000; ms += each_ms) {
+      socket.onmessage({ data: JSON.stringify({ kind: 'offer', seq: (seq += 1), of: ['state'] }) });
+      for (const one of sent.slice(answered)) if ('id' in one) socket.onmessage({ data: JSON.stringify({ kind: 'reply', id: one.id, ok: true }) });
+      answered = sent.length;
+      await pass(each_ms);
+    }
+    isDragged = false;
+    const takes_ms = sent.filter(({ kind }) => kind === 'take').map(({ at_ms }) => at_ms);
+    const seeks_ms = sent.filter((one) => one.do === 'seek').map(({ at_ms }) => at_ms);
+    assert.ok(mostInASecond(sent.map(({ at_ms }) => at_ms)) <= A_SECOND);
+    assert.ok(Math.max(...takes_ms.slice(1).map((at_ms, n) => at_ms - (takes_ms[n] ?? 0))) <= 220, `takes at ${takes_ms}`);
+    assert.ok(takes_ms.length >= 6 * 15, `${takes_ms.length} takes`);
+    assert.ok(seeks_ms.length >= 6 * 4 && mostInASecond(seeks_ms) <= 8, `${seeks_ms.length} seeks`);
+  });
+}
+
 test('messages of another second count no more', (t) => {
   let now_ms = 0;
   t.mock.timers.enable({ apis: ['setTimeout'] });

@@ -73,3 +73,28 @@ async def test_back_from_a_screen_and_from_a_sheet_over_it(phone: Phone, canned:
     await page.wait_for_function(PLAIN)
     await page.go_back()
     await page.wait_for_url("about:blank")
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize("way", ["a tab", "a press beside it"])
+async def test_a_hand_over_that_was_left_by_hand_opens_no_more_by_itself(
+    phone: Phone, canned: Canned, way: str
+) -> None:
+    page = await opened(phone, f"{canned.address}/#home")
+    me = next(one["page"] for one in reversed(canned.heard) if one["kind"] == "hello")
+    line = {
+        "key": "limit", "kind": "limit", "title": "Speed limit: 2 m/s", "text": "", "priority": None, "since_ms": None,
+        "until_ms": None, "read": False,
+    }  # fmt: skip
+    offer = {"by": "Ann", "by_page": "other", "name": "Ben", "page": me, "since_ms": 1, "version": "1"}
+    canned.state["control"] = {"holder": "Ann", "handover": offer | {"lines": [line], "left": 1}}
+    sheet = page.locator("#sheet-handover")
+    await expect(sheet).to_be_visible()
+    if way == "a tab":
+        await page.locator("#tab-map").tap()
+    else:
+        await page.evaluate("document.querySelector('#panel-home').click()")
+    await expect(sheet).to_have_count(0)
+    await page.wait_for_timeout(1200)  # so long it would not open again at once
+    await phone.drawn(4)
+    await expect(sheet).to_have_count(0)

@@ -14,6 +14,7 @@ from tests.page.canned_fleet import car, worst
 from tests.page.conftest import Phone
 from tests.page.test_alarm_list import answer, heard
 from tests.page.test_alarm_states import CRITICAL, ENDED, speeding
+from tests.page.test_overlaps import noticed
 from tests.page.test_slow_down import DIALOG, RAIL, Thumb
 
 OTHER = "Margay-the-long-named-car"
@@ -175,3 +176,26 @@ async def test_five_alarms_three_of_them_returned_are_acknowledged(
     answer(canned, names)
     await expect(phone.f("strip")).to_have_attribute("data-known", "")
     assert await presses(phone) <= 4
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize(("width", "height"), [(412, 915), (820, 400)])
+async def test_the_warning_of_this_car_is_covered_by_no_other_car_and_no_notice(
+    phone: Phone, canned: Canned, width: int, height: int
+) -> None:
+    fleet(canned)
+    await opened(phone, canned, width, height)
+    card = phone.page.locator("[data-f=other-car]")
+    await expect(card).to_be_visible()
+    canned.state["alarms"] = [alarm("phone_missing", "Phone position missing")]
+    warning = phone.page.locator(".snacks > [data-f=warning]")
+    await expect(warning).to_be_visible()
+    await expect(card).to_be_hidden()
+    await expect(phone.f("strip-text")).to_have_text("Margay t: Speed above limit")
+    await noticed(phone.page, canned)
+    await phone.drawn(6)
+    await warning.get_by_role("button", name="Acknowledge").tap()
+    answer(canned, await heard(canned, 1))
+    await phone.page.evaluate("document.querySelector('.snacks > .note').remove()")
+    await expect(warning).to_be_hidden()
+    await expect(card).to_be_visible()

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.async_api import Page, expect
+from playwright.async_api import Page, Route, expect
 
 from tests.page.canned import Canned, Json, alarm, live, slow
 from tests.page.conftest import Phone
@@ -201,3 +201,44 @@ async def test_what_a_sheet_leaves_in_sight_acts_and_escape_closes_the_sheet_alo
 @pytest.mark.parametrize("name", SHEETS)
 async def test_each_sheet_does_in_any_window(phone: Phone, canned: Canned, name: str) -> None:
     await sheets_leave_the_car_in_sight(phone, canned, SIZES[2::5], [name])
+
+
+@pytest.mark.gate
+@pytest.mark.own_phone
+async def test_a_sheet_leaves_a_docked_alarm_free_though_the_look_of_drawers_fails_and_is_asked_for_again(
+    phone: Phone, canned: Canned
+) -> None:
+    page = phone.page
+    asked: list[str] = []
+
+    async def refuse(route: Route) -> None:
+        asked.append(route.request.url)
+        await route.abort()
+
+    await page.route("**/drawers.css*", refuse)
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    canned.state = warned()
+    canned.state["alarms"].append(critical())
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    docked = page.locator(".alarms-pane #sheet-alarm")
+    await expect(docked).to_be_visible()
+    menu = page.locator("#sheet-menu")
+    for _ in range(2):
+        before = len(asked)
+        await click(page, SHEETS["sheet-menu"])
+        await expect(menu).to_be_visible()
+        box, pane = await menu.bounding_box(), await page.locator(".alarms-pane").bounding_box()
+        assert box is not None
+        assert pane is not None
+        assert box["x"] + box["width"] <= pane["x"] + 1
+        async with asyncio.timeout(10):
+            while len(asked) == before:
+                await asyncio.sleep(0.05)
+        await page.keyboard.press("Escape")
+        await expect(menu).to_be_hidden()
+    await page.unroute("**/drawers.css*")
+    await click(page, SHEETS["sheet-menu"])
+    await expect(page.locator("link[href$='drawers.css']")).to_be_attached()
+    await page.wait_for_function("() => document.querySelector('link[href$=\"drawers.css\"]').sheet")
+    phone.complaints.clear()  # of what was refused

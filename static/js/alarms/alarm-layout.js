@@ -45,9 +45,10 @@ export function layOut(alarms) {
   const sorted = byUrgency(alarms);
   const asking = sorted.filter(isAsking);
   const standing = sorted.filter((alarm) => alarm.state !== 'SHELVED');
+  const isPrompted = asking.some((alarm) => alarm.active && alarm.place !== 'list');
   return {
     // One that has ended is asked about in its turn: its dialog would cover what is active and unacknowledged.
-    dialog: asking.find((alarm, n) => alarm.place === 'dialog' && (alarm.active || n === 0)) ?? null,
+    dialog: asking.find((alarm) => alarm.place === 'dialog' && (alarm.active || !isPrompted)) ?? null,
     snackbars: asking.filter((alarm) => alarm.place === 'snackbar'),
     standing,
     shelved: sorted.length - standing.length,

@@ -7,8 +7,10 @@ const DIAL_MS = 5000;
 const FIRST_WAIT_MS = 300;
 const LAST_WAIT_MS = 2000;
 /** A page sends at most 25 messages a second: frames are taken up to the first, a replay is led up to the second; what a person orders never waits. */
-const TAKES_A_S = 20;
-export const LEADS_A_S = 24;
+const TAKES_A_S = 24;
+export const LEADS_A_S = 25;
+/** Besides, so that a replay never holds up the frames: a take waits while so many of all were sent within so long [ms], a lead while so many leads were. @type {Record<string, [few: number, ms: number]>} */
+const EVENLY = { take: [2, 85], replay: [2, 250] };
 
 /**
  * @typedef {Pick<WebSocket, 'binaryType' | 'send' | 'close'> & {onopen: any, onmessage: any, onclose: any, onerror: any}} Socket
@@ -28,8 +30,8 @@ export class PageSocket {
   #proof_ms = 0;
   #wait_ms = FIRST_WAIT_MS;
   #next_ms = -Infinity;
-  /** When the last messages were sent. @type {number[]} */
-  #sent_ms = [];
+  /** The last messages. @type {{kind: unknown, at_ms: number}[]} */
+  #sent = [];
   #isTaking = false;
 
   /**
@@ -77,14 +79,21 @@ export class PageSocket {
   send(message) {
     if (!this.#socket || !this.#isOpen) return false;
     this.#socket.send(JSON.stringify(message));
-    this.#sent_ms = [...this.#sent_ms.slice(-LEADS_A_S), performance.now()];
+    this.#sent = [...this.#sent.slice(-LEADS_A_S), { kind: 'kind' in message ? message.kind : '', at_ms: performance.now() }];
     return true;
   }
 
-  /** Run once fewer than `most` messages were sent within a second; where that is so, at once. @param {number} most @param {() => void} run */
-  inTurn(most, run) {
-    const wait_ms = 1000 + (this.#sent_ms.at(-most) ?? -Infinity) - performance.now();
-    if (wait_ms > 0) setTimeout(() => this.inTurn(most, run), wait_ms);
+  /**
+   * Run once fewer than `most` messages were sent within a second; where that is so, at once.
+   * @param {number} most
+   * @param {() => void} run
+   * @param {string} [kind] by which it is spread evenly
+   */
+  inTurn(most, run, kind = '') {
+    const [few, within_ms] = EVENLY[kind] ?? [most, 0];
+    const counted = kind === 'replay' ? this.#sent.filter((one) => one.kind === kind) : this.#sent;
+    const wait_ms = Math.max(1000 + (this.#sent.at(-most)?.at_ms ?? -Infinity), within_ms + (counted.at(-few)?.at_ms ?? -Infinity)) - performance.now();
+    if (wait_ms > 0) setTimeout(() => this.inTurn(most, run, kind), wait_ms);
     else run();
   }
 
@@ -95,7 +104,7 @@ export class PageSocket {
     this.inTurn(TAKES_A_S, () => {
       this.#isTaking = false;
       take();
-    });
+    }, 'take');
   }
 
   /** Hang up; the next `look` dials again, without waiting. */

@@ -31,7 +31,7 @@ export class ReplayLead {
     let answer;
     do {
       if (this.isAway) await new Promise((go) => this.#waiting.push(go));
-      await new Promise((/** @type {(_: void) => void} */ go) => this.store.socket.inTurn(LEADS_A_S, go));
+      await new Promise((/** @type {(_: void) => void} */ go) => this.store.socket.inTurn(LEADS_A_S, go, 'replay'));
       if (this.#isOver) return LEFT;
       answer = await this.store.ask('replay', order);
     } while (!answer.ok && this.isAway && !this.#isOver);

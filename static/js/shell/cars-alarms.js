@@ -16,6 +16,8 @@ export class CarsAlarms {
   #spoken = new Set();
   /** @type {CarRow | null} */
   #shown = null;
+  /** Which one, and whether beside a warning of this car: without one it may come to stand where that did. */
+  #place = '';
   #meant = new Meant();
 
   /**
@@ -106,7 +108,10 @@ export class CarsAlarms {
       card.remove();
       return;
     }
-    if (!this.#shown || keyOf(this.#shown) !== keyOf(row)) this.#meant.moved();
+    const warning = field(snacks, 'warning');
+    const place = `${keyOf(row)} ${warning.hidden}`;
+    if (!this.#shown || place !== this.#place) this.#meant.moved();
+    this.#place = place;
     this.#shown = row;
     const short = this.cars.shortOf(row.name); // whole in the list of cars
     const { title, text } = row.worst;
@@ -114,7 +119,7 @@ export class CarsAlarms {
     const for_s = ((this.store.cars?.time_ms ?? 0) - row.worst.raised_ms) / 1000 + this.store.carsLag_s;
     setWords(this.text, `${short}: ${title}, for ${age(Math.max(0, for_s))} s. In control: ${row.operator}.`);
     setText(this.open, `Open ${short}`);
-    if (!card.isConnected) field(snacks, 'warning').before(card); // after what has a time limit
+    if (!card.isConnected) warning.after(card); // where there is room for one, this car's comes first
   }
 
   /** Names a car and its alarm, once each occurrence, where the browser has a voice. @param {CarRow} row */

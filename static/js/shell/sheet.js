@@ -1,6 +1,7 @@
 // Opens and closes the sheets the operator asked for. Alarms take precedence: see dialogs.js.
 
 import { field, listen, need, setAttribute } from '../core/dom.js';
+import { styled } from '../core/style-sheet.js';
 import { isFloor } from './layout.js';
 
 /**
@@ -14,6 +15,7 @@ export function openSheet(sheet) {
   const view = document.querySelector('#monitor:not([hidden]) > .view');
   (view ?? document.body).append(sheet);
   if (!view) return sheet.showModal();
+  void styled('drawers'); // again where it failed
   sheet.show();
   setAttribute(need(document, '#monitor'), 'data-sheet', sheet.id);
   sheet.addEventListener('close', () => setAttribute(need(document, '#monitor'), 'data-sheet', asked()?.id), { once: true });
@@ -28,6 +30,11 @@ const asked = () => [...sheetsOpen()].find((sheet) => isAsked(sheet) && sheet.cl
 /** Whether a dialog stands over the page that no sheet may cover: an alarm, a broken link. */
 export function mustWait() {
   return [.../** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog:modal'))].some((one) => !isAsked(one));
+}
+
+/** By hand, in another way than its own key: who opened it may want to know. @param {HTMLDialogElement} [sheet] */
+function cancel(sheet) {
+  if (sheet?.dispatchEvent(new Event('cancel', { cancelable: true }))) sheet.close();
 }
 
 /** @param {HTMLDialogElement} sheet */
@@ -46,7 +53,7 @@ export function isAsked(sheet) {
 /** Closes what stands in the view when it is left: by Escape, by another tab or screen, by a press beside it where it is no drawer. */
 export function mountSheets() {
   const monitor = need(document, '#monitor');
-  const leave = () => asked()?.close();
+  const leave = () => cancel(asked());
   const seen = new MutationObserver(leave);
   seen.observe(monitor, { attributeFilter: ['hidden', 'data-front', 'data-over'] });
   const stops = [
@@ -55,7 +62,7 @@ export function mountSheets() {
       const sheet = event.key === 'Escape' && !document.querySelector('dialog:modal') ? asked() : undefined;
       if (!sheet) return;
       event.stopPropagation(); // it closes nothing else
-      if (sheet.dispatchEvent(new Event('cancel', { cancelable: true }))) sheet.close();
+      cancel(sheet);
     }, { capture: true }),
     listen(need(monitor, '.view'), 'click', (event) => {
       if (isFloor() || !asked() || event.target.closest('dialog')) return;
