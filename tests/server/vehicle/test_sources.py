@@ -30,7 +30,7 @@ Publish = Callable[[RosBridge, float], None]
 async def car(
     topics: dict[str, str], publish: Publish, hz: float = 20.0, data: Path | None = None
 ) -> AsyncIterator[tuple[RosBridge, str]]:
-    """A car that publishes on these topics until the block ends, and a server that watches it, recording into `data`."""
+    """A car that publishes on these topics and a server that watches it and records into `data`."""
     bridge = RosBridge(ros_version=1, now=time.time)
     port = await bridge.start("127.0.0.1", 0)
     for topic, kind in topics.items():
