@@ -14,6 +14,7 @@ from server.judge.transforms import MAX_NAME, Rotation, frame_name, inverse, pro
 IMU, ODOMETRY = "sensor_msgs/Imu", "nav_msgs/Odometry"
 TYPES = frozenset({IMU, ODOMETRY, "sensor_msgs/msg/Imu", "nav_msgs/msg/Odometry"})  # in both spellings
 EXACTLY = 1e-6  # of the way made: what the rounding of a rotation leaves
+STANDS_MPS = 1e-6  # the direction of what is slower does not matter
 NEGLIGIBLE = 1e-6  # of a unit vector: an axis that plays no part may be NaN
 
 
@@ -83,6 +84,8 @@ def _from_ground(message: Mapping[str, Any], frame: str) -> tuple[Any, str | Non
     aside_mps = abs(turned["linear"]["y"])
     if linear.get("y") == 0.0 and aside_mps > EXACTLY * way_mps:
         return message, None  # along an axis of the car, and of no other: it has the axes of the car
+    if linear.get("y") == 0.0 and way_mps > STANDS_MPS and turned["linear"]["x"] * linear["x"] < 0.0:
+        return message, f"{why} or in the axes of the car, which point the other way"
     if way_mps > MOVES_MPS and aside_mps > SIDEWAYS * way_mps:
         return message, f"{why}, and moves sideways by its orientation"
     found["twist"] = {**twist, "twist": turned}

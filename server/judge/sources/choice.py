@@ -15,6 +15,7 @@ from server.judge.signals.odometry import pose_only
 from server.judge.signals.speed import way_made, way_made_stamped
 from server.judge.sources import questions
 from server.judge.sources.candidates import (
+    MOST_COMPARED,
     OTHER_CAR,
     OWN_NAMES,
     USUAL_NAME,
@@ -47,7 +48,7 @@ class Choice:
     refused: frozenset[str] = frozenset()  # those of them where there is nothing to choose from
     reasons: Mapping[str, Mapping[str, str]]  # topic → what is known of it
     questions: Sequence[Question] = ()
-    watched: Mapping[str, tuple[Source, ...]]  # further candidates whose messages may decide
+    watched: Mapping[str, tuple[Source, ...]]  # further candidates whose messages may decide, refused ones too
 
     @property
     def competing(self) -> frozenset[str]:
@@ -57,10 +58,12 @@ class Choice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Open:
-    """No topic is taken. `among`: those that are asked for; none: there is nothing to ask."""
+    """No topic is taken. `among`: those that are asked for; none: there is nothing to ask. `watch`: those that may yet
+    be filled."""
 
     why: str
     among: Sequence[Candidate] = ()
+    watch: Sequence[Candidate] = ()
 
 
 def choose(
@@ -118,7 +121,7 @@ class _Chooser:
             watched={
                 signal: tuple(
                     replace(candidate.source(signal, why="compared"), carries=False)
-                    for candidate in one.among[:MOST_WATCHED]
+                    for candidate in one.among[:MOST_WATCHED] or one.watch[:MOST_COMPARED]
                     if candidate.is_published
                 )
                 for signal, one in opened.items()
@@ -191,7 +194,7 @@ class _Chooser:
         filled = [one for one in found if not self._evidence.of(one.topic).is_twist_empty]
         undoubted = [one for one in found if not self._evidence.of(one.topic).is_empty_by_odometry]
         among = self._speed_among(filled, found) or self._speed_among(undoubted, found)
-        return among or _Open(why=_empty([one.topic for one in found], self._evidence))
+        return among or _Open(why=_empty([one.topic for one in found], self._evidence), watch=found)
 
     def _speed_among(self, filled: list[Candidate], found: list[Candidate]) -> Source | _Open | None:
         own = next((one for one in filled if one.topic.lower() == OWN_NAMES["speed"]), None)
@@ -260,7 +263,7 @@ class _Chooser:
             is_published=topic not in self._unpublished,
         )
         if signal == "speed" and self._evidence.of(topic).is_empty_by_odometry:
-            return _Open(why=_empty([topic], self._evidence))
+            return _Open(why=_empty([topic], self._evidence), watch=(one,))
         source = one.source(signal, why=PICKED)
         if signal == "speed" and self._is_earth_fixed(one):
             source = _as_way_made(source)

@@ -4,110 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 from monitor.values import LaserScan
-from server.judge.frame_words import is_earth_fixed
 from server.judge.message_fields import Rejected, inner, number, stamp_s, text
 from server.judge.signals.scan import laser_scan
 from server.judge.signals.speed import SIDEWAYS
-from server.judge.sources.motion import FIX_MPS, MOVES_MPS, POSE_LEAST_M, Motion, is_lost, least_way_m
-from server.judge.sources.pictures import Picture, picture_of, see_the_same
+from server.judge.sources.motion import FIX_MPS, MOVES_MPS, least_way_m
+from server.judge.sources.pictures import picture_of, see_the_same
 from server.judge.sources.source import plain_type
-from server.judge.sources.ways import GAP_S, Way, course_rad, east_north_m, is_same, metres_between, turned
-from server.judge.topic import FLOATS
+from server.judge.sources.topic_evidence import FIXES_S, ODOMETRY, TopicEvidence
+from server.judge.sources.ways import GAP_S, course_rad, east_north_m, is_same, metres_between, turned
 
 MOST_TOPICS = 64
 SAME_TIME_S = 0.3  # two messages so near in time are compared
-FIXES_S = 1.2  # the same for positions, of which many receivers send one a second
 PICTURE_EVERY_S = 0.4
-ENOUGH = 5  # messages that show the same
 AGREE_ENOUGH = 10
 NO_REVERSE_MPS = 4.0  # faster than a car is reversed for long
 COURSE_WITHIN_RAD = math.radians(20)
 COURSE_CLEAR_RAD = math.radians(40)  # so far from east a velocity along the car differs from one in east and north
 SAME_PLACE_M = 5.0
-
-
-@dataclass(slots=True)
-class TopicEvidence:
-    """What is known of one topic. A velocity is along and across the car, or in east and north."""
-
-    kind: str
-    frame: str | None = None  # that its messages name; None: none, or no message yet
-    count: int = 0
-    is_beside: bool = False  # followed only to see whether the car moves, and whether it is filled
-    has_twist: bool = False  # its horizontal velocity, or its number, was not zero
-    way: Way = field(default_factory=Way)  # of its pose
-    stated: Motion = field(default_factory=Motion)  # by its velocity
-    made: Motion = field(default_factory=Motion)  # by its pose or its positions
-    least_m: float = POSE_LEAST_M  # way that its places must make to show a motion
-    origin: tuple[float, float] | None = None  # latitude and longitude of its first position
-    zero_s: tuple[float, float] | None = None  # when it was exactly zero, first and last, without a gap
-    idle_beside: dict[str, str] = field(default_factory=dict)  # type → topic that moved while this one was zero
-    earth_votes: int = 0
-    body_votes: int = 0
-    velocity: tuple[float, float, float] | None = None  # when, x and y [m/s] of the newest message
-    place: tuple[float, float, float] | None = None  # when, latitude and longitude [degrees]
-    course: tuple[float, float] | None = None  # when, direction of the way made [rad from east]
-    looks_ahead: bool | None = None  # of a laser, by the transforms of the car; None: they do not say
-    picture: Picture | None = None  # of its newest scan, at most every PICTURE_EVERY_S
-
-    @property
-    def is_twist_empty(self) -> bool:
-        """Whether its speed is exactly zero though its pose moves, or another topic shows that the car does."""
-        return not self.has_twist and (self.way.has_moved or bool(self.idle_beside))
-
-    @property
-    def is_empty_by_odometry(self) -> bool:
-        """The same where it is beyond doubt: another velocity may be a command, and a receiver may be wrong."""
-        return not self.has_twist and (self.way.has_moved or "nav_msgs/Odometry" in self.idle_beside)
-
-    @property
-    def why_empty(self) -> str:
-        """In words, of what `is_twist_empty`."""
-        what = "its value" if self.kind in FLOATS else "its twist"
-        beside = self.idle_beside.get("nav_msgs/Odometry") or next(iter(self.idle_beside.values()), "")
-        return f"{what} is zero while {'its pose' if self.way.has_moved else beside} moves"
-
-    @property
-    def is_body_fixed(self) -> bool:
-        """Whether its values follow the car and not the compass."""
-        return self.body_votes >= ENOUGH and self.body_votes > 2 * self.earth_votes
-
-    @property
-    def is_earth_fixed(self) -> bool:
-        """Whether its values are in east and north."""
-        return self.earth_votes >= ENOUGH and self.earth_votes > 2 * self.body_votes
-
-    @property
-    def shown(self) -> tuple[object, ...]:
-        """What a choice may depend on."""
-        return (
-            self.frame,
-            self.count > 0,
-            self.has_twist,
-            self.is_twist_empty,
-            self.is_empty_by_odometry,
-            self.is_earth_fixed,
-            self.is_body_fixed,
-            self.looks_ahead,
-        )
-
-    @property
-    def is_enough(self) -> bool:
-        """Whether more messages would hardly show more."""
-        match self.kind:
-            case "nav_msgs/Odometry" | "std_msgs/Float32" | "std_msgs/Float64":
-                return self.has_twist or self.is_twist_empty
-            case "geometry_msgs/TwistStamped" | "geometry_msgs/Twist":
-                named = self.is_beside or (self.frame is not None and is_earth_fixed(self.frame))
-                is_known = named or self.is_earth_fixed or self.is_body_fixed
-                return (self.has_twist and is_known) or self.is_twist_empty
-            case "sensor_msgs/LaserScan":
-                return self.count > 0
-        return True
 
 
 Place = Callable[[str, LaserScan], bool | None]
@@ -196,12 +112,8 @@ class Evidence:
     def _take(self, topic: str, known: TopicEvidence, message: Any, at_s: float) -> bool:
         match known.kind:
             case "nav_msgs/Odometry":
-                pose = inner(inner(message, "pose"), "pose")
                 x, y = self._twist(known, inner(inner(message, "twist"), "twist"), at_s)
-                here = number(pose, "position", "x"), number(pose, "position", "y")
-                known.way.add(*here, at_s)
-                if not is_lost(inner(message, "pose")):
-                    known.made.place(*here, at_s)
+                known.pose(inner(message, "pose"), at_s)
                 self._note_zero(topic, known, at_s)
                 return self._compare_speeds(topic, math.hypot(x, y), at_s)
             case "geometry_msgs/TwistStamped" | "geometry_msgs/Twist":
@@ -224,23 +136,25 @@ class Evidence:
         x, y = number(twist, "linear", "x"), number(twist, "linear", "y")
         known.has_twist |= x != 0.0 or y != 0.0  # NaN too: it is filled, and says that it is not known
         known.velocity = (at_s, x, 0.0 if math.isnan(y) else y)
+        known.is_filled |= math.hypot(x, known.velocity[2]) > 0.0
         known.stated.state(math.hypot(x, known.velocity[2]), at_s)
         return x, known.velocity[2]
 
     def _note_zero(self, topic: str, known: TopicEvidence, at_s: float) -> None:
         """Whether a speed that was never anything but zero is so while others show that the car moves."""
-        if known.has_twist or "nav_msgs/Odometry" in known.idle_beside:
+        if known.has_twist or ODOMETRY in known.idle_beside:
             return
         before = known.zero_s
         since_s, last_s = before if before is not None else (at_s, at_s)
         known.zero_s = (since_s if 0.0 <= at_s - last_s <= GAP_S else at_s, at_s)
         for name, other in self._topics.items():
-            if name == topic or other.kind in known.idle_beside or not _moves(other, at_s, known.zero_s[0]):
+            proof = other.moves_since(known.zero_s[0], at_s)
+            if name == topic or proof is None or proof in known.idle_beside:
                 continue
             # A pose that rests contradicts a velocity.
-            is_proof = other.kind in ("nav_msgs/Odometry", "sensor_msgs/NavSatFix") or known.kind != "nav_msgs/Odometry"
+            is_proof = other.kind in (ODOMETRY, "sensor_msgs/NavSatFix") or known.kind != ODOMETRY
             if is_proof and self.is_of_one_car(topic, name):
-                known.idle_beside[other.kind] = name
+                known.idle_beside[proof] = name
 
     def _vote(self, known: TopicEvidence, x: float, y: float, at_s: float) -> None:
         """Whether one velocity is along the car or in east and north."""
@@ -284,7 +198,7 @@ class Evidence:
         if not (abs(latitude) <= 90 and abs(longitude) <= 360) or (latitude == 0.0 and longitude == 0.0):
             return False
         known.origin = known.origin or (latitude, longitude)
-        known.least_m = least_way_m(message)
+        known.least_m = least_way_m(message.get("position_covariance"))
         known.made.place(*east_north_m(known.origin, (latitude, longitude)), at_s, slowest_mps=FIX_MPS)
         before, known.place = known.place, (at_s, latitude, longitude)
         if before is not None and 0.0 < at_s - before[0] <= 2 * FIXES_S:
@@ -327,11 +241,3 @@ class Evidence:
 
     def _near(self, at_s: float, within_s: float) -> Iterable[TopicEvidence]:
         return (t for t in self._topics.values() if t.velocity is not None and at_s - t.velocity[0] <= within_s)
-
-
-def _moves(known: TopicEvidence, at_s: float, zero_since_s: float) -> bool:
-    """Whether a topic has shown for long that the car moves, while another one was zero."""
-    stated, made = known.stated, known.made
-    return stated.is_long(at_s, zero_since_s, within_s=FIXES_S) or made.is_long(
-        at_s, zero_since_s, within_s=FIXES_S, least_m=known.least_m
-    )

@@ -7,13 +7,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from server.judge.sources.ways import GAP_S, turned
+from server.judge.sources.ways import FASTEST_MPS, GAP_S, turned
 
 MOVES_MPS = 1.0
 WINDOW_S = 0.5  # between two places that are compared: nearer ones differ by their noise
 LONG_S = 2.0  # so long a motion proves that a topic which is zero meanwhile is not filled
-POSE_LEAST_M = 2.0  # between the first and the newest place of a motion
+POSE_LEAST_M = 2.0  # between the first and the newest place of a motion, without its largest step
+PLACES_S = 1.5  # between two places of one motion: what happened in a longer pause was not seen
+LEAST_STEPS = 2  # of a motion: one may be a jump
 FIX_MPS, FIX_LEAST_M, FIX_SIGMAS = 2.0, 15.0, 6.0  # of a receiver, which wanders at standstill
+FAR_M = 100.0  # without a pause and a turn: no receiver wanders so
 LOST_M2 = 1000.0  # the covariance by which an odometry declares itself lost
 STRAIGHT_RAD = math.radians(90)  # a step that turns more is noise
 
@@ -24,7 +27,9 @@ class Motion:
 
     since_s: float | None = None  # None: it does not move now
     newest_s: float = -math.inf
-    way_m: float = math.inf  # between the first and the newest place; of a stated speed not known, and not needed
+    way_m: float = math.inf  # from the first to the newest place, without the largest step; not of a stated speed
+    _steps: int = 0  # since `since_s`
+    _largest_m: float = 0.0  # of these
     _anchor: tuple[float, float, float] | None = None  # when, x and y [m] of the place that is compared next
     _course: float | None = None
     _start: tuple[float, float] = (0.0, 0.0)
@@ -34,7 +39,9 @@ class Motion:
         if not abs(mps) > MOVES_MPS:
             self.since_s = None
         elif self.since_s is None or at_s - self.newest_s > GAP_S:
-            self.since_s = at_s
+            self.since_s, self._steps = at_s, 0
+        else:
+            self._steps += 1
         self.newest_s = at_s
 
     def place(self, x_m: float, y_m: float, at_s: float, *, slowest_mps: float = MOVES_MPS) -> None:
@@ -42,27 +49,30 @@ class Motion:
         if not math.isfinite(x_m + y_m):
             return
         self.newest_s = at_s
-        if self._anchor is None or not 0.0 <= at_s - self._anchor[0] <= GAP_S:
+        if self._anchor is None or not 0.0 <= at_s - self._anchor[0] <= PLACES_S:
             self._anchor, self._course, self.since_s = (at_s, x_m, y_m), None, None
             return
         before_s, before_x, before_y = self._anchor
         if at_s - before_s < WINDOW_S:
             return
         step_x, step_y = x_m - before_x, y_m - before_y
-        course = math.atan2(step_y, step_x)
+        step_m, course = math.hypot(step_x, step_y), math.atan2(step_y, step_x)
         is_straight = self._course is None or abs(turned(course, self._course)) <= STRAIGHT_RAD
-        if math.hypot(step_x, step_y) <= slowest_mps * (at_s - before_s) or not is_straight:
+        if not slowest_mps < step_m / (at_s - before_s) <= FASTEST_MPS or not is_straight:
             self.since_s = self._course = None
         else:
             self._course = course
             if self.since_s is None:
                 self.since_s, self._start = before_s, (before_x, before_y)
+                self._steps, self._largest_m = 0, 0.0
+            self._steps += 1
+            self._largest_m = max(self._largest_m, step_m)
         self._anchor = (at_s, x_m, y_m)
-        self.way_m = math.hypot(x_m - self._start[0], y_m - self._start[1])
+        self.way_m = math.hypot(x_m - self._start[0], y_m - self._start[1]) - self._largest_m
 
     def is_long(self, at_s: float, zero_since_s: float, *, within_s: float, least_m: float = 0.0) -> bool:
         """Whether it has lasted long since `zero_since_s`, and still does."""
-        if self.since_s is None or at_s - self.newest_s > within_s:
+        if self.since_s is None or self._steps < LEAST_STEPS or at_s - self.newest_s > within_s:
             return False
         return at_s - max(self.since_s, zero_since_s) >= LONG_S and self.way_m >= least_m
 
@@ -72,9 +82,9 @@ def is_lost(pose: Mapping[str, Any]) -> bool:
     return _first(pose.get("covariance")) > LOST_M2
 
 
-def least_way_m(fix: Mapping[str, Any]) -> float:
-    """The way between positions (sensor_msgs/NavSatFix) that is more than the wander of their receiver."""
-    variance_m2 = _first(fix.get("position_covariance"))
+def least_way_m(covariance: Any) -> float:
+    """The way between positions of this covariance that is more than the wander of their receiver."""
+    variance_m2 = _first(covariance)
     return max(FIX_LEAST_M, FIX_SIGMAS * math.sqrt(variance_m2)) if variance_m2 > 0.0 else FIX_LEAST_M
 
 

@@ -1,43 +1,12 @@
-"""Ways and directions by positions: whether a pose moves, the course over ground."""
+"""Ways and directions by positions, and whether two speeds are the same."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
-HAS_MOVED_M = 1.0
-GAP_S = 3.0  # between two poses of one way
+GAP_S = 3.0  # between two values of one motion
 FASTEST_MPS = 80.0  # a step that is faster is a jump of the estimate
 METRES_A_DEGREE = 111_200.0
-
-
-@dataclass(slots=True)
-class Way:
-    """The way of a pose from its first message on, without its largest step: one jump of an estimate is no motion."""
-
-    at_s: float | None = None
-    x_m: float = 0.0  # of the newest pose
-    y_m: float = 0.0
-    made_m: tuple[float, float] = (0.0, 0.0)
-    largest_m: tuple[float, float] = (0.0, 0.0)
-    has_moved: bool = False  # more than HAS_MOVED_M
-
-    def add(self, x_m: float, y_m: float, at_s: float) -> None:
-        """A further pose; what is not a number is left out."""
-        if not math.isfinite(x_m + y_m):
-            return
-        before_s, step = self.at_s, (x_m - self.x_m, y_m - self.y_m)
-        self.at_s, self.x_m, self.y_m = at_s, x_m, y_m
-        if before_s is not None and at_s - before_s > GAP_S:
-            self.made_m = self.largest_m = (0.0, 0.0)  # how it came here was not seen
-            return
-        if before_s is None or not math.hypot(*step) <= FASTEST_MPS * max(0.01, at_s - before_s):
-            return
-        self.made_m = (self.made_m[0] + step[0], self.made_m[1] + step[1])
-        if math.hypot(*step) > math.hypot(*self.largest_m):
-            self.largest_m = step
-        rest = (self.made_m[0] - self.largest_m[0], self.made_m[1] - self.largest_m[1])
-        self.has_moved |= math.hypot(*rest) > HAS_MOVED_M
 
 
 def is_same(one_mps: float, other_mps: float) -> bool:

@@ -164,9 +164,33 @@ def test_a_twist_that_is_along_the_car_alone_has_its_axes_whatever_its_frame(
     sent = driving(course_rad, 0.0)
     sent["twist"]["twist"]["linear"] = vector(np.array([speed_mps, 0.0, 0.0]))
     message, why = in_body_axes(Frames(), "/odom", "nav_msgs/Odometry", sent)
-    assert why is None
-    if abs(math.sin(course_rad)) > 1e-5:
+    is_along_one_axis = abs(math.sin(course_rad)) > 1e-5
+    assert why is None or (math.cos(course_rad) < 0.0 and not is_along_one_axis)
+    if is_along_one_axis:
         assert twist_of_odometry(message).speed_mps == speed_mps
+
+
+@pytest.mark.parametrize("speed_mps", [7.0, -0.5])
+@pytest.mark.parametrize("course_deg", [0, 90, 180, -180, 270])
+def test_along_the_car_and_along_the_ground_at_once_it_is_a_speed_only_if_both_have_one_sign(
+    course_deg: int, speed_mps: float
+) -> None:
+    """Driving west, the rounding of the orientation leaves nothing that tells the axes apart."""
+    sent = driving(math.radians(course_deg), 0.0)
+    sent["twist"]["twist"]["linear"] = vector(np.array([speed_mps, 0.0, 0.0]))
+    message, why = in_body_axes(Frames(), "/odom", "nav_msgs/Odometry", sent)
+    if abs(course_deg) == 180:
+        words = "its twist is in odom or in the axes of the car, which point the other way"
+        assert why == f"its axes are not known: {words}"
+    else:
+        assert why is None
+        assert twist_of_odometry(message).speed_mps == pytest.approx(speed_mps)
+
+
+def test_a_twist_of_the_ground_that_moves_west_and_not_exactly_is_known() -> None:
+    message, why = in_body_axes(Frames(), "/odom", "nav_msgs/Odometry", driving(math.pi, 7.0))
+    assert why is None
+    assert twist_of_odometry(message).speed_mps == pytest.approx(7.0)
 
 
 @pytest.mark.parametrize(

@@ -193,7 +193,7 @@ def test_a_velocity_that_follows_the_course_over_ground_is_read_without_a_sign(c
 
 
 def test_an_odometry_whose_twist_is_never_filled_gives_no_speed() -> None:
-    rows = [("/a/pose", odometry(n * 0.4, 0.0), n / 10) for n in range(20)]
+    rows = [("/a/pose", odometry(n * 0.4, 0.0), n / 10) for n in range(60)]
     alone = choose({"/a/pose": ODOM}, evidence=shown({"/a/pose": ODOM}, *rows))
     assert alone.undecided == {"speed": "/a/pose has no speed: its twist is zero while its pose moves"}
     assert alone.refused == {"speed"}
@@ -210,8 +210,8 @@ def test_an_odometry_whose_twist_is_never_filled_gives_no_speed() -> None:
     [
         ([0.0] * 20, [0.0] * 20),  # stands
         ([0.3] * 10 + [3.3] * 10, [0.0] * 20),  # one jump of an estimate is no motion
-        ([n * 0.4 for n in range(20)], [0.0] * 19 + [0.1]),  # filled at last
-        ([n * 0.4 for n in range(20)], [math.nan] * 20),  # states itself that it is not known
+        ([n * 0.4 for n in range(60)], [0.0] * 59 + [0.1]),  # filled at last
+        ([n * 0.4 for n in range(60)], [math.nan] * 60),  # states itself that it is not known
     ],
 )
 def test_what_may_yet_be_filled_is_accepted(ways: list[float], speeds: list[float]) -> None:
@@ -352,7 +352,7 @@ def test_the_choice_depends_on_no_order_and_every_source_has_a_reason(seed: int)
 
 
 def test_a_twist_that_only_turns_is_not_filled() -> None:
-    turning = [odometry(float(n), 0.0) for n in range(6)]
+    turning = [odometry(float(n), 0.0) for n in range(40)]
     for message in turning:
         message["twist"]["twist"]["angular"]["z"] = 0.1
     evidence = shown({"/odom": ODOM}, *[("/odom", one, n * 0.1) for n, one in enumerate(turning)])

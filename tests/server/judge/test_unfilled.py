@@ -86,9 +86,11 @@ def test_beside_poses_without_a_twist_there_is_no_speed(zero: tuple[str, str]) -
     topics = dict([zero, ("/lio/odom", ODOM)])
     evidence = driven(topics, zero, ("/lio/odom", ODOM), mps=0.0, seconds=0.2)
     for n in range(100):
-        evidence.receive("/lio/odom", odometry(n * 0.5, 0.0), 1.0 + n / 10)
+        evidence.receive("/lio/odom", odometry(n * 1.5, 0.0), 1.0 + n / 10)
         evidence.receive(zero[0], ZERO[zero[1]], 1.0 + n / 10)
     choice = choose(topics, evidence=evidence)
+    assert [one.topic for one in choice.watched["speed"]] == [zero[0], "/lio/odom"], "they may yet be filled"
+    assert choice.questions == ()
     assert choice.undecided["speed"] == f"{zero[0]}, /lio/odom have no speed: they are zero while the car moves"
 
 

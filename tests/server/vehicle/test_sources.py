@@ -7,6 +7,7 @@ import contextlib
 import math
 import time
 from collections.abc import AsyncIterator, Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,10 @@ Publish = Callable[[RosBridge, float], None]
 
 
 @contextlib.asynccontextmanager
-async def car(topics: dict[str, str], publish: Publish, hz: float = 20.0) -> AsyncIterator[tuple[RosBridge, str]]:
-    """A car that publishes on these topics until the block ends, and a server that watches it."""
+async def car(
+    topics: dict[str, str], publish: Publish, hz: float = 20.0, data: Path | None = None
+) -> AsyncIterator[tuple[RosBridge, str]]:
+    """A car that publishes on these topics and a server that watches it and records into `data`."""
     bridge = RosBridge(ros_version=1, now=time.time)
     port = await bridge.start("127.0.0.1", 0)
     for topic, kind in topics.items():
@@ -41,7 +44,9 @@ async def car(topics: dict[str, str], publish: Publish, hz: float = 20.0) -> Asy
 
     task = asyncio.create_task(drive())
     try:
-        async with serving(Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{port}"),))) as base:
+        async with serving(
+            Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{port}"),), data=data)
+        ) as base:
             yield bridge, base
     finally:
         task.cancel()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+from pathlib import Path
+
 import pytest
 
 from server.rosbridge_server.server import RosBridge
@@ -51,3 +54,39 @@ async def test_a_receiver_that_is_dead_from_the_start_is_an_alarm_and_leaves_wit
         state = await one.state(lambda s: any(alarm["id"] == "position_receiver" for alarm in s["alarms"]), within_s=60)
         (alarm,) = [alarm for alarm in state["alarms"] if alarm["id"] == "position_receiver"]
         assert "Nothing from /receiver/fix for" in str(alarm)
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize(
+    ("topic", "kind", "is_picked", "is_recorded"),
+    [
+        ("/vel", TWIST, True, True),
+        ("/vel", TWIST, False, False),
+        ("/speed", FLOAT, True, False),
+        ("/speed", FLOAT, False, True),
+    ],
+)
+async def test_a_speed_that_was_refused_is_taken_once_it_is_filled(
+    tmp_path: Path, topic: str, kind: str, is_picked: bool, is_recorded: bool
+) -> None:
+    """Beside an odometry, where the operator chose it; beside poses that go far, where nobody did."""
+    filled: list[bool] = []
+    other, mps = ("/odom", 4.0) if is_picked else ("/lio/odom", 20.0)
+
+    def publish(bridge: RosBridge, at_s: float) -> None:
+        shown = mps if filled else 0.0
+        bridge.publish(topic, twist(shown) if kind == TWIST else {"data": shown})
+        bridge.publish(other, odometry(mps * max(0.0, at_s - STANDS_S), mps if is_picked and at_s > STANDS_S else 0.0))
+
+    data = tmp_path if is_recorded else None
+    async with car({topic: kind, other: ODOM}, publish, data=data) as (_, base), viewer(base) as one:
+        await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
+        if is_picked:
+            await one.ask(kind="set", topics={"speed": topic})
+        state = await one.state(lambda s: "no speed" in (s["signals"]["speed"]["note"] or ""), within_s=60.0)
+        assert (state["signals"]["speed"]["topic"], state["questions"]) == (None, [])
+        assert state["recording"]["state"] == ("recording" if is_recorded else "off")
+        await asyncio.sleep(20.0)
+        filled.append(True)
+        state = await one.state(lambda s: s["signals"]["speed"]["topic"] == topic)
+        state = await one.state(lambda s: (s["signals"]["speed"]["value"] or {}).get("speed_mps") == mps)
