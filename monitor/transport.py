@@ -71,6 +71,7 @@ class _Topic:
         "delay_s",
         "excess_s",
         "first",
+        "is_given",
         "marks",
         "older_s",
         "period_s",
@@ -91,6 +92,7 @@ class _Topic:
         self.excess_s: float | None = None  # later by the clock of ROS than by the pings; None: it is not known
         self.first: tuple[float, float | None] | None = None  # when the only message came, and its stamp
         self.older_s = 0.0  # how old the newest message was when it came, where that is not due to its transport
+        self.is_given = False  # it had such a message, on any connection
         self.stamped = 0  # messages with a stamp on this connection
 
     def restart(self) -> None:
@@ -198,7 +200,13 @@ class TransportDelay:
         """The bridge sent a message again that came `age_s` ago."""
         known = self._topics.get(topic)
         if known is not None:
-            known.older_s, known.first = age_s, None
+            known.older_s, known.first, known.is_given = age_s, None, True
+
+    def is_new(self, topic: str) -> None:
+        """A new message came, of a topic that may not be judged."""
+        known = self._topics.get(topic)
+        if known is not None:
+            known.older_s = 0.0
 
     def older(self) -> dict[str, tuple[float, float]]:
         """Topics of which one message came on this connection: when it came, and how old it was then by all that is
@@ -272,7 +280,7 @@ class TransportDelay:
         return {
             name: max(topic.delay_s, topic.older_s)
             for name, topic in self._topics.items()
-            if topic.at_s is not None or topic.older_s
+            if topic.at_s is not None or topic.is_given
         }
 
     def queued_s(self, now_s: float) -> float:
@@ -282,6 +290,10 @@ class TransportDelay:
     def waiting_s(self, now_s: float) -> float:
         """Since the oldest ping was sent that is not answered yet."""
         return now_s - self._unanswered[0] if self._unanswered else 0.0
+
+    def answer_s(self, now_s: float) -> float:
+        """The most that the answer to something sent takes now, by all that is known."""
+        return max(self._longest_trip_s, self.waiting_s(now_s))
 
     def read_s(self, sent_s: float) -> float | None:
         """When the bridge was known to have read what was sent then: the first answer to a ping behind it, of those

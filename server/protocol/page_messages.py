@@ -20,6 +20,9 @@ class PageHello(TypedDict):
     have_event: NotRequired[Annotated[int | None, doc("number of the newest event that the page has")]]
     boot: NotRequired[Annotated[str | None, doc("of the server that it is of")]]
     name: NotRequired[Annotated[str, doc("what its operator calls it")]]
+    build: NotRequired[
+        Annotated[str, doc('which page it is; "" for single modules. One that names none gets former names of phases')]
+    ]
     page: NotRequired[
         Annotated[str, doc("what it calls itself, kept over reloads; without it the server gives it one")]
     ]

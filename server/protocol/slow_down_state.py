@@ -9,7 +9,7 @@ from typing_extensions import TypedDict
 from server.protocol.doc import doc
 
 SlowDownPhase = Literal["not_available", "not_armed", "armed", "ordered", "holding"]
-FORMER_PHASES: dict[str, SlowDownPhase] = {"safe": "not_armed"}  # as older agents state them
+FORMER_PHASES: dict[str, SlowDownPhase] = {"safe": "not_armed"}  # as older agents state them, and older pages know them
 GuardPhase = Literal["unguarded", "guarded", "operator", "slowing", "holding"]
 
 

@@ -3,7 +3,8 @@
 A subscription is given what a publisher keeps, at once. A message like the newest one that comes after a renewal may be
 that sample, or one that was published with the same content. It is therefore held, and the topic subscribed to once
 more: what a publisher keeps is given each time, what it published is not. Without such an answer the message is
-recorded late, with its delay: no message is lost, and a kept sample is recorded once.
+recorded late, with its delay. With enough of them it is dropped only after a while without a new message: a topic that
+goes on gives what looks like answers. No message is lost, and a kept sample is recorded once where nothing new comes.
 
 Pure: time is an argument, on a monotonic clock in seconds.
 """
@@ -11,26 +12,29 @@ Pure: time is an argument, on a monotonic clock in seconds.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
-ANSWERED_WITHIN_S = 0.3  # of what comes later it is not known whether the subscription gave it
-UNANSWERED_AFTER_S = 5.0
+ANSWERED_WITHIN_S = 0.3  # and a round trip: of what comes later it is not known whether the subscription gave it
+SETTLED_AFTER_S = 5.0  # without an answer, or without something new
 LEAST_ANSWERS, MOST_ANSWERS = 2, 6
 CHANCE = 0.01  # that so many answers are new messages of a topic that goes on
 QUIET_PERIODS = 5  # a topic that is silent for so long does not go on
+GOES_ON, GOES_ON_S = 5, 0.5  # intervals: what comes later is not of a topic whose messages look like answers
 MOST_HELD, MOST_HELD_BYTES = 500, 8_000_000
 
 
-def answers_needed(period_s: float | None, silent_s: float) -> int | None:
+def answers_needed(period_s: float | None, silent_s: float, within_s: float = ANSWERED_WITHIN_S) -> int | None:
     """How many answers prove that a publisher keeps its sample; None: the topic is too fast to tell.
 
-    `period_s`: its usual interval, None: not known; `silent_s`: since its newest message.
+    `period_s`: its usual interval, None: not known; `silent_s`: since its newest message; `within_s`: in which an
+    answer comes.
     """
-    if period_s is None or silent_s >= QUIET_PERIODS * period_s:
+    if not period_s or silent_s >= max(QUIET_PERIODS * period_s, SETTLED_AFTER_S):
         return LEAST_ANSWERS
-    by_chance = ANSWERED_WITHIN_S / max(period_s, ANSWERED_WITHIN_S / 2)
+    by_chance = within_s / max(period_s, within_s / 2)
     if by_chance >= 1.0:
         return None
     needed = math.ceil(math.log(CHANCE) / math.log(by_chance))
@@ -44,6 +48,7 @@ class Held:
     message: Any
     size: int
     at_s: float
+    first_s: float  # when the same message came first
 
 
 @dataclass(slots=True)
@@ -52,6 +57,7 @@ class _Doubt:
     held: list[Held]
     answers: int = 0
     probed_s: float = -math.inf
+    is_kept: bool = False  # it had its answers: what is held is dropped, if nothing new comes
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +66,6 @@ class Verdict:
 
     record: tuple[Held, ...] = ()
     probes: bool = False
-    is_kept: bool = False  # it is a sample that its publisher keeps
 
 
 @dataclass(slots=True)
@@ -70,42 +75,62 @@ class Doubtful:
     _doubts: dict[str, _Doubt] = field(default_factory=dict)
     _bytes: int = 0
 
-    def came(self, topic: str, one: Held, needed: int | None) -> Verdict:
+    def subscribed(self, topic: str, at_s: float) -> None:
+        """A subscription to a topic was sent."""
+        doubt = self._doubts.get(topic)
+        if doubt is not None:
+            doubt.probed_s = at_s
+
+    def came(self, topic: str, one: Held, needed: int | None, within_s: float = ANSWERED_WITHIN_S) -> Verdict:
         """A message of which it is not known whether it is new. `needed`: as `answers_needed` gives it."""
         doubt = self._doubts.get(topic)
-        if doubt is None and (needed is None or self._is_full(one.size)):
-            return Verdict(record=(one,))
         if doubt is None:
-            doubt = self._doubts[topic] = _Doubt(needed or LEAST_ANSWERS, [])
-        elif one.at_s - doubt.probed_s > ANSWERED_WITHIN_S:
+            if needed is None or len(self._doubts) >= MOST_HELD or self._is_full(one.size):
+                return Verdict(record=(one,))
+            doubt = self._doubts[topic] = _Doubt(needed, [])
+        elif self._is_full(one.size) or not (doubt.is_kept or one.at_s - doubt.probed_s <= within_s):
             return Verdict(record=(*self.settled(topic), one))
         else:
             doubt.answers += 1
-        if doubt.answers >= doubt.needed:
-            self.settled(topic)
-            return Verdict(is_kept=True)
         doubt.held.append(one)
         doubt.probed_s = one.at_s
+        doubt.is_kept = doubt.is_kept or doubt.answers >= doubt.needed
         self._bytes += one.size
-        return Verdict(probes=True)
+        return Verdict(probes=not doubt.is_kept)
+
+    def came_new(self, topic: str, one: Held, is_same: Callable[[Any, Any], bool]) -> tuple[Held, ...]:
+        """What is held of a topic and to be recorded, once: something new came of it. Another content, long after the
+        answers, says nothing of those."""
+        doubt, held = self._doubts.get(topic), self.settled(topic)
+        if doubt is None or not doubt.is_kept:
+            return held
+        interval_s = max(later.at_s - sooner.at_s for sooner, later in pairwise(held))
+        goes_on = one.at_s - held[-1].at_s <= max(GOES_ON * interval_s, GOES_ON_S)
+        return held if goes_on or is_same(held[0].message, one.message) else ()
 
     def settled(self, topic: str) -> tuple[Held, ...]:
-        """What is held of a topic, once: something new came of it, or it cannot be subscribed to again."""
+        """What is held of a topic, once."""
         doubt = self._doubts.pop(topic, None)
         if doubt is None:
             return ()
         self._bytes -= sum(one.size for one in doubt.held)
         return tuple(doubt.held)
 
-    def overdue(self, now_s: float) -> Iterator[tuple[str, Held]]:
-        """What was not given again."""
-        for topic in [one for one, doubt in self._doubts.items() if now_s - doubt.probed_s > UNANSWERED_AFTER_S]:
-            yield from ((topic, one) for one in self.settled(topic))
+    def overdue(self, now_s: float, *, is_heard: bool) -> Iterator[tuple[str, tuple[Held, ...]]]:
+        """Topics that were not given again, or of which nothing new came, and what of each is to be recorded; none of
+        it: its publisher keeps its sample. `is_heard`: something new could have come."""
+        for topic, doubt in list(self._doubts.items()):
+            if not is_heard:
+                doubt.is_kept = False
+            if now_s - doubt.held[-1].at_s > SETTLED_AFTER_S:
+                held = self.settled(topic)
+                yield topic, () if doubt.is_kept else held
 
     def all(self) -> Iterator[tuple[str, Held]]:
-        """What is held, once: a part of the recording ends."""
-        for topic in list(self._doubts):
-            yield from ((topic, one) for one in self.settled(topic))
+        """What is held and to be recorded, once: a part of the recording ends."""
+        for topic, doubt in list(self._doubts.items()):
+            held = self.settled(topic)
+            yield from ((topic, one) for one in held if not doubt.is_kept)
 
     def _is_full(self, size: int) -> bool:
-        return len(self._doubts) >= MOST_HELD or self._bytes + size > MOST_HELD_BYTES
+        return self._bytes + size > MOST_HELD_BYTES

@@ -15,11 +15,11 @@ from server.slowdown.command_target import GUARD_STATE
 from server.slowdown.controller import SlowDownController
 from server.vehicle import car_marks
 from server.vehicle.connection import Connection
-from server.vehicle.doubtful import Doubtful, Held
+from server.vehicle.doubtful import ANSWERED_WITHIN_S, Doubtful, Held, answers_needed
 from server.vehicle.judgement import Judgement
 from server.vehicle.marks import Marks
 from server.vehicle.scan_feed import ScanFeed
-from server.vehicle.sent_again import Arrival, SentAgain
+from server.vehicle.sent_again import Arrival, SentAgain, is_same
 from server.vehicle.tick_parts import TickParts
 from server.vehicle.transform_pace import TransformPace
 from server.vehicle.undelivered import CLIENT_COUNT
@@ -71,7 +71,9 @@ class MessageIntake:
 
     def subscribed(self, topic: str) -> None:
         """A subscription to a topic was sent: what the bridge kept of it may come again."""
-        self._sent_again.subscribed(topic, self._now())
+        now_s = self._now()
+        self._sent_again.subscribed(topic, now_s)
+        self._doubtful.subscribed(topic, now_s)
 
     def link_opened(self) -> None:
         """The car's messages come from the beginning, also those that are sent once."""
@@ -106,7 +108,7 @@ class MessageIntake:
         arrival = self._arrived(connection, frame.topic, frame, size, now_s)
         if plain_type(topics.others.get(frame.topic, "")) not in OF_ANY_NODE and not (arrival and arrival.is_repeat):
             self._judgement.other_message_s = now_s
-        if is_recorded and self._is_to_record(connection, frame.topic, Held(frame, size, now_s), arrival):
+        if is_recorded and self._is_to_record(connection, frame.topic, _held(frame, size, now_s, arrival), arrival):
             self._record(connection, frame.topic, frame, now_s, size)
         return True
 
@@ -125,7 +127,8 @@ class MessageIntake:
         if topic in topics.table.transforms:
             self._transforms_received(connection, topic, message, arrival, now_s)
             return
-        if connection.link is not None and self._is_to_record(connection, topic, Held(message, size, now_s), arrival):
+        one = _held(message, size, now_s, arrival)
+        if connection.link is not None and self._is_to_record(connection, topic, one, arrival):
             self._record(connection, topic, message, now_s, size)
         if is_button or self._slow_down.receive(topic, message) or topics.took(topic, message):
             return
@@ -163,7 +166,7 @@ class MessageIntake:
         is_in_part = is_repeat and is_static(topic) and self._recording.holds(topic, message)
         if connection.link is not None and not is_in_part:
             size = connection.link.frame_bytes
-            if self._is_to_record(connection, topic, Held(message, size, now_s), arrival):
+            if self._is_to_record(connection, topic, _held(message, size, now_s, arrival), arrival):
                 self._record(connection, topic, message, now_s, size)
         if is_static(topic):
             self._recording.hold(topic, kind, message)
@@ -189,28 +192,34 @@ class MessageIntake:
         sample = arrival.sample
         if arrival.is_repeat and sample.part == part and not arrival.may_be_new:
             if arrival.is_doubtful:
-                self._doubt(connection, topic, one, arrival.answers_needed)
+                self._doubt(connection, topic, one, arrival)
             return False
         if arrival.is_repeat and sample.part != part:
             self._judgement.transport.given(topic, one.at_s - sample.first_s)
-        self._record_late(connection, topic, *self._doubtful.settled(topic))
+        self._record_late(connection, topic, *self._doubtful.came_new(topic, one, is_same))
+        if not arrival.is_repeat:
+            self._judgement.transport.is_new(topic)
         sample.part = part
         return True
 
-    def _doubt(self, connection: Connection, topic: str, one: Held, needed: int | None) -> None:
+    def _doubt(self, connection: Connection, topic: str, one: Held, arrival: Arrival) -> None:
         """Another subscription shows whether a message was published now, or is what its publisher keeps."""
-        verdict = self._doubtful.came(topic, one, needed)
+        within_s = ANSWERED_WITHIN_S + self._judgement.transport.answer_s(one.at_s)
+        needed = answers_needed(arrival.period_s, arrival.silent_s, within_s)
+        verdict = self._doubtful.came(topic, one, needed, within_s)
         self._record_late(connection, topic, *verdict.record)
-        if verdict.is_kept:
-            self._sent_again.is_kept(topic)
-        elif verdict.probes and not connection.subscriptions.table.probe(topic):
+        if verdict.probes and not connection.subscriptions.table.probe(topic):
             self._record_late(connection, topic, *self._doubtful.settled(topic))
 
     def tick(self, now_s: float) -> None:
         """Records what was in doubt and is not any more."""
-        if self._connection is not None:
-            for topic, one in self._doubtful.overdue(now_s):
-                self._record_late(self._connection, topic, one)
+        connection = self._connection
+        if connection is None:
+            return
+        for topic, held in self._doubtful.overdue(now_s, is_heard=connection.bridge_answers(now_s)):
+            self._record_late(connection, topic, *held)
+            if not held:
+                self._sent_again.is_kept(topic)
 
     def settle(self) -> None:
         """A part of the recording ends: what is in doubt belongs into it."""
@@ -219,11 +228,10 @@ class MessageIntake:
                 self._record_late(self._connection, topic, one)
 
     def _record_late(self, connection: Connection, topic: str, *held: Held) -> None:
-        """Records messages that were in doubt, with their delay."""
+        """Records messages that were in doubt, as old as their age is shown: only something new makes it anew."""
         now_s = self._now()
         for one in held:
-            if one.at_s < now_s:
-                self._judgement.transport.given(topic, now_s - one.at_s)
+            self._judgement.transport.given(topic, now_s - one.first_s)
             self._record(connection, topic, one.message, now_s, one.size)
 
     def _show_scan(self, message: Any, now_s: float) -> None:
@@ -246,3 +254,7 @@ class MessageIntake:
             self._recording.take(topic, topics.type_of(topic), message, now_s, size)
 
         self._tick_parts.attempt(RECORDING, take)
+
+
+def _held(message: Any, size: int, now_s: float, arrival: Arrival | None) -> Held:
+    return Held(message, size, now_s, now_s if arrival is None else arrival.sample.first_s)

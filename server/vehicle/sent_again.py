@@ -23,7 +23,6 @@ import numpy as np
 from server.judge.message_fields import stamp_s
 from server.rosbridge.codec import Unreadable
 from server.rosbridge.raw_frame import RawFrame
-from server.vehicle.doubtful import answers_needed
 
 GIVEN_WITHIN_S = 5.0  # after it has read a subscription, a bridge of ROS 2 needs some time to get the kept sample
 TWICE_WITHIN_S = 0.1  # a message that a bridge sends twice
@@ -57,7 +56,7 @@ class _Topic:
     newest_s: float = -math.inf
     period_s: float | None = None
     steady: int = 0  # gaps in a row of about this period
-    is_kept: bool = False  # its publisher gave the newest sample to each subscription
+    is_kept: bool = False  # its publisher gave the newest sample to each subscription, and nothing new came since
 
     def came(self, at_s: float) -> None:
         gap_s = at_s - self.newest_s
@@ -82,7 +81,8 @@ class Arrival:
     is_repeat: bool = False
     may_be_new: bool = False  # a repeat without a stamp that came when a new message was due
     is_doubtful: bool = False  # a repeat without a stamp, of a topic whose publisher is not known to keep a sample
-    answers_needed: int | None = None  # as of doubtful.py, for one that is
+    period_s: float | None = None  # usual interval of the topic, for one that is; None: not known
+    silent_s: float = 0.0  # since its newest message
 
 
 class SentAgain:
@@ -114,7 +114,7 @@ class SentAgain:
             known.was_given = True
             found.sample.expected -= 1
             for other in known.samples:
-                if other is not found.sample and other.expected and _same(other.content, found.sample.content):
+                if other is not found.sample and other.expected and is_same(other.content, found.sample.content):
                     other.expected = 0  # one message that was sent many times is kept once by its publisher
             return found
         if known.subscribed_s is None or at_s - known.subscribed_s > EXPECTED_S:
@@ -123,7 +123,7 @@ class SentAgain:
         sample = Sample(_content(message, size), size, at_s)
         if known.is_first and known.samples and not known.was_given:
             sample.expected = 1  # it may come twice
-        known.is_first = False
+        known.is_first = known.is_kept = False
         known.came(at_s)
         self._keep(known, sample)
         return Arrival(sample)
@@ -133,7 +133,7 @@ class SentAgain:
             return None
         content = _content(message, size)
         for sample in reversed(known.samples):
-            if sample.expected and _same(sample.content, content):
+            if sample.expected and is_same(sample.content, content):
                 if _is_stamped(message, size):
                     return Arrival(sample, is_repeat=True)
                 if sample is known.samples[-1] and self._may_be_given(known, sample, at_s):
@@ -169,7 +169,8 @@ def _unstamped(known: _Topic, sample: Sample, at_s: float) -> Arrival:
         is_repeat=True,
         may_be_new=known.is_due(at_s),
         is_doubtful=not known.is_kept,
-        answers_needed=answers_needed(known.period_s, at_s - known.newest_s),
+        period_s=known.period_s,
+        silent_s=at_s - known.newest_s,
     )
 
 
@@ -196,7 +197,7 @@ def _is_stamped(message: Any, size: int) -> bool:
     )
 
 
-def _same(one: Any, other: Any) -> bool:
+def is_same(one: Any, other: Any) -> bool:
     """Whether two messages have the same content, whatever they were encoded as."""
     if one is None or other is None:
         return False

@@ -123,7 +123,7 @@ class Page:
                 self._writer.watch_scan(message.get("scan") is True)
             case "hello":
                 await self._commands.begin(message)
-                self._writer.begin(message.get("have_event"))
+                self._writer.begin(message.get("have_event"), is_former="build" not in message)
             case "present":
                 await self._commands.present(message)
             case "replay":

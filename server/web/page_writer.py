@@ -19,6 +19,7 @@ from server.protocol import messages
 from server.protocol.alarm_state import LogEvent
 from server.protocol.messages import FrameKind, Hello
 from server.replay.view_source import ViewSource
+from server.web import former_page
 from server.web.event_feed import EventFeed
 from server.web.fair_wakeup import FairWakeup
 
@@ -68,6 +69,7 @@ class PageWriter:
         self._are_events_unanswered = False
         self._is_catching_up = False  # more events wait than one message takes
         self._has_begun = False  # the page said hello
+        self._is_former = False
         self.skipped = 0  # frames that were replaced by newer ones before the page took them
 
     # -- what is new -------------------------------------------------------------------------------------------------
@@ -101,8 +103,10 @@ class PageWriter:
 
     # -- what the page answers ---------------------------------------------------------------------------------------
 
-    def begin(self, have_event: object) -> None:
-        """The page said hello, and which event is the newest that it has; only the first hello counts."""
+    def begin(self, have_event: object, *, is_former: bool = False) -> None:
+        """The page said hello, and which event is the newest that it has; only the first hello counts. `is_former`: it
+        knows the former names of phases."""
+        self._is_former = self._is_former or (is_former and not self._has_begun)
         if not self._has_begun and type(have_event) is int:
             self._have = have_event
             if self._is_greeted:
@@ -250,7 +254,8 @@ class PageWriter:
         if isinstance(frame.payload, bytes):
             await self._socket.send_bytes(frame.payload)
         else:
-            await self._socket.send_text(frame.payload)
+            is_renamed = self._is_former and kind == "state"
+            await self._socket.send_text(former_page.state(frame.payload) if is_renamed else frame.payload)
 
     async def _send(self, message: messages.ToPage | Hello | messages.Offer | messages.Events) -> None:
         await self._socket.send_text(orjson.dumps(message).decode())

@@ -141,7 +141,7 @@ async def viewer(
     async with websockets.connect(url, max_size=2**24, additional_headers=headers) as socket:
         one = Viewer(socket, name=name or "operator", page=page)
         named = {key: value for key, value in (("name", name), ("page", page)) if value}
-        await one.send({"kind": "hello", "have_event": have_event} | named)
+        await one.send({"kind": "hello", "have_event": have_event, "build": ""} | named)
         reading = asyncio.create_task(one.read())
         try:
             yield one

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import random
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from server.vehicle.doubtful import LEAST_ANSWERS, MOST_HELD, Doubtful, Held, answers_needed
+from server.recording.delay import recorded_delay
+from server.recording.read.read import open_recording
+from server.vehicle.doubtful import LEAST_ANSWERS, MOST_HELD, Doubtful, Held, Verdict, answers_needed
 from tests.server.vehicle.keeping_bridge import KeepingBridge, Topic, monitored
-from tests.world.test_kept_samples import FUEL, SPEED, drive, recorded, topics
+from tests.world.test_kept_samples import FUEL, ROUNDED_S, SPEED, TRANSPORT_S, drive, recorded, signal, topics
 
 pytestmark = [pytest.mark.world(n=27), pytest.mark.virtual_time]
 
@@ -98,8 +101,80 @@ async def test_a_kept_switch_is_recorded_once_and_anew_when_it_is_published_agai
     assert recorded(tmp_path, SWITCH) == [[True, True]]
 
 
+def late(folder: Path, topic: str) -> list[tuple[float, float]]:
+    """When each message of a topic was recorded, since the first one, and how old it was then [s]."""
+    [path] = folder.rglob("*.mcap")
+    with open_recording([path]) as recording:
+        delay = recorded_delay(recording)
+        assert delay is not None
+        times = [at_s - recording.start_s for at_s, name, _, _ in recording.rows() if name == topic]
+        return [(at_s - times[0], delay.receive(topic, at_s)) for at_s in times]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("silent_s", [0.3, 1.0, 5.5])
+async def test_a_constant_topic_that_goes_on_after_a_silence_is_recorded_whole(tmp_path: Path, silent_s: float) -> None:
+    """A parked car: what is published has the rhythm of answers."""
+    bridge = KeepingBridge(both(is_latched=False))
+    sent = 0
+
+    def each() -> None:
+        nonlocal sent
+        sent += 1
+        bridge.publish(SWITCH, {"data": True})
+
+    async with monitored(bridge, tmp_path):
+        await drive(bridge, 4.0, hz=20.0)
+        await drive(bridge, 3.0, each, hz=20.0)
+        for _ in range(3):
+            await drive(bridge, silent_s, hz=20.0)
+            bridge.renew(SWITCH)
+            await drive(bridge, 7.0, each, hz=20.0)
+            bridge.renew(SWITCH)
+            await drive(bridge, 1.0, each, hz=20.0)
+    assert recorded(tmp_path, SWITCH) == [[True] * sent]
+
+
+@pytest.mark.slow
+async def test_over_a_slow_link_a_kept_sample_is_recorded_once(tmp_path: Path) -> None:
+    bridge = KeepingBridge(both(is_latched=True))
+    bridge.trip_s = 0.8
+    async with monitored(bridge, tmp_path):
+        await drive(bridge, 6.0, hz=4.0)
+        bridge.publish(FUEL, {"data": 60.0})
+        for _ in range(2):
+            await drive(bridge, 9.0, hz=4.0)
+            bridge.renew(FUEL)
+        await drive(bridge, 9.0, hz=4.0)
+    assert recorded(tmp_path, FUEL) == [[60.0]]
+
+
+@pytest.mark.slow
+async def test_what_is_recorded_late_is_as_old_as_it_is_shown_and_the_next_one_is_new(tmp_path: Path) -> None:
+    bridge = KeepingBridge(both(is_latched=False))
+    async with monitored(bridge, tmp_path) as session:
+        await drive(bridge, 4.0, hz=4.0)
+        published_s = time.monotonic()
+        for topic, value in ((SWITCH, True), (FUEL, 60.0)):
+            bridge.publish(topic, {"data": value})
+        await drive(bridge, 3.0, hz=4.0)
+        for topic, value in ((SWITCH, True), (FUEL, 60.0)):
+            bridge.renew(topic)
+            bridge.publish(topic, {"data": value})
+        await drive(bridge, 6.0, hz=4.0)
+        shown_s, true_s = signal(session, "fuel")["age_s"], time.monotonic() - published_s
+        for topic, value in ((SWITCH, False), (FUEL, 50.0)):
+            bridge.publish(topic, {"data": value})
+        await drive(bridge, 1.0, hz=4.0)
+    for topic in (SWITCH, FUEL):
+        [_, (at_s, old_s), (_, new_s)] = late(tmp_path, topic)
+        assert old_s == pytest.approx(at_s, abs=0.2)
+        assert new_s < 0.2
+    assert true_s - ROUNDED_S <= shown_s <= true_s + TRANSPORT_S
+
+
 def held(at_s: float) -> Held:
-    return Held({"data": True}, 10, at_s)
+    return Held({"data": True}, 10, at_s, at_s)
 
 
 def test_a_fast_topic_is_recorded_at_once_and_a_quiet_one_needs_few_answers() -> None:
@@ -115,18 +190,51 @@ def test_a_fast_topic_is_recorded_at_once_and_a_quiet_one_needs_few_answers() ->
 def test_without_an_answer_in_time_all_are_recorded() -> None:
     doubtful = Doubtful()
     assert doubtful.came("/a", held(1.0), 2).probes
-    assert not list(doubtful.overdue(5.9))
-    assert list(doubtful.overdue(6.1)) == [("/a", held(1.0))]
-    assert not list(doubtful.overdue(20.0))
+    assert not list(doubtful.overdue(5.9, is_heard=True))
+    assert list(doubtful.overdue(6.1, is_heard=True)) == [("/a", (held(1.0),))]
+    assert not list(doubtful.overdue(20.0, is_heard=True))
     assert doubtful.came("/a", held(21.0), 2).probes
     assert doubtful.came("/a", held(22.0), 2).record == (held(21.0), held(22.0))
+
+
+def kept() -> Doubtful:
+    """It had its answers."""
+    doubtful = Doubtful()
+    assert [doubtful.came("/a", held(at_s), 2).probes for at_s in (1.0, 1.1, 1.2)] == [True, True, False]
+    return doubtful
+
+
+def test_what_had_its_answers_is_dropped_only_if_nothing_new_comes() -> None:
+    assert kept().settled("/a") == (held(1.0), held(1.1), held(1.2))
+    assert list(kept().overdue(6.3, is_heard=True)) == [("/a", ())]
+    assert not list(kept().all())
+    later = kept()
+    assert later.came("/a", held(4.0), 2) == Verdict()  # another renewal
+    assert not list(later.overdue(8.9, is_heard=True))
+    assert later.settled("/a")[-1] == held(4.0)
+
+
+def test_without_a_link_it_is_not_known_that_nothing_new_came() -> None:
+    doubtful = kept()
+    assert not list(doubtful.overdue(3.0, is_heard=False))
+    assert list(doubtful.overdue(6.3, is_heard=True)) == [("/a", (held(1.0), held(1.1), held(1.2)))]
+
+
+def test_an_answer_may_need_a_round_trip_from_when_the_subscription_was_sent() -> None:
+    doubtful = Doubtful()
+    doubtful.came("/a", held(1.0), 2)
+    doubtful.subscribed("/a", 2.0)
+    assert doubtful.came("/a", held(2.9), 2, 1.0).probes
+    assert doubtful.came("/a", held(4.0), 2, 1.0).record
+    assert answers_needed(2.0, 2.0, 1.5) is None
+    assert answers_needed(0.05, 0.3) is None  # a hiccup of the link
 
 
 def test_what_is_held_is_bounded() -> None:
     doubtful = Doubtful()
     at_once = sum(bool(doubtful.came(f"/{number}", held(1.0), 2).record) for number in range(MOST_HELD + 100))
     assert at_once == 100
-    large = Held({"data": True}, 5_000_000, 1.0)
+    large = Held({"data": True}, 5_000_000, 1.0, 1.0)
     doubtful = Doubtful()
     assert [bool(doubtful.came(name, large, 2).record) for name in ("/a", "/b")] == [False, True]
     assert list(doubtful.all()) == [("/a", large)]

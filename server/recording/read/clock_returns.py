@@ -13,6 +13,7 @@ S = 10**9  # ns
 NEAR_NS = S  # a clock that is set by hand and back by a time server is not set by the same to the millisecond
 NEAR_PART = 50  # but of a short gap only by so many-th of it
 INTERVALS = 4  # a gap is longer than its step by an interval of messages, and a step back is shorter
+CERTAIN = 3  # jumps that are not so many times as large as what they may differ by are silences
 LONGEST_RUN = 4  # steps that cancel out
 MOST_JUMPS = 1000
 
@@ -59,5 +60,6 @@ def _take_pairs(jumps: Sequence[Jump], interval_ns: int, taken: set[int], *, is_
 def _cancels(jumps: Sequence[Jump], run: Collection[int], interval_ns: int) -> bool:
     sizes = [jumps[index].by_ns for index in run]
     has_back = any(jumps[index].is_sure and jumps[index].by_ns < 0 for index in run)
-    near_ns = min(NEAR_NS, max(map(abs, sizes)) // NEAR_PART) + INTERVALS * interval_ns
-    return has_back and max(sizes) > 0 and abs(sum(sizes)) <= near_ns
+    largest_ns = max(map(abs, sizes))
+    near_ns = min(NEAR_NS, largest_ns // NEAR_PART) + min(INTERVALS * interval_ns, NEAR_NS)
+    return has_back and max(sizes) > 0 and abs(sum(sizes)) <= near_ns and largest_ns >= CERTAIN * near_ns

@@ -36,7 +36,7 @@ export class LogSync {
   /**
    * The server greets.
    * @param {Hello} hello
-   * @param {{name: string, page?: string}} self who this page is
+   * @param {{name: string, build?: string, page?: string}} self who this page is
    * @param {number} blind_s for so long nothing fresh had come
    */
   greeted(hello, self, blind_s) {

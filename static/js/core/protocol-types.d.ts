@@ -1360,6 +1360,8 @@ export interface PageHello {
   boot?: string | null;
   /** what its operator calls it */
   name?: string;
+  /** which page it is; "" for single modules. One that names none gets former names of phases */
+  build?: string;
   /** what it calls itself, kept over reloads; without it the server gives it one */
   page?: string;
 }

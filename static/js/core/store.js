@@ -233,7 +233,7 @@ export class Store extends Known {
     if (!this.greet(hello)) return;
     this.seal.greeted(hello);
     this.#clock.note(hello.time_ms, at_ms);
-    this.sync.greeted(hello, { name: this.name, ...(this.page ? { page: this.page } : {}) }, this.heard_ms === null ? 0 : this.silence_s);
+    this.sync.greeted(hello, { name: this.name, build: ownBuild(), ...(this.page ? { page: this.page } : {}) }, this.heard_ms === null ? 0 : this.silence_s);
   }
 
   /** @param {State} frame @param {number} now_ms when it came */
@@ -279,4 +279,9 @@ export class Store extends Known {
     if (isBack) this.socket.hurry();
     if (this.frame) this.painter.draw(); // before, there is nothing to cover
   }
+}
+
+/** Which build this page is of; '' for single modules: the server then uses the present names. */
+function ownBuild() {
+  return globalThis.document?.documentElement.dataset['build'] ?? '';
 }

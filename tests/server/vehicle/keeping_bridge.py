@@ -50,6 +50,7 @@ class KeepingBridge:
         self.clients = clients
         self.stuck: set[str] = set()  # topics of which each subscription is given one message, as on ROS 2
         self.is_open = False
+        self.trip_s = 0.0  # what the link needs there and back
         self.heard_s: float | None = None
         self.subscribed: list[tuple[float, str]] = []  # when each subscription was sent
         self._has_rosapi = has_rosapi
@@ -103,8 +104,8 @@ class KeepingBridge:
         while True:
             if self.is_open and self._marks is not None:
                 self.heard_s = time.monotonic()
-                self._marks.sent(self.heard_s)
-                self._marks.answered(self.heard_s, self.heard_s)
+                self._marks.sent(self.heard_s - self.trip_s)
+                self._marks.answered(self.heard_s - self.trip_s, self.heard_s)
             if CLIENT_COUNT in self.topics:
                 self.publish(CLIENT_COUNT, {"data": OWN_CLIENTS + self.clients})
             await asyncio.sleep(PING_EVERY_S)
@@ -167,7 +168,7 @@ class KeepingBridge:
         self._given.discard(row.topic)
         if self._marks is not None:
             self._marks.subscribe(row.topic, row.queue_length, row.throttle_ms / 1000)
-        asyncio.get_running_loop().call_later(GIVEN_AFTER_S, self._give, row.topic)
+        asyncio.get_running_loop().call_later(GIVEN_AFTER_S + self.trip_s, self._give, row.topic)
 
     def _give(self, topic: str) -> None:
         if topic in self._kept and topic in self._rows:

@@ -11,6 +11,7 @@ import pytest
 import websockets
 
 from server.rosbridge_server.server import RosBridge
+from server.web import former_page
 from tests.http import http_client
 from tests.server import scan_frames
 from tests.server.cars import driving
@@ -34,6 +35,27 @@ async def test_a_viewer_that_stops_reading_finds_nothing_old(bridge: RosBridge, 
         age_s = resumed_s - one.states[-1]["server"]["time_ms"] / 1000
         assert age_s < 0.06
         assert one.got_s[-1] - resumed_s < 0.11
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize("build", [{}, {"build": ""}, {"build": "b2"}])
+async def test_only_a_page_that_names_no_build_gets_former_names(
+    bridge: RosBridge, server: str, build: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    renamed: list[str] = []
+
+    def rename(payload: str) -> str:
+        renamed.append(payload)
+        return payload
+
+    monkeypatch.setattr(former_page, "state", rename)
+    async with driving(bridge), websockets.connect(server.replace("http", "ws") + "/ws") as socket:
+        one = Viewer(socket)
+        await one.send({"kind": "hello", "have_event": 0} | build)
+        async with asyncio.timeout(10.0):
+            while len(one.states) < 5:
+                await one.hear(await socket.recv())
+    assert bool(renamed) == (not build)
 
 
 @pytest.mark.virtual_time

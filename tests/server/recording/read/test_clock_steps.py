@@ -142,6 +142,20 @@ def test_a_gap_is_a_step_where_another_step_takes_it_back(jumps: list[Jump], exp
     assert returned(jumps, 0) == expected
 
 
+@pytest.mark.parametrize(("silence_s", "back_s"), [(4.0, 1.0), (6.0, 2.5), (9.0, 6.0), (2.5, 1.5), (3.0, 3.0)])
+def test_where_messages_are_rare_a_silence_that_is_not_as_long_as_a_step_stays_one(
+    silence_s: float, back_s: float
+) -> None:
+    """With a message a second."""
+    assert not returned([jump(silence_s), jump(-back_s)], S)
+    assert not returned([jump(-back_s), jump(silence_s)], S)
+
+
+def test_where_messages_are_rare_a_step_is_taken_back() -> None:
+    assert returned([jump(30.7), jump(-29.5)], S) == {0}
+    assert returned([jump(301.0), jump(-299.2)], S) == {0}
+
+
 def test_a_drive_with_thousands_of_gaps_is_compared_in_time() -> None:
     chance = random.Random(1)
     jumps = [jump(chance.uniform(2.0, 5000.0) * (-1 if n % 10 == 0 else 1)) for n in range(20_000)]
