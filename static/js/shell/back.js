@@ -1,9 +1,11 @@
 // Back closes what is open and then leads to the first tab; only where nothing is open does it leave the page. While there is
 // something to close, an entry of the history that shows the same (`over`) is what Back takes away.
 
-import { listen } from '../core/dom.js';
+import { listen, need } from '../core/dom.js';
+import { isAsked } from './sheet.js';
 
-const OPEN = 'dialog[open]:not([data-docked])'; // what is docked covers nothing
+const OPEN = 'dialog[open]:not([data-docked], [data-slot] > dialog)'; // what is docked or stands in its pane covers nothing
+const BOARDS = '.drive-board, .saved-board';
 
 /**
  * Whether the history needs an entry for Back to take away.
@@ -21,7 +23,7 @@ export function mount(monitor, tabs) {
   const back = new Back(monitor, tabs, navigation);
   const [opened, made, front] = [0, 1, 2].map(() => new MutationObserver(() => back.look())); // one target, one set of options each
   opened?.observe(document.body, { subtree: true, attributeFilter: ['open'] });
-  made?.observe(document.body, { childList: true }); // a sheet that is taken away while it is open
+  for (const place of [document.body, need(monitor, '.view')]) made?.observe(place, { childList: true }); // a board, or a sheet that is taken away while it is open
   front?.observe(monitor, { attributeFilter: ['data-front', 'data-over', 'hidden'] });
   const stop = listen(window, 'popstate', (event) => back.popped(event), { capture: true });
   return () => {
@@ -30,7 +32,7 @@ export function mount(monitor, tabs) {
   };
 }
 
-/** @typedef {{currentEntry: {index: number} | null}} Navigated */
+/** @typedef {{currentEntry: {index: number} | null, entries: () => {url: string | null}[]}} Navigated */
 
 class Back {
   /** Open dialogs, the last opened last. @type {HTMLDialogElement[]} */
@@ -38,8 +40,8 @@ class Back {
   #index;
   /** Why the history goes back, where it is by this module. @type {'tidying' | 'leaving' | null} */
   #own = null;
-  /** A screen or a board lay over the page, when all was at rest last. */
-  #isCovered = false;
+  /** A screen or a board lay over the page, when all was at rest last: a screen hears of Back before this module. */
+  #wasCovered = false;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   #timer;
 
@@ -61,6 +63,11 @@ class Back {
     return Boolean(this.monitor.hidden) || this.tabs.index === 0;
   }
 
+  /** A screen or a board lies over the page. */
+  get #isCovered() {
+    return Boolean(this.monitor.dataset['over']) || document.querySelector(BOARDS) !== null;
+  }
+
   /** Something was opened or closed. */
   look() {
     const now = /** @type {HTMLDialogElement[]} */ ([...document.querySelectorAll(OPEN)]);
@@ -72,8 +79,8 @@ class Back {
   /** Let the history have the entry exactly where it is wanted. */
   #agree() {
     if (this.#own === 'tidying') return; // it is under way
+    this.#wasCovered = this.#isCovered;
     this.#own = null; // there was nowhere to leave to
-    this.#isCovered = Boolean(this.monitor.dataset['over']) || document.querySelector('.drive-board, .saved-board') !== null;
     const { state } = history;
     const isThere = state?.over === true;
     const wanted = isWanted({ isOpen: this.#open.length > 0, isFirstTab: this.#isFirstTab, state });
@@ -84,25 +91,35 @@ class Back {
 
   /** @param {'tidying' | 'leaving'} why */
   #goBack(why) {
+    clearTimeout(this.#timer);
     this.#own = why;
     history.back();
   }
 
+  /** The address of the entry that was left goes on: it follows what is shown. @param {number} left its index */
+  #carry(left) {
+    const url = new URL(this.navigation.entries()[left]?.url ?? location.href);
+    if (!this.monitor.hidden) url.hash = this.tabs.front; // the tab of this entry may be another: no link was followed
+    history.replaceState(history.state, '', url);
+  }
+
   /** @param {PopStateEvent} event */
   popped(event) {
-    const isBack = this.#at < this.#index;
+    const left = this.#index;
+    const isBack = this.#at < left;
     const why = this.#own;
     this.#index = this.#at;
     this.#own = null;
+    this.look();
+    if (!isBack) return;
+    this.#carry(left);
     const top = this.#open.at(-1);
-    if (isBack && !this.monitor.hidden) history.replaceState(history.state, '', `#${this.tabs.front}`); // the tab of that entry may be another: no link was followed
-    if (!isBack || why === 'tidying') this.look();
-    else if (why === 'leaving') this.#goBack('leaving');
+    if (why === 'tidying') event.stopImmediatePropagation(); // it closes nothing
     else if (top) {
       event.stopImmediatePropagation(); // what lies beneath stays
-      if (top.dispatchEvent(new Event('cancel', { cancelable: true }))) top.close();
-      this.look();
-    } else if (this.#isCovered) this.look(); // it closes itself
+      if (isAsked(top) && top.dispatchEvent(new Event('cancel', { cancelable: true }))) top.close(); // an alarm and a lost link are never answered by it
+    } else if (why === 'leaving') this.#goBack('leaving');
+    else if (this.#wasCovered || this.#isCovered) return; // it closes itself
     else if (!this.#isFirstTab) this.tabs.go(0);
     else this.#goBack('leaving'); // an entry of what was closed in another way
   }

@@ -3,7 +3,7 @@
 import { areAlarmsInSight, floorQuery, isFloor } from './layout.js';
 import { mountHeadSpeed } from './head-speed.js';
 import { openPreferences } from './preferences.js';
-import { closeSheet, openSheet } from './sheet.js';
+import { closeSheet, leaveSheet, openSheet } from './sheet.js';
 import { field, html, listen, need, setAttribute, setText, show, words } from '../core/dom.js';
 import { styled } from '../core/style-sheet.js';
 
@@ -105,10 +105,14 @@ export class Screens {
     else if (name === 'trends' && areAlarmsInSight() && stage?.checkVisibility()) stage.focus();
     else if (name === null) history.back();
     else {
-      const depth = history.state?.depth ?? 0;
       const isDeeper = this.open === null || LEADS[this.open]?.includes(name) === true;
-      history[isDeeper ? 'pushState' : 'replaceState']({ screen: name, of, depth: isDeeper ? depth + 1 : depth }, '');
-      this.#set(name, of);
+      const go = () => {
+        const depth = history.state?.depth ?? 0;
+        history[isDeeper ? 'pushState' : 'replaceState']({ screen: name, of, depth: isDeeper ? depth + 1 : depth }, '');
+        this.#set(name, of);
+      };
+      if (this.open === null) go();
+      else this.#past(0, go);
     }
   }
 
@@ -116,10 +120,18 @@ export class Screens {
   #tab(tab) {
     const go = () => { location.hash = `#${tab}`; };
     if (this.open === null) go();
-    else {
-      window.addEventListener('popstate', go, { once: true });
-      history.go(-(history.state?.depth ?? 1));
-    }
+    else this.#past(history.state?.depth ?? 1, go);
+  }
+
+  /** So many entries back, and past that of a sheet that lay over the screen (back.js); then `go`. @param {number} steps @param {() => void} go */
+  #past(steps, go) {
+    const { over, ...state } = history.state ?? {};
+    const back = over ? steps + 1 : steps;
+    if (back === 0) return go();
+    if (over) history.replaceState(state, ''); // it is not tidied meanwhile
+    leaveSheet();
+    window.addEventListener('popstate', go, { once: true });
+    history.go(-back);
   }
 
   /** @param {string | null} name @param {string} [of] */

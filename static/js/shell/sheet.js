@@ -27,6 +27,9 @@ const sheetsOpen = () => document.querySelectorAll('dialog[open]');
 /** The sheet that stands in the view. */
 const asked = () => [...sheetsOpen()].find((sheet) => isAsked(sheet) && sheet.closest('.view'));
 
+/** Closes what stands in the view, by hand. */
+export const leaveSheet = () => cancel(asked());
+
 /** Whether a dialog stands over the page that no sheet may cover: an alarm, a broken link. */
 export function mustWait() {
   return [.../** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog:modal'))].some((one) => !isAsked(one));
@@ -53,8 +56,7 @@ export function isAsked(sheet) {
 /** Closes what stands in the view when it is left: by Escape, by another tab or screen, by a press beside it where it is no drawer. */
 export function mountSheets() {
   const monitor = need(document, '#monitor');
-  const leave = () => cancel(asked());
-  const seen = new MutationObserver(leave);
+  const seen = new MutationObserver(leaveSheet);
   seen.observe(monitor, { attributeFilter: ['hidden', 'data-front', 'data-over'] });
   const stops = [
     ...ASKED.map((id) => mountSheet(/** @type {HTMLDialogElement} */ (need(document, `#${id}`)))),
@@ -67,7 +69,7 @@ export function mountSheets() {
     listen(need(monitor, '.view'), 'click', (event) => {
       if (isFloor() || !asked() || event.target.closest('dialog')) return;
       event.stopPropagation();
-      leave();
+      leaveSheet();
     }, { capture: true }),
     () => seen.disconnect(),
   ];
