@@ -21,7 +21,10 @@ class PageHello(TypedDict):
     boot: NotRequired[Annotated[str | None, doc("of the server that it is of")]]
     name: NotRequired[Annotated[str, doc("what its operator calls it")]]
     build: NotRequired[
-        Annotated[str, doc('which page it is; "" for single modules. One that names none gets former names of phases')]
+        Annotated[
+            str,
+            doc('which page it is; "" for single modules. With `page` and without it: former names of phases'),
+        ]
     ]
     page: NotRequired[
         Annotated[str, doc("what it calls itself, kept over reloads; without it the server gives it one")]

@@ -123,7 +123,8 @@ class Page:
                 self._writer.watch_scan(message.get("scan") is True)
             case "hello":
                 await self._commands.begin(message)
-                self._writer.begin(message.get("have_event"), is_former="build" not in message)
+                is_former = "page" in message and "build" not in message  # a page of before the builds were named
+                self._writer.begin(message.get("have_event"), is_former=is_former)
             case "present":
                 await self._commands.present(message)
             case "replay":

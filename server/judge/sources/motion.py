@@ -16,6 +16,7 @@ POSE_LEAST_M = 2.0  # between the first and the newest place of a motion, withou
 PLACES_S = 1.5  # between two places of one motion: what happened in a longer pause was not seen
 LEAST_STEPS = 2  # of a motion: one may be a jump
 FIX_MPS, FIX_LEAST_M, FIX_SIGMAS = 2.0, 15.0, 6.0  # of a receiver, which wanders at standstill
+POSES_MPS = 0.8  # of poses without a twist, which may be a receiver's too: straight on, over the same least way
 FAR_M = 100.0  # without a pause and a turn: no receiver wanders so
 LOST_M2 = 1000.0  # the covariance by which an odometry declares itself lost
 STRAIGHT_RAD = math.radians(90)  # a step that turns more is noise

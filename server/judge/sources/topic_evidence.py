@@ -9,7 +9,7 @@ from typing import Any
 
 from server.judge.frame_words import is_earth_fixed
 from server.judge.message_fields import inner, number
-from server.judge.sources.motion import FAR_M, FIX_MPS, MOVES_MPS, POSE_LEAST_M, Motion, is_lost, least_way_m
+from server.judge.sources.motion import FAR_M, MOVES_MPS, POSE_LEAST_M, POSES_MPS, Motion, is_lost, least_way_m
 from server.judge.sources.pictures import Picture
 from server.judge.topic import FLOATS
 
@@ -105,7 +105,7 @@ class TopicEvidence:
         if is_lost(pose):
             return
         self.least_m = POSE_LEAST_M if self.is_filled else least_way_m(pose.get("covariance"))
-        self.made.place(x_m, y_m, at_s, slowest_mps=MOVES_MPS if self.is_filled else FIX_MPS)
+        self.made.place(x_m, y_m, at_s, slowest_mps=MOVES_MPS if self.is_filled else POSES_MPS)
         self.has_moved |= self.made.is_long(at_s, -math.inf, within_s=FIXES_S, least_m=self.least_m)
 
     def moves_since(self, zero_since_s: float, at_s: float) -> str | None:

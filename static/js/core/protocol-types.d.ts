@@ -1360,7 +1360,7 @@ export interface PageHello {
   boot?: string | null;
   /** what its operator calls it */
   name?: string;
-  /** which page it is; "" for single modules. One that names none gets former names of phases */
+  /** which page it is; "" for single modules. With `page` and without it: former names of phases */
   build?: string;
   /** what it calls itself, kept over reloads; without it the server gives it one */
   page?: string;

@@ -83,7 +83,7 @@ async def test_others_get_their_turn_while_it_hurries(numbers: RosBridge, probe:
     played: list[Message] = []
     playing = asyncio.ensure_future(play(drive(200_000, period_s=0.0), numbers, on_message=played.append))
     assert (await probe.call("/rosapi/get_time"))["result"] is True
-    assert 0 < len(played) < 20_000
+    assert 0 < len(played) < 100_000
     assert not playing.done()
     playing.cancel()
     await asyncio.wait({playing})

@@ -38,9 +38,12 @@ async def test_a_viewer_that_stops_reading_finds_nothing_old(bridge: RosBridge, 
 
 
 @pytest.mark.virtual_time
-@pytest.mark.parametrize("build", [{}, {"build": ""}, {"build": "b2"}])
+@pytest.mark.parametrize(
+    ("hello", "is_former"),
+    [({"page": "p1"}, True), ({"page": "p1", "build": ""}, False), ({"page": "p1", "build": "b2"}, False), ({}, False)],
+)
 async def test_only_a_page_that_names_no_build_gets_former_names(
-    bridge: RosBridge, server: str, build: dict[str, str], monkeypatch: pytest.MonkeyPatch
+    bridge: RosBridge, server: str, hello: dict[str, str], is_former: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     renamed: list[str] = []
 
@@ -51,11 +54,11 @@ async def test_only_a_page_that_names_no_build_gets_former_names(
     monkeypatch.setattr(former_page, "state", rename)
     async with driving(bridge), websockets.connect(server.replace("http", "ws") + "/ws") as socket:
         one = Viewer(socket)
-        await one.send({"kind": "hello", "have_event": 0} | build)
+        await one.send({"kind": "hello", "have_event": 0} | hello)
         async with asyncio.timeout(10.0):
             while len(one.states) < 5:
                 await one.hear(await socket.recv())
-    assert bool(renamed) == (not build)
+    assert bool(renamed) == is_former
 
 
 @pytest.mark.virtual_time
