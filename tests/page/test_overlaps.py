@@ -78,7 +78,7 @@ def several(canned: Canned) -> None:
     canned.vehicle = "Ocelot"
     fast: Json = {"title": "Speed above limit", "priority": "critical", "state": "UNACKED"}
     canned.cars = [car("Ocelot", 4.2, holder="You"), car("Serval", 12.6, **fast)]
-    canned.state = warned(decelerate=slow("safe"))
+    canned.state = warned(decelerate=slow("not_armed"))
     canned.state["control"] |= {"requests": [{"name": "Ben", "page": "other", "left_s": 22.0}]}
 
 
@@ -147,10 +147,17 @@ HEAD = """() => {
 }"""
 
 
+#: Once the open sheet has risen.
+STANDS = """() => {
+  const moves = document.querySelector('.view > dialog[open]').getAnimations();
+  return Promise.all(moves.map((one) => one.finished)).then(() => {});
+}"""
+
+
 async def sheets_leave_the_car_in_sight(
     phone: Phone, canned: Canned, sizes: list[tuple[int, int]], sheets: list[str]
 ) -> None:
-    canned.state = warned(decelerate=slow("safe"))
+    canned.state = warned(decelerate=slow("not_armed"))
     page = await opened(phone, canned)
     for name in sheets:
         await click(page, SHEETS[name])
@@ -160,6 +167,7 @@ async def sheets_leave_the_car_in_sight(
         for width, height in sizes:
             await page.set_viewport_size({"width": width, "height": height})
             await page.evaluate(DRAWN)
+            await page.evaluate(STANDS)
             seen = await page.evaluate(HEAD)
             good = {"strip": False, "rail": False, "bar": False, "isModal": False, "isCarShown": True, "isSeen": True}
             if seen != good:

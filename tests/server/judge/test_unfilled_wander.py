@@ -38,7 +38,7 @@ def pose(x_m: float, y_m: float, mps: float = 0.0) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("hz", [1, 10])
 @pytest.mark.parametrize("zero", [("/vel", TWIST), ("/vehicle/speed", FLOAT)])
 def test_a_parked_car_keeps_its_speed_beside_an_odometry_of_its_receiver(
@@ -53,7 +53,7 @@ def test_a_parked_car_keeps_its_speed_beside_an_odometry_of_its_receiver(
     assert chosen(choose(topics, evidence=evidence))["speed"] == zero[0]
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("hz", [1, 10])
 def test_a_parked_car_keeps_the_twist_of_an_odometry_that_fuses_its_receiver(hz: int, seed: int) -> None:
     """The wheels stand still, and the pose wanders."""
@@ -94,7 +94,7 @@ def test_poses_of_an_odometry_that_states_no_velocity_are_no_proof_as_slow_as_no
     topics = {"/vel": TWIST, GPS: ODOM}
     evidence = following(topics)
     for n in range(600):
-        evidence.receive(GPS, pose(1.5 * n / 10, 0.0, number), n / 10)
+        evidence.receive(GPS, pose(0.7 * n / 10, 0.0, number), n / 10)
         evidence.receive("/vel", twist(0.0), n / 10)
     assert not evidence.of("/vel").is_twist_empty
 
