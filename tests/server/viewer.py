@@ -15,6 +15,8 @@ import websockets
 from server.access.order_signer import OrderSigner
 from tests.frames import check_frame
 
+WAIT_S = 60.0  # how long a test waits for what is to come: no test is about this limit
+
 
 class Viewer:
     """Takes what it is offered and keeps it."""
@@ -73,7 +75,7 @@ class Viewer:
     async def send(self, message: dict[str, Any]) -> None:
         await self.socket.send(json.dumps(message))
 
-    async def ask(self, *, within_s: float = 20.0, **command: Any) -> dict[str, Any]:
+    async def ask(self, *, within_s: float = WAIT_S, **command: Any) -> dict[str, Any]:
         """Sends a command and answers its reply."""
         identity = f"test {next(self._ids)}"
         await self.send(self.signed(command) | {"id": identity})
@@ -104,7 +106,7 @@ class Viewer:
                 return listed[0]["summary"].get("challenge")
         return None
 
-    async def until(self, found: Callable[[], Any], within_s: float = 20.0) -> Any:
+    async def until(self, found: Callable[[], Any], within_s: float = WAIT_S) -> Any:
         """Waits for `found()` to be something and answers it."""
         async with asyncio.timeout(within_s), self._changed:
             while True:
@@ -114,7 +116,7 @@ class Viewer:
                 await self._changed.wait()
 
     async def state(
-        self, fits: Callable[[dict[str, Any]], bool] = lambda _: True, within_s: float = 20.0
+        self, fits: Callable[[dict[str, Any]], bool] = lambda _: True, within_s: float = WAIT_S
     ) -> dict[str, Any]:
         """The next state (from now on) that fits."""
         start = len(self.states)

@@ -30,7 +30,6 @@ async def beside(one: Viewer, at_s: float) -> dict[str, Any]:
             ),
             None,
         ),
-        within_s=15,
     )
     return found
 

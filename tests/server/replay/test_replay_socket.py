@@ -25,7 +25,7 @@ async def order(one: Viewer, do: str, **fields: Any) -> dict[str, Any]:
     identity = f"order {do} {len(one.other)}"
     await one.send({"kind": "replay", "do": do, "id": identity, **fields})
     answer: dict[str, Any] = await one.until(
-        lambda: next((reply for reply in one.other if reply.get("id") == identity), None), within_s=25
+        lambda: next((reply for reply in one.other if reply.get("id") == identity), None)
     )
     return answer
 
@@ -43,7 +43,6 @@ def replays() -> list[psutil.Process]:
 async def at(one: Viewer, at_s: float) -> dict[str, Any]:
     return await one.state(
         lambda s: s.get("replay") is not None and s["replay"]["at_s"] == at_s and not s["replay"]["is_seeking"],
-        within_s=10,
     )
 
 
@@ -87,9 +86,7 @@ async def test_the_time_line_the_track_and_the_minute_come_of_the_recording(brid
         await order(one, "open", recording="car_20260921T142640Z", at_s=15.0)
         frame = await at(one, 15.0)
         assert frame["replay"]["alarms_from"] == "recording"
-        line = await one.until(
-            lambda: next((m for m in one.other if m["kind"] == "timeline" and m["is_done"]), None), within_s=15
-        )
+        line = await one.until(lambda: next((m for m in one.other if m["kind"] == "timeline" and m["is_done"]), None))
         assert len(line["speed_mps"]) > 30
         token = frame["replay"]["token"]
         async with http_client() as client:
@@ -133,7 +130,7 @@ async def test_a_live_alarm_reaches_the_page_that_replays(bridge: RosBridge, bas
         await order(one, "open", recording=STREET, at_s=5.0)
         await at(one, 5.0)
         speed[0] = 13.0
-        event = await one.until(lambda: next((e for e in one.events if e["alarm"] == "speed_limit"), None), within_s=8)
+        event = await one.until(lambda: next((e for e in one.events if e["alarm"] == "speed_limit"), None))
         frame = await one.state(lambda s: "speed_limit" in {a["id"] for a in s["live"]["alarms"]})
         assert event["change"] == "raised"
         assert frame["replay"]["at_s"] == 5.0
@@ -244,9 +241,7 @@ async def test_a_file_without_its_end_is_replayed_and_said_to_be_so(bridge: RosB
     whole.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
     async with viewer(base) as one:
         assert (await order(one, "open", recording="car_20260921T142640Z"))["ok"]
-        line = await one.until(
-            lambda: next((m for m in one.other if m["kind"] == "timeline" and m["is_done"]), None), within_s=15
-        )
+        line = await one.until(lambda: next((m for m in one.other if m["kind"] == "timeline" and m["is_done"]), None))
         assert any("never closed" in note for note in line["notes"])
 
 
