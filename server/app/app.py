@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
@@ -13,9 +14,11 @@ from server.app.build import build
 from server.app.config import Config
 from server.app.lifespan import lifespan
 from server.system import preload  # noqa: F401
+from server.web import interface
 from server.web.middleware import errors
 from server.web.middleware.access_guard import Guard
 from server.web.middleware.headers import SecurityHeaders
+from server.web.middleware.methods import HeadAsGet
 from server.web.middleware.throttle import Throttle
 from server.web.routes import (
     alarms,
@@ -93,6 +96,7 @@ def create_app(
     )
     app.state.services = running
     app.state.strict_transport = config.tls is not None and config.tls.mode == "files"
+    app.add_middleware(HeadAsGet)
     if running.agents is not None:
         from server.web.agents.to_agents import ToAgents  # only here: without a broker nats-py need not be installed
 
@@ -106,6 +110,11 @@ def create_app(
 
 class _Served(FastAPI):
     """Every answer has the headers: those of a bug too, which Starlette gives outside of all that is added to it."""
+
+    def openapi(self) -> dict[str, Any]:
+        if self.openapi_schema is None:
+            self.openapi_schema = interface.described(self)
+        return self.openapi_schema
 
     def build_middleware_stack(self) -> ASGIApp:
         return SecurityHeaders(super().build_middleware_stack(), is_strict=self.state.strict_transport)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NotRequired
 
+from pydantic import Field
 from typing_extensions import TypedDict
 
 from monitor.alarm_spec import Priority
@@ -196,7 +197,10 @@ class Recording(TypedDict):
     late_marks: NotRequired[
         Annotated[list[DriveMark], doc("of one recording: those that came after it was complete, at most 200")]
     ]
-    state: Annotated[Literal["waiting", "read", "unreadable"], doc("waiting: listed by its name, and read soon")]
+    state: Annotated[
+        Literal["waiting", "read", "unreadable"],
+        Field(title="Reading", description="waiting: listed by its name, and read soon"),
+    ]
     problem: Annotated[str | None, doc("why it cannot be read, as a sentence")]
     damage: Annotated[list[str], doc("what of it cannot be read, a sentence each")]
     unread: Annotated[list[str], doc("topics whose messages are of no use here, a sentence each; at most 10")]

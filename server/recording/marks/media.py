@@ -11,7 +11,7 @@ Kind = Literal["voice", "photo"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 MAX_BYTES: dict[Kind, int] = {"voice": 1024 * 1024, "photo": 8 * 1024 * 1024}
-_TYPES: dict[Kind, dict[str, str]] = {  # media type → ending
+TYPES: dict[Kind, dict[str, str]] = {  # media type → ending
     "voice": {"audio/webm": "webm", "audio/ogg": "ogg", "audio/mp4": "m4a"},
     "photo": {"image/jpeg": "jpg", "image/png": "png", "image/webp": "webp"},
 }
@@ -43,7 +43,7 @@ class MediaName:
 
     @property
     def media_type(self) -> str:
-        return next(type for type, ending in _TYPES[self.kind].items() if ending == self.ending)
+        return next(type for type, ending in TYPES[self.kind].items() if ending == self.ending)
 
 
 def name_of(file: str) -> MediaName | None:
@@ -52,14 +52,14 @@ def name_of(file: str) -> MediaName | None:
     if found is None:
         return None
     kind: Kind = "voice" if found[2] == "voice" else "photo"
-    return MediaName(mark=found[1], kind=kind, ending=found[3]) if found[3] in _TYPES[kind].values() else None
+    return MediaName(mark=found[1], kind=kind, ending=found[3]) if found[3] in TYPES[kind].values() else None
 
 
 def named(mark: str, kind: Kind, content_type: str) -> MediaName:
     """By the media type that the sender gives. Raises BadMedia."""
-    ending = _TYPES[kind].get(content_type.partition(";")[0].strip().lower())
+    ending = TYPES[kind].get(content_type.partition(";")[0].strip().lower())
     if ending is None:
-        raise BadMedia(f"A {_WHAT[kind]} is sent as one of {', '.join(_TYPES[kind])}.")
+        raise BadMedia(f"A {_WHAT[kind]} is sent as one of {', '.join(TYPES[kind])}.")
     return MediaName(mark=mark, kind=kind, ending=ending)
 
 
@@ -78,7 +78,7 @@ def too_large(kind: Kind) -> str:
 
 def find(folder: Path, mark: str, kind: Kind) -> Path | None:
     """The file of a mark in a folder; None: there is none."""
-    names = (MediaName(mark=mark, kind=kind, ending=ending).file for ending in _TYPES[kind].values())
+    names = (MediaName(mark=mark, kind=kind, ending=ending).file for ending in TYPES[kind].values())
     return next((folder / name for name in names if (folder / name).is_file()), None)
 
 

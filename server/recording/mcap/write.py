@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from mcap.data_stream import RecordBuilder
-from mcap.records import DataEnd
+from mcap.records import DataEnd, SummaryOffset
 from mcap.writer import CompressionType, Writer
 
 from server.recording.folder import writing_path
@@ -63,7 +63,9 @@ class PartFile:
                 enable_crcs=True,
                 enable_data_crcs=True,
             )
-            vars(self._writer)["_Writer__chunk_indices"] = ChunkIndexes(self._writing)  # there is no public name for it
+            # There are no public names for these two.
+            vars(self._writer)["_Writer__chunk_indices"] = ChunkIndexes(self._writing)
+            vars(self._writer)["_Writer__summary_offsets"] = _SummaryOffsets()
             self._writer.start(profile=profile, library=f"{LIBRARY} {catgraph_version()} {LIBRARY_MARK}")
             self._writer.add_metadata(METADATA, self._metadata)
             self._link()
@@ -182,6 +184,14 @@ class PartFile:
             fd, self._fd = self._fd, -1
             if fd >= 0:
                 os.close(fd)
+
+
+class _SummaryOffsets(list[SummaryOffset]):
+    """Takes the place of the writer's own list: it leaves out empty groups, which readers report as faults."""
+
+    def append(self, offset: SummaryOffset) -> None:
+        if offset.group_length:
+            super().append(offset)
 
 
 class _Stream:

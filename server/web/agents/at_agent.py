@@ -12,6 +12,7 @@ from server.access.rules import is_enough, needs_of
 from server.bus.nats_http import Begin, Refused
 from server.web.agents import kept, kept_replays
 from server.web.middleware import errors
+from server.web.middleware.methods import HeadAsGet
 from server.web.services import Services
 
 
@@ -32,6 +33,7 @@ def _app(services: Services) -> FastAPI:
     app = FastAPI(openapi_url=None)
     app.state.services = services
     app.state.replays = kept_replays.KeptReplays(services.replays)
+    app.add_middleware(HeadAsGet)
     errors.install(app)
     for router in (*kept.ROUTERS, kept_replays.router):
         app.include_router(router)

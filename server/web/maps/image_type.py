@@ -6,6 +6,7 @@ import struct
 from html.parser import HTMLParser
 
 SHOWN_ATTRIBUTION = 200
+TYPES = ("image/png", "image/jpeg", "image/webp")
 
 
 def media_type(data: bytes) -> str | None:

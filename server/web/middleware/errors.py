@@ -9,10 +9,12 @@ from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, Response
 from starlette.exceptions import HTTPException
 
 from server.bus.bus import NotServed
+from server.web.interface import PROBLEM_TYPE
+from server.web.middleware.methods import allowed
 
 log = logging.getLogger("catgraph.web")
 
@@ -34,14 +36,16 @@ class Problem(HTTPException):
 def problem(status: int, detail: str, **more: Any) -> JSONResponse:
     """A problem document; `type` is about:blank, so `title` is the status in words."""
     body = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": detail, **more}
-    return _Document(body, status_code=status, media_type="application/problem+json")
+    return _Document(body, status_code=status, media_type=PROBLEM_TYPE)
 
 
 def install(app: FastAPI) -> None:
     """Lets the app answer all its errors this way."""
 
     @app.exception_handler(HTTPException)
-    async def of_http(_: Request, error: HTTPException) -> JSONResponse:
+    async def of_http(request: Request, error: HTTPException) -> Response:
+        if error.status_code == 405:
+            return _of_method(request)
         answer = problem(error.status_code, str(error.detail), **getattr(error, "more", {}))
         answer.headers.update(error.headers or {})
         return answer
@@ -63,3 +67,13 @@ def install(app: FastAPI) -> None:
     async def of_bug(_: Request, error: Exception) -> JSONResponse:
         log.error("a request failed", exc_info=error)
         return problem(500, "Internal server error; the server's log has the details.")
+
+
+def _of_method(request: Request) -> Response:
+    """No route of the path takes the method: which are taken, which is also the answer to OPTIONS."""
+    methods = allowed(request.app.routes, request.scope)
+    if request.method == "OPTIONS":
+        return Response(status_code=204, headers={"Allow": methods})
+    answer = problem(405, f"This address takes {methods}.")
+    answer.headers["Allow"] = methods
+    return answer

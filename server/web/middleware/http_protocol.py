@@ -17,6 +17,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from server.protocol.rate_limit import Limits
 from server.web.compression import PageSocket
+from server.web.middleware.errors import problem
 from server.web.middleware.headers import FOR_ALL, FOR_DOCUMENTS
 
 # What strangers do to a port is no news for the person at the terminal.
@@ -84,10 +85,11 @@ class PageRequests(H11Protocol):
 
     def send_400_response(self, msg: str) -> None:
         try:
-            plain = {"Content-Type": "text/plain; charset=utf-8", "Connection": "close"}
-            head = [(name.lower(), value) for name, value in (plain | FOR_ALL | FOR_DOCUMENTS).items()]
+            answer = problem(400, msg)
+            headers = {**answer.headers, "Connection": "close"} | FOR_ALL | FOR_DOCUMENTS
+            head = [(name.lower(), value) for name, value in headers.items()]
             self.transport.write(self.conn.send(h11.Response(status_code=400, headers=head, reason="Bad Request")))
-            self.transport.write(self.conn.send(h11.Data(data=msg.encode("ascii"))))
+            self.transport.write(self.conn.send(h11.Data(data=bytes(answer.body))))
             self.transport.write(self.conn.send(h11.EndOfMessage()))
         except h11.LocalProtocolError:
             pass  # during a response no error can be sent

@@ -14,6 +14,8 @@ from urllib.parse import quote
 from fastapi import HTTPException, Request
 from fastapi.responses import Response, StreamingResponse
 
+from server.web.middleware.methods import is_head
+
 _PORTION = 256 * 1024  # bytes per step, read in a thread, so that a slow disk blocks nobody
 _RANGE = re.compile(r"bytes=(\d{0,18})-(\d{0,18})", re.ASCII)
 _SEVERAL = re.compile(r"bytes=[^,]+,", re.ASCII)
@@ -40,7 +42,7 @@ def file_answer(request: Request, path: Path, *, name: str, media_type: str) -> 
         file.close()
         raise
     sent_headers["Content-Disposition"] = disposition(name)
-    if request.method == "HEAD" or status == 304:
+    if is_head(request) or status == 304:
         file.close()
         if status == 304:
             del sent_headers["Content-Length"]
@@ -65,7 +67,7 @@ def _asked(request: Request, stat: os.stat_result) -> tuple[int, int, int, dict[
         return 304, 0, -1, sent_headers
     wish = request.headers.get("range")
     condition = request.headers.get("if-range")
-    if wish is None or request.method != "GET" or (condition is not None and condition not in (etag, changed)):
+    if wish is None or is_head(request) or (condition is not None and condition not in (etag, changed)):
         return 200, 0, size - 1, sent_headers
     if _SEVERAL.match(wish):
         raise HTTPException(

@@ -6,13 +6,15 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from server.web.routes.session_request import ReplayToken, VehicleName, as_json, ask, ask_either, vehicle_of
+from server.protocol.check_state import CheckAnswer
+from server.protocol.http_answers import AlarmList, EventList
+from server.web.routes.session_request import OF_VEHICLE, ReplayToken, VehicleName, as_json, ask, ask_either, vehicle_of
 from server.web.services import services
 
-router = APIRouter(tags=["alarms"])
+router = APIRouter(tags=["alarms"], responses=OF_VEHICLE)
 
 
-@router.get("/api/events", summary="The numbered log of what happened, oldest first")
+@router.get("/api/events", response_model=EventList, summary="The numbered log of what happened, oldest first")
 async def events(
     request: Request,
     vehicle: VehicleName = None,
@@ -24,12 +26,18 @@ async def events(
     return as_json({"events": await app.bus.events_after(name, after, limit), "last": app.bus.last_event(name)})
 
 
-@router.get("/api/alarms", summary="The alarms that are active or not acknowledged, most urgent first")
+@router.get(
+    "/api/alarms", response_model=AlarmList, summary="The alarms that are active or not acknowledged, most urgent first"
+)
 async def alarms(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json({"alarms": (await ask(request, vehicle, {"kind": "state"}))["alarms"]})
 
 
-@router.get("/api/checks/{check}", summary="One check: what it found, its last minute, its thresholds, what it needs")
+@router.get(
+    "/api/checks/{check}",
+    response_model=CheckAnswer,
+    summary="One check: what it found, its last minute, its thresholds, what it needs",
+)
 async def check(
     request: Request,
     check: Annotated[str, Path(max_length=120)],

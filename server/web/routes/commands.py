@@ -11,9 +11,9 @@ from pydantic import BaseModel, ConfigDict, create_model
 
 from server.protocol.command_base import OfCar
 from server.protocol.commands import BY_KIND, SLOW_DOWN, Command
-from server.web.routes.session_request import Done, MeantVehicle, VehicleName, ask, meant_vehicle
+from server.web.routes.session_request import OF_VEHICLE, Done, MeantVehicle, VehicleName, ask, meant_vehicle
 
-router = APIRouter()
+router = APIRouter(responses=OF_VEHICLE)
 
 
 def body_of(command: type[Command], without: tuple[str, ...] = (), *, is_strict: bool = False) -> type[BaseModel]:

@@ -16,7 +16,9 @@ from server.access.invitations import LASTS_S
 from server.access.tickets import LASTS_S as TICKET_LASTS_S
 from server.protocol.answers import DeviceList, DeviceRow
 from server.system.loopback import is_loopback
+from server.web.interface import raises
 from server.web.middleware.errors import Problem
+from server.web.routes.session_request import Done
 from server.web.services import services
 
 router = APIRouter()
@@ -71,7 +73,9 @@ def _me(who: Principal) -> Me:
     return Me(id=who.id, name=who.name, role=who.role)
 
 
-@router.post("/api/pair", tags=["access"], summary="Pair this device by the token of a link or a PIN")
+@router.post(
+    "/api/pair", responses=raises(503), tags=["access"], summary="Pair this device by the token of a link or a PIN"
+)
 async def pair(request: Request, response: Response, body: Annotated[PairRequest, Body()]) -> Me:
     access = services(request).access
     if access.is_open:
@@ -120,7 +124,9 @@ async def devices(request: Request) -> DeviceList:
     }
 
 
-@router.post("/api/devices/invite", tags=["access"], summary="A link and a PIN for one more device")
+@router.post(
+    "/api/devices/invite", responses=raises(409), tags=["access"], summary="A link and a PIN for one more device"
+)
 async def invite(request: Request, body: Annotated[InviteRequest, Body()]) -> Invited:
     access = services(request).access
     if access.is_open:
@@ -131,7 +137,9 @@ async def invite(request: Request, body: Annotated[InviteRequest, Body()]) -> In
     return Invited(role=made.role, pin=made.pin, link=link, qr=code, expires_in_s=LASTS_S)
 
 
-@router.patch("/api/devices/{id}", tags=["access"], summary="Another role or name; it counts at once")
+@router.patch(
+    "/api/devices/{id}", responses=raises(404, 503), tags=["access"], summary="Another role or name; it counts at once"
+)
 async def change(request: Request, id: DeviceId, body: Annotated[DeviceChange, Body()]) -> DeviceRow:
     try:
         device = await services(request).access.change(id, role=body.role, name=body.name, but=answering())
@@ -140,8 +148,13 @@ async def change(request: Request, id: DeviceId, body: Annotated[DeviceChange, B
     return _listed(request, _there(device))
 
 
-@router.delete("/api/devices/{id}", tags=["access"], summary="It may not come any more, and what it has open ends now")
-async def remove(request: Request, id: DeviceId) -> dict[str, bool]:
+@router.delete(
+    "/api/devices/{id}",
+    responses=raises(404, 503),
+    tags=["access"],
+    summary="It may not come any more, and what it has open ends now",
+)
+async def remove(request: Request, id: DeviceId) -> Done:
     access = services(request).access
     who = principal_of(request)
     try:
@@ -149,7 +162,7 @@ async def remove(request: Request, id: DeviceId) -> dict[str, bool]:
     except OSError as why:
         detail = f"Its access ended, but it returns after a restart. {_NOT_KEPT}: {why.strerror or why}."
         raise HTTPException(503, detail) from None
-    return {"ok": True}
+    return Done()
 
 
 def _there(device: Device | None) -> Device:

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Body, HTTPException, Request, Response
 from fastapi import Path as InPath
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema
 
 from server.protocol.answers import ExportJob
+from server.protocol.http_answers import CancelledExport, ExportList
 from server.recording.export.clip import AFTER_S, BEFORE_S, LONGEST_S, Window
 from server.recording.export.formats import FORMATS
 from server.recording.export.jobs import Exports, Job, NoSuchRecording, NotYet, TooMany
+from server.web.interface import OF_KEPT, files, raises
 from server.web.middleware.errors import Problem
 from server.web.middleware.ranges import file_answer
 from server.web.services import services
 
-router = APIRouter(tags=["recordings"])
+router = APIRouter(tags=["recordings"], responses=raises(*OF_KEPT))
+_FILES = raises(409) | files(*{form.media_type: None for form in FORMATS.values()}, in_parts=True)
 Id = Annotated[str, InPath(max_length=100, description="The recording's `id` in the list")]
 JobId = Annotated[str, InPath(max_length=40, description="`job` of the answer that began it")]
 
@@ -72,14 +75,24 @@ async def clip(request: Request, id: Id, body: Annotated[ClipRequest, Body()]) -
         raise HTTPException(429, str(why), headers={"Retry-After": "30"}) from None
 
 
-@router.get("/api/recordings/{id}/export/{format}", summary="A recording in another format", response_class=Response)
+@router.get(
+    "/api/recordings/{id}/export/{format}",
+    responses=_FILES,
+    summary="A recording in another format",
+    response_class=Response,
+)
 async def exported(request: Request, id: Id, format: Format) -> Response:
     """Made first where it is not there, which may take a minute for an hour of driving: where a person waits, begin it
     as a job and show how far it is."""
     return await _file(request, await _done(await _begun(request, id, format)))
 
 
-@router.get("/api/recordings/{id}/report", summary="The drive's report, to be looked at", response_class=Response)
+@router.get(
+    "/api/recordings/{id}/report",
+    responses=raises(409) | files("text/html", in_parts=True),
+    summary="The drive's report, to be looked at",
+    response_class=Response,
+)
 async def report(request: Request, id: Id) -> Response:
     """The export `html`, opened by a browser and not saved; made first where it is not there."""
     answer = await _file(request, await _done(await _begun(request, id, "html")))
@@ -88,7 +101,7 @@ async def report(request: Request, id: Id) -> Response:
 
 
 @router.get("/api/exports", summary="The exports that wait, run, or can be downloaded")
-async def listed(request: Request) -> dict[str, Any]:
+async def listed(request: Request) -> ExportList:
     return {"exports": [job.as_json() for job in exports(request).jobs()]}
 
 
@@ -98,15 +111,15 @@ async def followed(request: Request, job: JobId) -> ExportJob:
 
 
 @router.delete("/api/exports/{job}", summary="Cancel an export, or remove its file")
-async def cancelled(request: Request, job: JobId) -> dict[str, Any]:
+async def cancelled(request: Request, job: JobId) -> CancelledExport:
     found = _found(request, job)
     await exports(request).cancel(job)
     return {"ok": True, "state": found.state}
 
 
-@router.head("/api/exports/{job}/file", include_in_schema=False)
 @router.get(
     "/api/exports/{job}/file",
+    responses=_FILES,
     summary="The file of an export that is done, whole or in part",
     response_class=Response,
 )

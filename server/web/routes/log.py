@@ -15,10 +15,13 @@ from fastapi.responses import Response, StreamingResponse
 from monitor.alarm_spec import Priority
 from server.bus.bus import PageBus
 from server.bus.event_table import COLUMNS, event_row
+from server.protocol.alarm_state import LogEvent
+from server.protocol.http_answers import LogPage
+from server.web.interface import files, raises
 from server.web.routes.session_request import VehicleName, vehicle_of
 from server.web.services import Services, services
 
-router = APIRouter()
+router = APIRouter(tags=["alarms"], responses=raises(404, 503))
 _PAGE = 500
 _LOOKED_THROUGH = 2000  # events scanned per page of results: a rare search text must not block the loop
 
@@ -69,7 +72,7 @@ def _words_of(event: Mapping[str, Any]) -> str:
     return " ".join(str(event.get(name) or "") for name in ("title", "text", "by", "alarm", "change")).casefold()
 
 
-@router.get("/api/log", tags=["alarms"], summary="The alarm log, newest first, a page at a time")
+@router.get("/api/log", response_model=LogPage, summary="The alarm log, newest first, a page at a time")
 async def log_page(
     request: Request,
     which: Wanted,
@@ -86,7 +89,9 @@ async def log_page(
     return Response(orjson.dumps(body), media_type="application/json")
 
 
-@router.get("/api/log.csv", tags=["alarms"], summary="The alarm log as CSV, oldest first")
+@router.get(
+    "/api/log.csv", response_class=Response, responses=files("text/csv"), summary="The alarm log as CSV, oldest first"
+)
 async def log_csv(request: Request, which: Wanted, vehicle: VehicleName = None) -> StreamingResponse:
     app = services(request)
     name = await _answering(app, vehicle)
@@ -97,7 +102,7 @@ async def log_csv(request: Request, which: Wanted, vehicle: VehicleName = None) 
     )
 
 
-@router.get("/api/log.json", tags=["alarms"], summary="The alarm log as JSON, oldest first")
+@router.get("/api/log.json", response_model=list[LogEvent], summary="The alarm log as JSON, oldest first")
 async def log_json(request: Request, which: Wanted, vehicle: VehicleName = None) -> StreamingResponse:
     app = services(request)
     name = await _answering(app, vehicle)

@@ -11,13 +11,15 @@ from fastapi import APIRouter, HTTPException, Query, Request, Response
 from fastapi import Path as InPath
 
 from server.bus.event_table import safe_cell
+from server.protocol.drive_course import Course
 from server.protocol.logbook import LogbookAnswer, LogbookDrive
 from server.recording.catalog.catalog_db import Which
 from server.recording.drive.logbook import logbook
 from server.recording.export.formats.csv_zip import when
+from server.web.interface import OF_KEPT, files, raises
 from server.web.routes.recordings import catalog
 
-router = APIRouter(tags=["recordings"])
+router = APIRouter(tags=["recordings"], responses=raises(*OF_KEPT))
 Text = Annotated[str | None, Query(max_length=200)]
 From = Annotated[
     int | None, Query(alias="from", ge=-(2**53), le=2**53, description="Began then or later, ms since 1970")
@@ -42,7 +44,9 @@ def read(
     return logbook(drives, person=person, now_ms=round(time.time() * 1000), every=every, unread=unread)
 
 
-@router.get("/api/logbook.csv", summary="The same drives as a table", response_class=Response)
+@router.get(
+    "/api/logbook.csv", responses=files("text/csv"), summary="The same drives as a table", response_class=Response
+)
 def table(
     request: Request, vehicle: Text = None, tag: Text = None, person: Text = None, since: From = None, until: To = None
 ) -> Response:
@@ -57,7 +61,11 @@ def table(
     return Response(out.getvalue(), media_type="text/csv; charset=utf-8", headers=headers)
 
 
-@router.get("/api/recordings/{id}/course", summary="Its course by distance and by time, to compare two drives")
+@router.get(
+    "/api/recordings/{id}/course",
+    response_model=Course,
+    summary="Its course by distance and by time, to compare two drives",
+)
 def course(request: Request, id: Annotated[str, InPath(max_length=100)]) -> Response:
     """A `Course` as docs/protocol.md has it; 404 where it has not been read yet."""
     body = catalog(request).course(id)

@@ -17,11 +17,12 @@ from server.mail.mailer import Mailer
 from server.mail.order import Format, Letter, Order, State, TooLarge, Way
 from server.mail.settings import BadMailSetting, MailSettings, Security
 from server.mail.test_mail import MailTestFailed, Trial, try_out
+from server.web.interface import OF_KEPT, raises
 from server.web.middleware.errors import Problem
 from server.web.routes.session_request import NAME_HEADER
 from server.web.services import services
 
-router = APIRouter(prefix="/api/mail", tags=["mail"])
+router = APIRouter(prefix="/api/mail", tags=["mail"], responses=raises(*OF_KEPT, 409, 507))
 MAX_RECIPIENTS = 20
 MAX_RECORDINGS = 20
 _HOST = re.compile(r"[A-Za-z0-9.-]{1,253}(:\d{1,5})?|\[[0-9A-Fa-f:.]{2,45}\](:\d{1,5})?")

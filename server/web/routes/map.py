@@ -8,6 +8,9 @@ from typing import Any
 from fastapi import APIRouter, HTTPException, Request, Response
 from starlette.concurrency import run_in_threadpool
 
+from server.protocol.http_answers import MapAnswer
+from server.web.interface import files, raises
+from server.web.maps.image_type import TYPES
 from server.web.maps.mbtiles import Layer
 from server.web.maps.tile_proxy import Upstream
 from server.web.services import services
@@ -18,7 +21,12 @@ _DAY_S = 86_400  # a phone keeps a fetched tile no longer: it may be another one
 _NUMBER = re.compile(r"[0-9]{1,9}")  # more digits are no tile's, and turning them into a number may cost or fail
 
 
-@router.get("/api/map", tags=["map"], summary="The layers below the map: tiles, and the image of the site")
+@router.get(
+    "/api/map",
+    response_model=MapAnswer,
+    tags=["map"],
+    summary="The layers below the map: tiles, and the image of the site",
+)
 async def ground(request: Request) -> dict[str, Any]:
     under = services(request).ground
     image, fetched = under.image, under.upstream
@@ -41,7 +49,13 @@ def _description(layer: Layer) -> dict[str, Any]:
     }
 
 
-@router.get("/map/site/{name}", tags=["map"], summary="The picture of the site", response_class=Response)
+@router.get(
+    "/map/site/{name}",
+    responses=files(*TYPES) | raises(404),
+    tags=["map"],
+    summary="The picture of the site",
+    response_class=Response,
+)
 async def picture(request: Request, name: str) -> Response:
     image = services(request).ground.image
     if image is None or name != image.name:
@@ -51,6 +65,7 @@ async def picture(request: Request, name: str) -> Response:
 
 @router.get(
     "/map/{name}/{z}/{x}/{y}",
+    responses=files(*TYPES) | {204: {"description": "No tile"}} | raises(404),
     tags=["map"],
     summary="A tile, rows counted from the north; 204 where the map has none",
     response_class=Response,

@@ -11,41 +11,63 @@ from fastapi import Path as InPath
 from pydantic import Field
 
 from server.protocol.mark_commands import MARK
+from server.protocol.marks import DriveMark, MarkList
 from server.recording.marks import media
-from server.recording.marks.media import BadMedia, Kind, MediaName
+from server.recording.marks.media import TYPES, BadMedia, Kind, MediaName
 from server.recording.marks.pending import NoRoom
 from server.recording.marks.recorded import read_media
-from server.web.routes.session_request import VehicleName, as_json, ask, vehicle_of
+from server.web.interface import OF_KEPT, files, raises, takes
+from server.web.routes.session_request import OF_VEHICLE, VehicleName, as_json, ask, vehicle_of
 from server.web.services import services
 
-router = APIRouter(tags=["marks"])
-kept = APIRouter(tags=["marks"])  # at a web node: answered by the agent of the car
+router = APIRouter(tags=["marks"], responses=OF_VEHICLE)
+kept = APIRouter(tags=["marks"], responses=raises(*OF_KEPT))  # at a web node: answered by the agent of the car
+_TAKEN = raises(409, 415, 507)
 MarkOfPath = Annotated[str, Field(pattern=MARK), InPath(description="The mark's id")]
 
 
-@router.get("/api/marks", summary="The marks of this drive, the newest moment last")
+@router.get("/api/marks", response_model=MarkList, summary="The marks of this drive, the newest moment last")
 async def listed(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json(await ask(request, vehicle, {"kind": "marks"}))
 
 
-@kept.post("/api/marks/{mark}/voice", summary="Add a voice note to a mark: audio/webm, audio/ogg or audio/mp4")
+@kept.post(
+    "/api/marks/{mark}/voice",
+    response_model=DriveMark,
+    responses=_TAKEN,
+    openapi_extra=takes(*TYPES["voice"]),
+    summary="Add a voice note to a mark: audio/webm, audio/ogg or audio/mp4",
+)
 async def add_voice(request: Request, mark: MarkOfPath, vehicle: VehicleName = None) -> Response:
     """The body is the file itself, of at most 1 MB. The same again changes nothing, another one takes its place."""
     return await _added(request, mark, "voice", vehicle)
 
 
-@kept.post("/api/marks/{mark}/photo", summary="Add a photo to a mark: image/jpeg, image/png or image/webp")
+@kept.post(
+    "/api/marks/{mark}/photo",
+    response_model=DriveMark,
+    responses=_TAKEN,
+    openapi_extra=takes(*TYPES["photo"]),
+    summary="Add a photo to a mark: image/jpeg, image/png or image/webp",
+)
 async def add_photo(request: Request, mark: MarkOfPath, vehicle: VehicleName = None) -> Response:
     """The body is the file itself, of at most 8 MB. The same again changes nothing, another one takes its place."""
     return await _added(request, mark, "photo", vehicle)
 
 
-@kept.get("/api/marks/{mark}/voice", summary="The voice note of a mark", response_class=Response)
+@kept.get(
+    "/api/marks/{mark}/voice",
+    responses=files(*TYPES["voice"]),
+    summary="The voice note of a mark",
+    response_class=Response,
+)
 def voice(request: Request, mark: MarkOfPath, vehicle: VehicleName = None) -> Response:
     return _media(request, mark, "voice", vehicle)
 
 
-@kept.get("/api/marks/{mark}/photo", summary="The photo of a mark", response_class=Response)
+@kept.get(
+    "/api/marks/{mark}/photo", responses=files(*TYPES["photo"]), summary="The photo of a mark", response_class=Response
+)
 def photo(request: Request, mark: MarkOfPath, vehicle: VehicleName = None) -> Response:
     return _media(request, mark, "photo", vehicle)
 

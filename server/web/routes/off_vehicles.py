@@ -9,11 +9,12 @@ from fastapi import Path as InPath
 
 from server.access.identity import LOCAL, principal_of
 from server.control import display_name
+from server.web.interface import raises
 from server.web.middleware.errors import Problem
 from server.web.routes.session_request import NAME_HEADER, Done
 from server.web.services import Services, services
 
-router = APIRouter(tags=["vehicle"])
+router = APIRouter(tags=["vehicle"], responses=raises(404, 409))
 Name = Annotated[str, InPath(max_length=40, description="The car's name")]
 
 

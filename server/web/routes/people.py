@@ -13,11 +13,13 @@ from server.access.identity import LOCAL, principal_of
 from server.control import display_name
 from server.control.duty import ENDS_WITHIN_H
 from server.protocol.people import DutyRole, PeopleList
+from server.web.interface import raises
 from server.web.middleware.errors import Problem
 from server.web.routes.session_request import device_of
 from server.web.services import services
 
-router = APIRouter()
+router = APIRouter(tags=["people"])
+_CHANGES = raises(409, 503)
 PersonId = Annotated[str, Path(max_length=60)]
 PersonName = Annotated[str, Field(min_length=1, max_length=200, examples=["A. K."])]
 _NO_PERSON = "Nobody can be on duty at a program: pair a device, and sign on there."
@@ -54,12 +56,12 @@ class SignOn(BaseModel):
     moves: Annotated[bool, Field(description="true: also where they are on duty at another device, which ends")] = False
 
 
-@router.get("/api/people", tags=["people"], summary="Everybody who can sign on, the last shift first")
+@router.get("/api/people", summary="Everybody who can sign on, the last shift first")
 async def people(request: Request) -> PeopleList:
     return _listed(request)
 
 
-@router.post("/api/people", tags=["people"], summary="One more person")
+@router.post("/api/people", responses=_CHANGES, summary="One more person")
 async def add(request: Request, body: Annotated[NewPerson, Body()]) -> PeopleList:
     added = ""
 
@@ -71,22 +73,22 @@ async def add(request: Request, body: Annotated[NewPerson, Body()]) -> PeopleLis
     return {**listed, "added": added}
 
 
-@router.patch("/api/people", tags=["people"], summary="After how long a duty ends by itself")
+@router.patch("/api/people", responses=_CHANGES, summary="After how long a duty ends by itself")
 async def change_list(request: Request, body: Annotated[ListChange, Body()]) -> PeopleList:
     return await _done(request, services(request).people.set_hours(body.ends_after_h))
 
 
-@router.patch("/api/people/{id}", tags=["people"], summary="Another name or role")
+@router.patch("/api/people/{id}", responses=_CHANGES, summary="Another name or role")
 async def change(request: Request, id: PersonId, body: Annotated[PersonChange, Body()]) -> PeopleList:
     return await _done(request, services(request).people.change(id, name=body.name, role=body.role))
 
 
-@router.delete("/api/people/{id}", tags=["people"], summary="Remove a person who is not on duty")
+@router.delete("/api/people/{id}", responses=_CHANGES, summary="Remove a person who is not on duty")
 async def remove(request: Request, id: PersonId) -> PeopleList:
     return await _done(request, services(request).people.remove(id))
 
 
-@router.post("/api/duty", tags=["people"], summary="Sign on at this device")
+@router.post("/api/duty", responses=_CHANGES, summary="Sign on at this device")
 async def sign_on(request: Request, body: Annotated[SignOn, Body()]) -> PeopleList:
     made = services(request).people.sign_on(
         _device(request), _device_name(request, body.device), body.person, body.role, moves=body.moves
@@ -94,12 +96,12 @@ async def sign_on(request: Request, body: Annotated[SignOn, Body()]) -> PeopleLi
     return await _done(request, made)
 
 
-@router.delete("/api/duty", tags=["people"], summary="Sign off at this device")
+@router.delete("/api/duty", responses=_CHANGES, summary="Sign off at this device")
 async def sign_off(request: Request) -> PeopleList:
     return await _done(request, services(request).people.sign_off(_device(request)))
 
 
-@router.delete("/api/duty/note", tags=["people"], summary="The note of how the last duty ended was read")
+@router.delete("/api/duty/note", responses=_CHANGES, summary="The note of how the last duty ended was read")
 async def dismiss(request: Request) -> PeopleList:
     return await _done(request, services(request).people.dismiss(_device(request)))
 

@@ -11,7 +11,8 @@ from fastapi import APIRouter, Body, HTTPException, Query, Request, Response
 from fastapi import Path as InPath
 from pydantic import BaseModel, ConfigDict, Field
 
-from server.protocol.answers import ExportFormat, RecordingList, VerificationAnswer
+from server.protocol.answers import ExportFormat, Recording, RecordingList, VerificationAnswer
+from server.protocol.http_answers import Deleted, TrashList
 from server.recording.catalog import sketch
 from server.recording.catalog.annotations import BadAnnotation
 from server.recording.catalog.catalog import Catalog
@@ -20,16 +21,18 @@ from server.recording.catalog.discovery import why_not_one_file
 from server.recording.catalog.errors import NotThere, Refused
 from server.recording.catalog.rows import MAX_ROWS
 from server.recording.export.formats import FORMATS
+from server.web.interface import OF_KEPT, UNCHANGED, files, raises
 from server.web.middleware.errors import Problem
 from server.web.middleware.ranges import file_answer
 from server.web.services import services
 
 # None of these routes is `async`: they read a disk and therefore run in threads.
-router = APIRouter(tags=["recordings"])
+router = APIRouter(tags=["recordings"], responses=raises(*OF_KEPT, 409))
 Id = Annotated[str, InPath(max_length=100, description="The recording's `id` in the list")]
 Text = Annotated[str | None, Query(max_length=200)]
 Milliseconds = Annotated[int | None, Query(ge=-(2**53), le=2**53)]
 _TYPES = {"mcap": "application/x-mcap", "bag": "application/x-rosbag", "db3": "application/vnd.sqlite3"}
+_OTHER = "application/octet-stream"
 T = TypeVar("T")
 
 
@@ -72,7 +75,12 @@ def _json(request: Request, body: Any) -> Response:
     return Response(raw, media_type="application/json", headers=headers)
 
 
-@router.get("/api/recordings", summary="The recordings, newest first, a page at a time")
+@router.get(
+    "/api/recordings",
+    response_model=RecordingList,
+    responses=UNCHANGED,
+    summary="The recordings, newest first, a page at a time",
+)
 def listed(
     request: Request,
     cursor: Annotated[str | None, Query(max_length=120, description="`next` of the page before")] = None,
@@ -120,13 +128,18 @@ def listed_formats() -> list[ExportFormat]:
 
 
 @router.post("/api/recordings/rescan", summary="Scan the folder again, and read again what could not be read")
-def rescan(request: Request) -> dict[str, Any]:
+def rescan(request: Request) -> Deleted:
     recordings = catalog(request)
     recordings.rebuild()
     return {"ok": True, **recordings.totals()}
 
 
-@router.get("/api/recordings/{id}", summary="One recording, with the alarms that were raised in it")
+@router.get(
+    "/api/recordings/{id}",
+    response_model=Recording,
+    responses=UNCHANGED,
+    summary="One recording, with the alarms that were raised in it",
+)
 def one(request: Request, id: Id) -> Response:
     row, uploader = catalog(request).row(id), services(request).uploader
     if row is None:
@@ -136,29 +149,40 @@ def one(request: Request, id: Id) -> Response:
     return _json(request, row)
 
 
-@router.get("/api/recordings/{id}/verify", summary="Verify its hash chain: whether it is as it was recorded")
+@router.get(
+    "/api/recordings/{id}/verify",
+    summary="Verify its hash chain: whether it is as it was recorded",
+)
 def verify(request: Request, id: Id) -> VerificationAnswer:
     """Reads the whole file, which can take a minute; one recording at a time, otherwise 409."""
     recordings = catalog(request)
     return _asked(lambda: recordings.verify(id))
 
 
-@router.patch("/api/recordings/{id}", summary="Give it another title, note or tags")
+@router.patch(
+    "/api/recordings/{id}",
+    response_model=Recording,
+    summary="Give it another title, note or tags",
+)
 def annotate(request: Request, id: Id, body: Annotated[AnnotationsChange, Body()]) -> Response:
     recordings = catalog(request)
     said = {"title": body.title, "note": body.note, "weather": body.weather}
     return _json(request, _asked(lambda: recordings.annotate(id, tags=body.tags, **said)))
 
 
-@router.delete("/api/recordings/{id}", summary="Into the trash; it stays there until the trash is emptied")
+@router.delete(
+    "/api/recordings/{id}",
+    response_model=Recording,
+    summary="Into the trash; it stays there until the trash is emptied",
+)
 def delete(request: Request, id: Id) -> Response:
     recordings = catalog(request)
     return _json(request, _asked(lambda: recordings.delete(id)))
 
 
-@router.head("/api/recordings/{id}/file.mcap", include_in_schema=False)
 @router.get(
     "/api/recordings/{id}/file.mcap",
+    responses=files(*_TYPES.values(), _OTHER, in_parts=True),
     summary="Its file as it is, whole or in part",
     response_class=Response,
 )
@@ -171,10 +195,15 @@ def file(request: Request, id: Id) -> Response:
     if (what := why_not_one_file(path)) is not None:
         raise HTTPException(409, f"This recording is {what}: export it, or copy it from the disk.")
     name = f"{id} {row['title']}".strip() + f".{row['format']}"
-    return file_answer(request, path, name=name, media_type=_TYPES.get(row["format"], "application/octet-stream"))
+    return file_answer(request, path, name=name, media_type=_TYPES.get(row["format"], _OTHER))
 
 
-@router.get("/api/recordings/{id}/track.svg", summary="Its track, with its alarms", response_class=Response)
+@router.get(
+    "/api/recordings/{id}/track.svg",
+    responses=files("image/svg+xml"),
+    summary="Its track, with its alarms",
+    response_class=Response,
+)
 def track(request: Request, id: Id) -> Response:
     row = catalog(request).row(id)
     if row is None:
@@ -191,7 +220,12 @@ def track(request: Request, id: Id) -> Response:
     )
 
 
-@router.get("/api/trash", summary="What was deleted and can be taken back, deleted last first")
+@router.get(
+    "/api/trash",
+    response_model=TrashList,
+    responses=UNCHANGED,
+    summary="What was deleted and can be taken back, deleted last first",
+)
 def trash(
     request: Request,
     cursor: Annotated[str | None, Query(max_length=120)] = None,
@@ -203,19 +237,19 @@ def trash(
     return _json(request, {"recordings": page.rows, "next": page.next, "all": recordings.totals(which)})
 
 
-@router.post("/api/trash/{id}/restore", summary="Restore")
+@router.post("/api/trash/{id}/restore", response_model=Recording, summary="Restore")
 def restore(request: Request, id: Id) -> Response:
     recordings = catalog(request)
     return _json(request, _asked(lambda: recordings.restore(id)))
 
 
 @router.delete("/api/trash/{id}", summary="Delete it for good")
-def destroy(request: Request, id: Id) -> dict[str, Any]:
+def destroy(request: Request, id: Id) -> Deleted:
     recordings = catalog(request)
     return {"ok": True, **_asked(lambda: recordings.destroy(id))}
 
 
 @router.delete("/api/trash", summary="Empty the trash: delete all of it for good")
-def empty(request: Request) -> dict[str, Any]:
+def empty(request: Request) -> Deleted:
     recordings = catalog(request)
     return {"ok": True, **_asked(lambda: recordings.destroy(None))}

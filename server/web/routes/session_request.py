@@ -20,6 +20,7 @@ from server.protocol import messages
 from server.protocol.command_base import PAGE
 from server.replay.manager import NoReplay
 from server.system import log_context
+from server.web.interface import raises
 from server.web.middleware.errors import Problem
 from server.web.services import Services, services
 
@@ -34,6 +35,7 @@ VehicleName = Annotated[str | None, Query(description="Which vehicle; the first 
 MeantVehicle = Annotated[
     str | None, Query(description="Which vehicle; required where there are several", max_length=40)
 ]
+OF_VEHICLE = raises(404, 409, 422, 503)  # of a route that asks a session, as `ask` raises them
 ReplayToken = Annotated[str | None, Query(description="Of a page's replay, as its state names it", max_length=40)]
 
 

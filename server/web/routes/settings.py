@@ -8,24 +8,29 @@ from fastapi import APIRouter, Body, HTTPException, Request, Response
 from pydantic import BaseModel
 
 from server.protocol import commands
+from server.protocol.answers import SettingsAnswer
+from server.web.interface import files, takes
 from server.web.routes.commands import body_of
-from server.web.routes.session_request import VehicleName, as_json, ask, vehicle_of
+from server.web.routes.session_request import OF_VEHICLE, VehicleName, as_json, ask, vehicle_of
+from server.web.routes.state import TOML
 from server.web.services import services
 
-router = APIRouter(tags=["settings"])
+router = APIRouter(tags=["settings"], responses=OF_VEHICLE)
 if TYPE_CHECKING:
     SettingsChange = BaseModel
 else:
     SettingsChange = body_of(commands.Set, is_strict=True)
 
 
-@router.get("/api/settings", summary="Settings in force, their defaults, ranges and units")
+@router.get(
+    "/api/settings", response_model=SettingsAnswer, summary="Settings in force, their defaults, ranges and units"
+)
 async def settings(request: Request, vehicle: VehicleName = None) -> Response:
     body = await ask(request, vehicle, {"kind": "settings"})
     return as_json({name: value for name, value in body.items() if name != "toml"})
 
 
-@router.patch("/api/settings", summary="Change some settings; they count at once")
+@router.patch("/api/settings", response_model=SettingsAnswer, summary="Change some settings; they count at once")
 async def change_settings(
     request: Request, body: Annotated[SettingsChange, Body()], vehicle: VehicleName = None
 ) -> Response:
@@ -33,18 +38,25 @@ async def change_settings(
     return await settings(request, vehicle)
 
 
-@router.get("/api/settings.toml", summary="What was changed, as a TOML file")
+@router.get(
+    "/api/settings.toml", response_class=Response, responses=files(TOML), summary="What was changed, as a TOML file"
+)
 async def export_settings(request: Request, vehicle: VehicleName = None) -> Response:
     body = await ask(request, vehicle, {"kind": "settings"})
     name = f"catgraph-{vehicle_of(services(request), vehicle)}.toml"
     return Response(
         body["toml"],
-        media_type="application/toml; charset=utf-8",
+        media_type=f"{TOML}; charset=utf-8",
         headers={"Content-Disposition": f'attachment; filename="{name}"'},
     )
 
 
-@router.put("/api/settings.toml", summary="Take all settings from a TOML file")
+@router.put(
+    "/api/settings.toml",
+    response_model=SettingsAnswer,
+    openapi_extra=takes(TOML),
+    summary="Take all settings from a TOML file",
+)
 async def import_settings(request: Request, vehicle: VehicleName = None) -> Response:
     try:
         text = (await limited_body(request, 64 * 1024)).decode("utf-8")

@@ -12,17 +12,30 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from monitor.signals import CHARTED
 from server.access.identity import is_known
 from server.bus.bus import NotServed
-from server.protocol.drive_trends import LEAST_BUCKETS, MOST_BUCKETS, MOST_SIGNALS
+from server.protocol.answers import SignalsAnswer, TrackPoints
+from server.protocol.departure import DepartureAnswer
+from server.protocol.drive_trends import LEAST_BUCKETS, MOST_BUCKETS, MOST_SIGNALS, DriveTrendsAnswer
+from server.protocol.driving_state import DrivingAnswer, InterventionAnswer
+from server.protocol.http_answers import Health, Track, VehicleList, VehicleRow
+from server.protocol.state import LiveState, Trends
+from server.web.interface import files
 from server.web.middleware.errors import Problem
-from server.web.routes.session_request import ReplayToken, VehicleName, as_json, ask, ask_either, vehicle_of
+from server.web.routes.session_request import OF_VEHICLE, ReplayToken, VehicleName, as_json, ask, ask_either, vehicle_of
 from server.web.services import Services, services
 
 router = APIRouter()
+TOML = "application/toml"
 AGENT_WITHIN_S = 1.0  # an agent that has not answered then is called lost
 COUNTED_WITHIN_S = 2.0  # a health check must work while the disk hangs
 
 
-@router.get("/api/health", tags=["server"], summary="Is the server well?")
+@router.get(
+    "/api/health",
+    response_model=Health,
+    responses={503: {"model": Health, "description": "Impaired"}},
+    tags=["server"],
+    summary="Is the server well?",
+)
 async def health(request: Request) -> Response:
     """200 and "ok"; 200 and "cars lost" where the server is well and cars are not heard, because another server would
     not hear them either; 503 and "impaired" with the problems. A caller who is not known gets status and version only.
@@ -46,10 +59,10 @@ async def health(request: Request) -> Response:
     return Response(orjson.dumps(body), status_code=503 if found else 200, media_type="application/json")
 
 
-async def _listed(app: Services) -> list[dict[str, Any]]:
+async def _listed(app: Services) -> list[VehicleRow]:
     """Name, address and phase of each vehicle; one whose agent does not answer is lost."""
 
-    async def one(name: str) -> dict[str, Any]:
+    async def one(name: str) -> VehicleRow:
         session = app.sessions.get(name)
         if session is not None:
             return {"name": name, "address": session.address_url or session.configured, "phase": session.phase}
@@ -76,7 +89,7 @@ async def _counted(app: Services, problems: list[str]) -> Mapping[str, object] |
 
 
 @router.get("/api/vehicles", tags=["vehicle"], summary="The vehicles this server watches, and those found nearby")
-async def vehicles(request: Request) -> dict[str, Any]:
+async def vehicles(request: Request) -> VehicleList:
     app = services(request)
     return {
         "vehicles": await _listed(app),
@@ -84,50 +97,98 @@ async def vehicles(request: Request) -> dict[str, Any]:
     }
 
 
-@router.get("/api/state", tags=["vehicle"], summary="Everything known of a vehicle now")
+@router.get(
+    "/api/state",
+    response_model=LiveState,
+    responses=OF_VEHICLE,
+    tags=["vehicle"],
+    summary="Everything known of a vehicle now",
+)
 async def state(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json(await ask(request, vehicle, {"kind": "state"}))
 
 
-@router.get("/api/signals", tags=["vehicle"], summary="Topics for each signal and beyond, what was rejected and why")
+@router.get(
+    "/api/signals",
+    response_model=SignalsAnswer,
+    responses=OF_VEHICLE,
+    tags=["vehicle"],
+    summary="Topics for each signal and beyond, what was rejected and why",
+)
 async def signals(request: Request, vehicle: VehicleName = None, replay: ReplayToken = None) -> Response:
     return as_json(await ask_either(request, vehicle, replay, {"kind": "signals"}))
 
 
-@router.get("/api/driving", tags=["vehicle"], summary="Time and distance in each mode, interventions and alarms a km")
+@router.get(
+    "/api/driving",
+    response_model=DrivingAnswer,
+    responses=OF_VEHICLE,
+    tags=["vehicle"],
+    summary="Time and distance in each mode, interventions and alarms a km",
+)
 async def driving(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json(await ask(request, vehicle, {"kind": "driving"}))
 
 
-@router.get("/api/interventions/{intervention}", tags=["vehicle"], summary="One intervention, with the 16 s about it")
+@router.get(
+    "/api/interventions/{intervention}",
+    response_model=InterventionAnswer,
+    responses=OF_VEHICLE,
+    tags=["vehicle"],
+    summary="One intervention, with the 16 s about it",
+)
 async def intervention(
     request: Request, intervention: Annotated[str, Path(max_length=40)], vehicle: VehicleName = None
 ) -> Response:
     return as_json(await ask(request, vehicle, {"kind": "intervention", "intervention": intervention}))
 
 
-@router.get("/api/departure", tags=["vehicle"], summary="The departure check: its list, what became of it, who signed")
+@router.get(
+    "/api/departure",
+    response_model=DepartureAnswer,
+    responses=OF_VEHICLE,
+    tags=["vehicle"],
+    summary="The departure check: its list, what became of it, who signed",
+)
 async def departure(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json(await ask(request, vehicle, {"kind": "departure"}))
 
 
-@router.get("/api/departure.toml", tags=["vehicle"], summary="The list of the departure check, as a TOML file")
+@router.get(
+    "/api/departure.toml",
+    response_class=Response,
+    responses=OF_VEHICLE | files(TOML),
+    tags=["vehicle"],
+    summary="The list of the departure check, as a TOML file",
+)
 async def departure_list(request: Request, vehicle: VehicleName = None) -> Response:
     body = await ask(request, vehicle, {"kind": "departure"})
     name = f"{vehicle_of(services(request), vehicle)}.departure.toml"
     return Response(
         body["toml"],
-        media_type="application/toml; charset=utf-8",
+        media_type=f"{TOML}; charset=utf-8",
         headers={"Content-Disposition": f'attachment; filename="{name}"'},
     )
 
 
-@router.get("/api/track", tags=["vehicle"], summary="The track since connecting, as GeoJSON")
+@router.get(
+    "/api/track",
+    response_model=Track,
+    responses=OF_VEHICLE,
+    tags=["vehicle"],
+    summary="The track since connecting, as GeoJSON",
+)
 async def track(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json(await ask(request, vehicle, {"kind": "track"}))
 
 
-@router.get("/api/track/points", tags=["vehicle"], summary="The track's points beyond one, with their numbers")
+@router.get(
+    "/api/track/points",
+    response_model=TrackPoints,
+    responses=OF_VEHICLE,
+    tags=["vehicle"],
+    summary="The track's points beyond one, with their numbers",
+)
 async def track_points(
     request: Request,
     vehicle: VehicleName = None,
@@ -137,7 +198,13 @@ async def track_points(
     return as_json(await ask_either(request, vehicle, replay, {"kind": "track_points", "after": after}))
 
 
-@router.get("/api/trends", tags=["vehicle"], summary="The last minute of speed, pedals, steering and distance")
+@router.get(
+    "/api/trends",
+    response_model=Trends,
+    responses=OF_VEHICLE,
+    tags=["vehicle"],
+    summary="The last minute of speed, pedals, steering and distance",
+)
 async def trends(
     request: Request,
     vehicle: VehicleName = None,
@@ -148,7 +215,11 @@ async def trends(
 
 
 @router.get(
-    "/api/trends/drive", tags=["vehicle"], summary="Signals over the whole drive, lowest and highest in buckets"
+    "/api/trends/drive",
+    response_model=DriveTrendsAnswer,
+    responses=OF_VEHICLE,
+    tags=["vehicle"],
+    summary="Signals over the whole drive, lowest and highest in buckets",
 )
 async def drive_trends(
     request: Request,

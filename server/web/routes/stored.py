@@ -13,15 +13,20 @@ from pydantic import BaseModel, ConfigDict, Field
 from server.protocol.answers import StoredCopy, StoredList
 from server.recording.catalog.errors import NotThere, Refused
 from server.recording.store.trouble import StoreTrouble
+from server.web.interface import OF_KEPT, files, raises
+from server.web.middleware.methods import is_head
 from server.web.middleware.ranges import disposition
 from server.web.services import services
 
 # None of these routes is `async`: they ask the store and therefore run in threads.
-router = APIRouter(tags=["recordings"])
-copies = APIRouter(tags=["recordings"])  # of recordings: at a web node their agents answer
+router = APIRouter(tags=["recordings"], responses=raises(404, 409, 502))
+copies = APIRouter(
+    tags=["recordings"], responses=raises(*OF_KEPT, 409)
+)  # of recordings: at a web node their agents answer
 Id = Annotated[str, InPath(max_length=100, description="The recording's `id` in the list")]
 Folder = Annotated[str, InPath(max_length=40, description="`folder` of the recording in the list")]
 Name = Annotated[str, InPath(max_length=120)]
+_KIND = "application/octet-stream"
 T = TypeVar("T")
 
 
@@ -78,12 +83,22 @@ def listed(
     return _asked(lambda: stored.page(vehicle=vehicle, cursor=cursor, limit=limit))
 
 
-@router.get("/api/stored/{folder}/{id}/file", summary="The whole file, from the store", response_class=Response)
+@router.get(
+    "/api/stored/{folder}/{id}/file",
+    responses=files(_KIND),
+    summary="The whole file, from the store",
+    response_class=Response,
+)
 def fetched(request: Request, folder: Folder, id: Id) -> Response:
     return _answer(request, lambda stored: stored.file(folder, id))
 
 
-@router.get("/api/stored/{folder}/{id}/clips/{name}", summary="A clip, from the store", response_class=Response)
+@router.get(
+    "/api/stored/{folder}/{id}/clips/{name}",
+    responses=files(_KIND),
+    summary="A clip, from the store",
+    response_class=Response,
+)
 def fetched_clip(request: Request, folder: Folder, id: Id, name: Name) -> Response:
     return _answer(request, lambda stored: stored.clip(folder, id, name))
 
@@ -95,13 +110,15 @@ def _answer(request: Request, find: Callable[[Any], Any]) -> Response:
     if stored is None:
         raise HTTPException(404, _no_store(request))
     file = _asked(lambda: find(stored))
-    portions = _asked(lambda: stored.read(file))
     headers = {
         "Content-Length": str(file.size),
         "Content-Disposition": disposition(file.name),
         "Cache-Control": "private, no-cache",
     }
-    return StreamingResponse(portions, headers=headers, media_type="application/octet-stream")
+    if is_head(request):
+        return Response(headers=headers, media_type=_KIND)
+    portions = _asked(lambda: stored.read(file))
+    return StreamingResponse(portions, headers=headers, media_type=_KIND)
 
 
 def _copy(request: Request, id: str) -> StoredCopy:

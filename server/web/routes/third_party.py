@@ -10,12 +10,13 @@ from pydantic import BaseModel
 
 from server.system.page_files import static_dir
 from server.web.assets.third_party import Part, parts
+from server.web.interface import raises
 from server.web.services import services
 
 router = APIRouter()
 
 
-class PartOut(BaseModel):
+class ThirdPartyPart(BaseModel):
     """A part of somebody else's."""
 
     name: str
@@ -30,7 +31,7 @@ class About(BaseModel):
     version: str
     python: str
     system: str
-    parts: list[PartOut]
+    parts: list[ThirdPartyPart]
 
 
 def _parts() -> tuple[Part, ...]:
@@ -44,12 +45,19 @@ def about(request: Request) -> About:
         python=platform.python_version(),
         system=f"{platform.system()} {platform.machine()}",
         parts=[
-            PartOut(name=part.name, version=part.version, license=part.license, where=part.where) for part in _parts()
+            ThirdPartyPart(name=part.name, version=part.version, license=part.license, where=part.where)
+            for part in _parts()
         ],
     )
 
 
-@router.get("/api/notices/{name}", tags=["server"], summary="The licence text of one part")
+@router.get(
+    "/api/notices/{name}",
+    response_class=PlainTextResponse,
+    responses=raises(404),
+    tags=["server"],
+    summary="The licence text of one part",
+)
 def notice(name: str) -> PlainTextResponse:
     part = next((part for part in _parts() if part.name == name), None)
     if part is None:
