@@ -51,6 +51,7 @@ class KeepingBridge:
         self.stuck: set[str] = set()  # topics of which each subscription is given one message, as on ROS 2
         self.is_open = False
         self.trip_s = 0.0  # what the link needs there and back
+        self.connects_s = 0.0  # what the bridge needs to find the publishers of a topic whose last subscription ended
         self.heard_s: float | None = None
         self.subscribed: list[tuple[float, str]] = []  # when each subscription was sent
         self._has_rosapi = has_rosapi
@@ -138,6 +139,12 @@ class KeepingBridge:
         self._rows.pop(topic, None)
 
     def renew(self, topic: str) -> None:
+        row = self._rows.pop(topic) if self.connects_s else self._rows[topic]
+        self._begin(row)
+        if self.connects_s:
+            asyncio.get_running_loop().call_later(self.connects_s, self._rows.__setitem__, topic, row)
+
+    def again(self, topic: str) -> None:
         self._begin(self._rows[topic])
 
     def ping(self) -> None:
