@@ -137,6 +137,8 @@ class Drive:
         self.ros_version = source.ros_version
         self.delay = delay
         self.clock_steps: Sequence[ClockStep] = getattr(source, "clock_steps", ())  # what is no file has none
+        # The time of day at the beginning; None: one that was set proves nothing.
+        self.wall_zero_s = None if self.clock_steps or recorded.clock_was_set else source.start_s
         self.notes: list[str] = [*getattr(source, "clock_notes", ()), *source.notes, *recorded.notes]
         self._names: dict[str, str] = {}  # as the recording spells a topic → as a bridge would offer it
         for topic in source.topics:

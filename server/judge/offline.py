@@ -330,7 +330,7 @@ def _link(drive: Drive, epoch: SettingsEpoch, run_state: RunState, now_s: float)
         carriers=epoch.carriers,
         compared=epoch.compared,
         undecided=epoch.undecided,
-        wall_zero_s=None if drive.clock_steps else drive.start_s,  # one that was set proves nothing
+        wall_zero_s=drive.wall_zero_s,
     )
 
 
