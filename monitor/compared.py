@@ -137,7 +137,8 @@ class Comparisons:
                 if facts.carriers.get(signal, topic) != topic:
                     self.forget(signal)
         if facts.carriers is not before.carriers or facts.compared is not before.compared:
-            self._has_several = not facts.carriers or bool(facts.compared) or len(facts.carriers.keys() & MOTION) > 1
+            is_known = facts.compared is not None and bool(facts.carriers)
+            self._has_several = not is_known or bool(facts.compared) or len(facts.carriers.keys() & MOTION) > 1
         wanted = facts.compared
         if wanted is None or facts.opened_s is None or (wanted is before.compared and self._is_awaiting):
             return

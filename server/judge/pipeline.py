@@ -107,10 +107,7 @@ def receive(
             basis = UnitBasis(profile=profile, chosen=units, tyre_rad_per_unit=tyre_rad_per_unit)
             published, value = value, reception.in_unit(source, value, at_s, basis)
             if reception.units.is_void:
-                state.forget(source.signal)  # what was received of it is of another unit, or of none
-                number = number_of(published)
-                if value is None and number is not None and on_number is not None:
-                    on_number(source.signal, number, reception.units.unconverted(source), at_s, stamp)
+                _void(source, reception, state, None if value is not None else published, at_s, stamp, on_number)
         if value is None:
             is_proper &= _without_value(source, reception, state, at_s)
             continue
@@ -143,6 +140,22 @@ def _without_value(source: Source, reception: Reception, state: State, at_s: flo
     if source.decode is not None:
         state.refuse(source.signal, tally.last_reason or "unreadable", at_s)
     return False
+
+
+def _void(
+    source: Source,
+    reception: Reception,
+    state: State,
+    published: Any | None,
+    at_s: float,
+    stamp: float | None,
+    on_number: OnNumber | None,
+) -> None:
+    """What was received of a signal is of another unit, or of none; `published`: a value of which none follows."""
+    state.forget(source.signal)
+    number = number_of(published)
+    if number is not None and on_number is not None:
+        on_number(source.signal, number, reception.units.unconverted(source), at_s, stamp)
 
 
 def _refuse(sources: tuple[Source, ...], why: str, at_s: float, reception: Reception, state: State) -> None:
