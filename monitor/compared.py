@@ -48,6 +48,7 @@ class Compared:
 NOTHING_COMPARED = Compared()
 
 
+MOTION = frozenset({"speed", "odometry", "position"})  # signals whose sources are compared with each other
 MOVING = frozenset({Twist, Odometry, GpsFix})  # values that say how the car moves
 
 
@@ -122,6 +123,7 @@ class Comparisons:
         self._came: set[tuple[str, str]] = set()  # signal and topic of what was awaited and sent anything
         self._is_awaiting = False  # `_awaited` is of the link that is open
         self._link = LinkFacts()
+        self._has_several = True  # sources of the motion, as far as is known
         self._known: Compared | None = NOTHING_COMPARED
 
     def link(self, facts: LinkFacts, now_s: float) -> None:
@@ -134,6 +136,9 @@ class Comparisons:
             for signal, topic in before.carriers.items():
                 if facts.carriers.get(signal, topic) != topic:
                     self.forget(signal)
+        if facts.carriers is not before.carriers or facts.compared is not before.compared:
+            is_known = facts.compared is not None and bool(facts.carriers)
+            self._has_several = not is_known or bool(facts.compared) or len(facts.carriers.keys() & MOTION) > 1
         wanted = facts.compared
         if wanted is None or facts.opened_s is None or (wanted is before.compared and self._is_awaiting):
             return
@@ -154,7 +159,7 @@ class Comparisons:
 
     def receive(self, signal: str, reading: Reading[Any]) -> None:
         """A reading of the signal itself."""
-        if type(reading.value) not in MOVING:
+        if type(reading.value) not in MOVING or not self._has_several:
             return
         follower = self._own.get(signal)
         if follower is None:

@@ -29,23 +29,30 @@ class CauseTable:
             self._visit(alarm_id, inhibited_by, ())
         self.inhibitors = frozenset(name for names in self._closure.values() for name in names)
         self._gone_at_s: dict[str, float | None] = {}  # when each inhibitor's condition went; None: it is there
+        self._held: frozenset[str] = frozenset()  # the inhibitors that hold at `_held_s`
+        self._held_s: float | None = None  # None: they are to be found anew
 
     def note(self, alarm: Alarm, now_s: float) -> None:
         """Store whether this alarm's condition holds; called after each of its evaluations."""
         if alarm.id not in self.inhibitors:
             return
         if alarm.condition:
-            self._gone_at_s[alarm.id] = None
+            if self._gone_at_s.get(alarm.id, now_s) is not None:
+                self._gone_at_s[alarm.id] = self._held_s = None
         elif alarm.id in self._gone_at_s:
             gone_at_s = self._gone_at_s[alarm.id]
             if gone_at_s is None or gone_at_s > now_s:  # it ends now, or the clock went back: the grace restarts
                 self._gone_at_s[alarm.id] = now_s
+                self._held_s = None
 
     def holding(self, alarm_id: str, now_s: float) -> tuple[str, ...]:
         """The alarms that now explain this one away."""
         if not self._gone_at_s:
             return ()
-        held = [name for name in self._gone_at_s if self._holds(name, now_s)]  # few, and asked for all alarms
+        if self._held_s != now_s:  # asked for all alarms at each moment
+            self._held_s = now_s
+            self._held = frozenset(name for name in self._gone_at_s if self._holds(name, now_s))
+        held = self._held
         return tuple(name for name in self._closure[alarm_id] if name in held) if held else ()
 
     def remembers(self, alarm_id: str) -> bool:
@@ -54,6 +61,7 @@ class CauseTable:
 
     def clear(self) -> None:
         self._gone_at_s.clear()
+        self._held_s = None
 
     def _holds(self, name: str, now_s: float) -> bool:
         gone_at_s = self._gone_at_s[name]

@@ -178,6 +178,8 @@ class _Rehearsal(Observer):
             self._broke_off = str(error)  # it is judged up to there
         if self._messages:
             self._sample(run.run_state.monitor, self._last_s)
+        frames = run.run_state.frames or self._drive.frames
+        self.notes += [note for note in frames.notes if note not in self.notes]
         self.notes += unit_sentences(run.run_state.reception.units, run.epoch.sources)
         self._note_rejected()
         return self._found(run)

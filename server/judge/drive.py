@@ -87,6 +87,7 @@ class SettingsEpoch:
     listeners: Mapping[str, tuple[Source, ...]]  # by topic as the recording spells it
     carriers: Mapping[str, str]  # signal → the topic that carries it
     compared: Mapping[str, tuple[str, ...]]  # signal → further topics of it
+    published: frozenset[str]  # the signals that the car has in a form that can be read
     competing: frozenset[str] = frozenset()  # topics as the recording spells them, of signals that none carries yet
 
     @property
@@ -103,11 +104,6 @@ class SettingsEpoch:
     def questions(self) -> Sequence[Question]:
         """What the operator would be asked."""
         return self.choice.questions
-
-    @property
-    def published(self) -> frozenset[str]:
-        """The signals that the car has in a form that can be read."""
-        return pipeline.published(self.sources.values())
 
 
 class Drive:
@@ -141,6 +137,8 @@ class Drive:
         self.ros_version = source.ros_version
         self.delay = delay
         self.clock_steps: Sequence[ClockStep] = getattr(source, "clock_steps", ())  # what is no file has none
+        # The time of day at the beginning; None: one that was set proves nothing.
+        self.wall_zero_s = None if self.clock_steps or recorded.clock_was_set else source.start_s
         self.notes: list[str] = [*getattr(source, "clock_notes", ()), *source.notes, *recorded.notes]
         self._names: dict[str, str] = {}  # as the recording spells a topic → as a bridge would offer it
         for topic in source.topics:
@@ -228,6 +226,7 @@ class Drive:
             listeners=listeners,
             carriers=pipeline.carriers(choice.sources.values()),
             compared=pipeline.compared(source for sources in by_topic.values() for source in sources),
+            published=pipeline.published(choice.sources.values()),
             competing=frozenset(topic for topic, name in self._names.items() if name in choice.competing),
         )
 

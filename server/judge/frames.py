@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -67,19 +68,19 @@ class Frames:
         self._kept: dict[tuple[str, str], tuple[int, Any, Mounting]] = {}  # by topic and frame
         self._axes: dict[tuple[str, str], tuple[int, Axes]] = {}  # by topic and frame
         self._located: dict[str, str] = {}  # topic → the frame whose place its transforms gave
-        self._asked: set[tuple[str, str]] = set()  # topics and frames that were asked for
-        self._size = 0  # frames of all trees
-        self._noted = (0, 0)  # of how many frames and sensors the needed names were noted
+        self._asked: dict[tuple[str, str], None] = {}  # topics and frames that were asked for, the newest last
+        self._growth = 0  # grows with each frame and each sensor that comes to be known
+        self._noted = -1  # the growth when the needed names were noted
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = ("_trees", "_changes", "_located", "_asked", "_size")
-        return {"_kept": {}, "_axes": {}, "_noted": (0, 0)} | {name: getattr(self, name) for name in kept}
+        kept = ("_trees", "_changes", "_located", "_asked", "_growth")
+        return {"_kept": {}, "_axes": {}, "_noted": -1} | {name: getattr(self, name) for name in kept}
 
     def forget(self) -> None:
         """The link opens again: what is latched is sent again, and may be of another calibration by now."""
         self._trees.clear()
         self._asked.clear()
-        self._size = 0
+        self._growth += 1
         self._changes += 1
 
     def receive(self, topic: str, message: Any) -> None:
@@ -90,10 +91,10 @@ class Frames:
             if len(self._trees) >= MAX_TREES:
                 return
             tree = self._trees[space] = FrameTree()
-        before = tree.version
+        version, taken = tree.version, tree.taken
         tree.add(message, is_static=is_static(topic))
-        self._changes += tree.version - before
-        self._size = sum(tree.size for tree in self._trees.values())
+        self._changes += tree.version - version
+        self._growth += tree.taken - taken
 
     @property
     def notes(self) -> list[str]:
@@ -132,23 +133,29 @@ class Frames:
     def note_needed(self, names: set[bytes]) -> None:
         """Change `names` to those of which a serialized message of transforms that may count holds one, if it is not of
         the same frames as before; of all where a name may be spelled in another way there."""
-        known = (self._size, len(self._asked))
-        if names and known == self._noted:
+        if names and self._growth == self._noted:
             return
-        self._noted = known
-        asked = [one for one in self._asked if not self.is_settled(*one)]
-        needed = {name for topic, frame in asked for name in (self.tree_of(topic) or FrameTree()).needed(frame)}
+        self._noted = self._growth
+        needed = {name for topic, frame in self._asked for name in (self.tree_of(topic) or FrameTree()).needed(frame)}
         found = {name.rpartition("/")[2].encode() if PLAIN.fullmatch(name) else b"" for name in needed}
         names.clear()
         names.update(found or {NOTHING})
 
     def ask(self, topic: str, frame: str) -> None:
         """A sensor's frame is to be placed."""
-        self._ask(topic, frame_name(frame))
+        frame = frame_name(frame)
+        self._ask(topic, frame)
+        with suppress(Contradiction):
+            if self.locate(topic, frame) is not None and len(self._located) < MAX_SENSORS:
+                self._located[topic] = frame
 
     def _ask(self, topic: str, frame: str) -> None:
-        if len(self._asked) < MAX_SENSORS:
-            self._asked.add((topic, frame))
+        if self._asked.pop((topic, frame), 0) is not None:
+            self._growth += 1
+        self._asked[topic, frame] = None
+        if len(self._asked) > MAX_SENSORS:
+            del self._asked[next(iter(self._asked))]
+        (self.tree_of(topic) or FrameTree()).place(frame)
 
     def axes(self, topic: str, frame: str) -> Axes:
         """What is known of the axes of a frame in which a topic gives vectors."""

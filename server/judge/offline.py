@@ -24,6 +24,7 @@ from server.judge.recorded_events import ChosenPhone, NewSettings, Pause
 from server.judge.recorded_slowdown import SlowDownEvent
 from server.judge.run_state import RunState
 from server.judge.unit_watch import UnitWatch
+from server.judge.units import Unit
 
 SILENCE_S = 600.0  # after so long without a message nothing new can be said: the judge is not stepped through the rest
 QUIET_S, QUIET_TICKS = 60.0, 20  # after so long without a message, every check is judged at one tick in so many
@@ -39,8 +40,10 @@ class Observer:
     def value_decoded(self, signal: str, value: Any, now_s: float, stamp_s: float | None) -> None:
         """A message holds this value; `stamp_s`: by its header, on the car's clock."""
 
-    def number_decoded(self, signal: str, number: float, now_s: float, stamp_s: float | None) -> None:
-        """A message holds a number whose unit is not known."""
+    def number_decoded(
+        self, signal: str, number: float, unit: Unit | None, now_s: float, stamp_s: float | None
+    ) -> None:
+        """A message holds a number whose unit is not known (None), or cannot be converted."""
 
     def signals_changed(self, changed: tuple[str, ...], state: State, now_s: float) -> None:
         """A message changed these signals; what comes of it was judged."""
@@ -105,10 +108,9 @@ class OfflineRun:
     def _begin(self, from_s: float) -> RunState:
         epoch = self.drive.epochs[0]
         limits = epoch.tuning.limits
-        monitor = Monitor(limits=limits)
         return RunState(
             state=State(expected_rates(limits)),
-            monitor=monitor,
+            monitor=Monitor(limits=limits),
             trends=Trends(from_s),
             opened_s=from_s,
             at_s=from_s,
@@ -307,8 +309,7 @@ class OfflineRun:
                 run_state.load.add([event])
             elif not isinstance(event, PhoneReport):
                 self._apply(event, at_s)
-        if before:
-            self._restore(before)
+        self._restore(before)
 
 
 def _link(drive: Drive, epoch: SettingsEpoch, run_state: RunState, now_s: float) -> LinkFacts:
@@ -329,7 +330,7 @@ def _link(drive: Drive, epoch: SettingsEpoch, run_state: RunState, now_s: float)
         carriers=epoch.carriers,
         compared=epoch.compared,
         undecided=epoch.undecided,
-        wall_zero_s=None if drive.clock_steps else drive.start_s,  # one that was set proves nothing
+        wall_zero_s=drive.wall_zero_s,
     )
 
 

@@ -17,13 +17,15 @@ from server.judge.profiles import Profile
 from server.judge.reception_stats import Reception
 from server.judge.topics import Source
 from server.judge.unit_watch import UnitBasis, number_of
-from server.judge.units import UNITS
+from server.judge.units import UNITS, Unit
 
 TICK_S = 0.05  # every check is judged this often
 
 OF_THE_CAR = (LaserScan, DriveMode)  # what their values mean depends on the car
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 ByTopic = Mapping[str, tuple[Source, ...]]
+# Signal, number as it was published, its unit (None: not known), seconds, and stamp by the car.
+OnNumber = Callable[[str, float, Unit | None, float, float | None], None]
 
 
 class Delays(Protocol):
@@ -74,14 +76,14 @@ def receive(
     frames: Frames | None = None,
     limits: AllLimits | None = None,
     on_value: Callable[[str, Any, float, float | None], None] | None = None,
-    on_number: Callable[[str, float, float, float | None], None] | None = None,
+    on_number: OnNumber | None = None,
     steady_stamp: Callable[[float], float] | None = None,
 ) -> tuple[str, ...]:
     """One message of one topic into the state; the signals that changed by it, none by what is only compared. `at_s` is
     the receiver's clock; `tyre_rad_per_unit` of the steering signal, 0: not known; `units` are the operator's choices,
     signal → name; `transport` None: it came without delay, as far as is known. `frames` and `limits`: by which a laser
     is mounted; None: at the nose. `on_value` receives each decoded value: signal, value, `at_s`, stamp; `on_number`
-    each number whose unit is not known, as it was published; `steady_stamp` corrects a stamp by a clock that was set.
+    each number of which no value follows, as it was published; `steady_stamp` corrects a stamp by a clock that was set.
     """
     reception.received += 1
     stamp = stamp_s(message)
@@ -105,7 +107,7 @@ def receive(
             basis = UnitBasis(profile=profile, chosen=units, tyre_rad_per_unit=tyre_rad_per_unit)
             published, value = value, reception.in_unit(source, value, at_s, basis)
             if reception.units.is_void:
-                _void(source, state, None if value is not None else published, at_s, stamp, on_number)
+                _void(source, reception, state, None if value is not None else published, at_s, stamp, on_number)
         if value is None:
             is_proper &= _without_value(source, reception, state, at_s)
             continue
@@ -142,16 +144,18 @@ def _without_value(source: Source, reception: Reception, state: State, at_s: flo
 
 def _void(
     source: Source,
+    reception: Reception,
     state: State,
     published: Any | None,
     at_s: float,
     stamp: float | None,
-    on_number: Callable[[str, float, float, float | None], None] | None,
+    on_number: OnNumber | None,
 ) -> None:
-    """What was received of a signal is of another unit, or of none; `published`: a value whose unit is not known."""
+    """What was received of a signal is of another unit, or of none; `published`: a value of which none follows."""
     state.forget(source.signal)
-    if published is not None and on_number is not None and (number := number_of(published)) is not None:
-        on_number(source.signal, number, at_s, stamp)
+    number = number_of(published)
+    if number is not None and on_number is not None:
+        on_number(source.signal, number, reception.units.unconverted(source), at_s, stamp)
 
 
 def _refuse(sources: tuple[Source, ...], why: str, at_s: float, reception: Reception, state: State) -> None:

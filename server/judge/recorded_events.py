@@ -41,4 +41,5 @@ class RecordedEvents:
     events: tuple[tuple[float, RecordedEvent], ...] = ()
     has_alarms: bool = False  # it holds the alarms as they were announced
     settings: str | None = None  # that were in force at its start; None: unknown
+    clock_was_set: bool = False  # of the server, while it recorded
     notes: tuple[str, ...] = field(default=())

@@ -39,7 +39,8 @@ class RecordedTransforms:
             found = set()
         self._moving = frozenset(topic for topic in found if not is_static(names[topic]))
         self.frames = Frames()
-        self._learn(self.frames, found - self._moving, MOST_STATIC)
+        self._static = found - self._moving
+        self._learn(self.frames, self._static, MOST_STATIC)
 
     def looks_ahead(self, topic: str, scan: LaserScan) -> bool | None:
         """Whether the laser of a topic, as a bridge would offer it, looks ahead; None: no transform says."""
@@ -47,19 +48,15 @@ class RecordedTransforms:
         return self._with_moving.looks_ahead(topic, scan) if found is None and self._moving else found
 
     def follow(self, listened: Mapping[str, str]) -> frozenset[str]:
-        """The topics of transforms that move if what is placed on the car, of the topics `listened` to (as the
-        recording spells one → as a bridge would), may be placed by them: a run has to follow them; `frames` then has
-        their first messages."""
+        """The topics of transforms that move if anything of the topics `listened` to (as the recording spells one → as
+        a bridge would) is placed on the car: a run has to follow them, since they may place it, or contradict what does
+        at any time; `frames` then has their first messages."""
         measured = [(name, frame) for topic, name in listened.items() for frame in self._frames_of(topic, name)]
-        # Those that move may contradict the static ones, or be of a nearer namespace.
-        if not self._moving or all(
-            frames.is_settled(*one) for one in measured for frames in (self.frames, self._with_moving)
-        ):
-            return frozenset()
-        self.frames = self._with_moving
+        if measured and self._moving:
+            self.frames = self._with_moving
         for name, frame in measured:
             self.frames.ask(name, frame)
-        return self._moving
+        return self._moving if measured else frozenset()
 
     @cached_property
     def _with_moving(self) -> Frames:
@@ -73,7 +70,7 @@ class RecordedTransforms:
 
     def _frames_of(self, topic: str, name: str) -> set[str]:
         """The frames of what a topic measures, by its first messages; none of what has no place on the car."""
-        if plain_type(self._types[name]) not in PLACED or not self._moving:
+        if plain_type(self._types[name]) not in PLACED or not (self._static or self._moving):
             return set()
         return {_frame(message) for _, _, _, message in islice(self._source.only({topic}), FIRST_MEASURED)}
 

@@ -20,6 +20,7 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     "diagnostic_msgs/DiagnosticArray": ("header", "status"),
     "autoware_vehicle_msgs/ControlModeReport": ("stamp", "mode"),
 }
+PLAIN = ("std_msgs/Bool", "std_msgs/String")
 NUMBERS = ("std_msgs/Float32", "std_msgs/UInt8")  # alike in JSON; which of them a topic may be, its name says
 
 
@@ -30,6 +31,11 @@ def type_of(message: Any, topic: str, signal: str | None = None) -> str:
     allowed = [kind for row in rows for kind in row.types]
     found = next((kind for kind in allowed if _fits(message, kind)), None)
     return found or (rows[0].expected_type if rows else "")
+
+
+def type_by_fields(message: Any) -> str:
+    """The type of a message of any topic; "" where its fields are of none that a signal has."""
+    return next((kind for kind in (*FIELDS, *PLAIN, NUMBERS[0]) if _fits(message, kind)), "")
 
 
 def _fits(message: Any, kind: str) -> bool:

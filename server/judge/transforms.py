@@ -13,7 +13,8 @@ from server.judge.message_fields import Rejected, finite
 from server.system.clean_text import clean
 
 TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")  # ROS 1 spelling
-MAX_FRAMES = 500
+MAX_FRAMES, FORGOTTEN = 500, 50  # frames that are kept, and that are forgotten at a time where more are sent
+MAX_PLACED = 64  # frames of sensors that are never forgotten, nor those that place them
 MAX_NAME = 100
 MAX_DEPTH = 50  # a chain of more frames is none
 MAX_NOTES = 20
@@ -106,6 +107,7 @@ class _Link:
     fault: str | None = None  # why it cannot be used; stays, for who is right cannot be known
     first: Pose | None = None  # as it was sent first
     has_moved: bool = False
+    sent: int = 0  # grows with each transform that was sent of any frame
 
 
 def frame_name(name: Any) -> str:
@@ -134,12 +136,12 @@ class FrameTree:
 
     def __init__(self) -> None:
         self.version = 0
-        self.notes: list[str] = []  # what could not be used, in sentences
+        self.taken = 0  # frames so far, forgotten ones too
+        self.notes: list[str] = []  # what could not be used or is not kept, in sentences
         self._links: dict[str, _Link] = {}  # by the lower frame
-
-    @property
-    def is_empty(self) -> bool:
-        return not self._links
+        self._sent = 0
+        self._is_crowded = False  # frames were forgotten
+        self._placed: dict[str, None] = {}  # frames that were placed, the newest last
 
     def add(self, message: Any, *, is_static: bool) -> None:
         """The transforms of one message. What is not static may move: then the newest counts."""
@@ -156,15 +158,18 @@ class FrameTree:
             self._note("A transform names no frames, or longer ones than are read.")
             return
         known = self._links.get(child)
-        if known is None and len(self._links) >= MAX_FRAMES:
-            self._note(f"More than {MAX_FRAMES} frames are sent: the rest is left out.")
-            return
+        self._sent += 1
+        if known is not None:
+            known.sent = self._sent
+        elif len(self._links) >= MAX_FRAMES:
+            self._forget_some()
         try:
             pose, fault = _pose(row), None
         except Rejected as why:
             pose, fault = None, f"the transform of {child} is not usable, {why}"
         if known is None:
-            self._links[child] = _Link(parent, pose, is_static, fault, pose)
+            self._links[child] = _Link(parent, pose, is_static, fault, pose, sent=self._sent)
+            self.taken += 1
         else:
             if known.fault is not None or (
                 parent == known.parent and is_static == known.is_static and pose == known.pose and fault is None
@@ -183,7 +188,8 @@ class FrameTree:
         self.version += 1
 
     def body_of(self, frame: str) -> str | None:
-        """The body frame of the car that a frame is part of; None: there is none."""
+        """The body frame of the car that a frame is part of; None: there is none. Raises Contradiction where that may
+        be because what is above it cannot be known."""
         above = list(self._above(frame_name(frame)))
         for body in BODIES:
             found = [name for name in above if _last(name) == body]
@@ -192,7 +198,12 @@ class FrameTree:
             beside = {name for name in self._links if _last(name) == body and above[-1] in self._above(name)}
             if len(beside) == 1:
                 return beside.pop()
-        return above[-1] if _last(above[-1]) in ROOTS else None
+        if _last(above[-1]) in ROOTS:
+            return above[-1]
+        for link in filter(None, map(self._links.get, above)):
+            if link.fault is not None:
+                raise Contradiction(link.fault)
+        return None
 
     def pose(self, frame: str, body: str) -> Pose | None:
         """The pose of a frame in another one; None: nothing connects them. Raises Contradiction."""
@@ -214,11 +225,6 @@ class FrameTree:
             return False
         self._down(chain, body)
         return True
-
-    @property
-    def size(self) -> int:
-        """How many frames are known below others."""
-        return len(self._links)
 
     def needed(self, frame: str) -> set[str]:
         """Frames of which each transform that counts for the place of this one names at least one."""
@@ -269,6 +275,28 @@ class FrameTree:
                 raise Contradiction(link.fault or f"the transform of {name} is not usable")
             pose = link.pose.of(pose)
         return pose
+
+    def place(self, frame: str) -> None:
+        """A sensor is in this frame: it is not forgotten, nor what places it."""
+        self._placed.pop(frame, None)
+        self._placed[frame] = None
+        if len(self._placed) > MAX_PLACED:
+            del self._placed[next(iter(self._placed))]
+
+    def _forget_some(self) -> None:
+        """Those that move and were not sent for longest come first: they would be sent again; what places a sensor
+        comes last."""
+        bodies = [name for name in self._links if _last(name) in BODIES]
+        needed = {name for frame in (*self._placed, *bodies) for name in self._above(frame)}
+        order = sorted(
+            self._links, key=lambda name: (name in needed, self._links[name].is_static, self._links[name].sent)
+        )
+        for name in order[:FORGOTTEN]:
+            del self._links[name]
+        self.version += 1
+        if not self._is_crowded:
+            self._is_crowded = True
+            self._note(f"More than {MAX_FRAMES} frames are sent: the longest unused are forgotten, {order[0]} first.")
 
     def _note(self, sentence: str) -> None:
         if sentence not in self.notes and len(self.notes) < MAX_NOTES:

@@ -137,6 +137,11 @@ class UnitWatch:
         found = self._watched.get((signal, topic))
         return None if found is None else found.decision
 
+    def unconverted(self, source: Source) -> Unit | None:
+        """The unit of numbers that it makes no values of the signal; None: it does, or is not known."""
+        found = self.decision(source.signal, source.topic)
+        return None if found is None or found.unit is None or found.unit.converts else found.unit
+
     def is_to_ask(self, signal: str, topic: str) -> bool:
         """Whether the operator can say what the values do not show."""
         found = self._watched.get((signal, topic))

@@ -51,9 +51,17 @@ def read_recorded_events(recording: Recording) -> RecordedEvents:
         elif toml != newest:
             left_out += 1
     events.sort(key=lambda event: event[0])  # stable: of one moment, each channel keeps its order
-    notes = (f"{left_out} invalid entries of catgraph's own channels are left out.",) if left_out else ()
+    notes = [f"{left_out} invalid entries of catgraph's own channels are left out."] if left_out else []
+    clock_set = [row for _, row in rows if row.get("change") == "clock_set"]
+    notes += [text for row in clock_set[:1] if isinstance(text := row.get("text"), str)]
     has_alarms = bool(rows) or "session" in metadata
-    return RecordedEvents(events=tuple(events), has_alarms=has_alarms, settings=at_first, notes=notes)
+    return RecordedEvents(
+        events=tuple(events),
+        has_alarms=has_alarms,
+        settings=at_first,
+        clock_was_set=bool(clock_set),
+        notes=tuple(notes),
+    )
 
 
 def _rows(recording: Recording, topic: str) -> Iterator[tuple[float, Mapping[str, Any]]]:

@@ -135,6 +135,10 @@ class RosLink:
         """Renew the subscription of a topic without messages."""
         self._rows.renew(topic)
 
+    def again(self, topic: str) -> None:
+        """As `SentRows.again`."""
+        self._rows.again(topic)
+
     @property
     def subscriptions(self) -> tuple[Subscription, ...]:
         return tuple(self._rows.table.values())

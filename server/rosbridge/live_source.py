@@ -84,7 +84,10 @@ class LiveSource(CommandChannel, Protocol):
         """Ask for it no more."""
 
     def renew(self, topic: str) -> None:
-        """Renew the subscription of a topic without messages."""
+        """Renew the subscription of a topic without messages: it ends and begins anew; what comes between is lost."""
+
+    def again(self, topic: str) -> None:
+        """Subscribe to a topic once more, without an end between: it is given what its publisher keeps."""
 
     async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any:
         """The values of a service, such as `/rosapi/topics`. Raises CallFailed where there is none, LinkDown."""

@@ -147,8 +147,8 @@ class Client:
         subscription.settle(topic.type)
         if subscription not in topic.subscribers:
             topic.subscribers[subscription] = self
-            if topic.latched is not None:
-                subscription.offer(topic.latched)
+        if topic.latched is not None:  # with each subscription, as of a real bridge
+            subscription.offer(topic.latched)
         self._bridge.subscribed(topic.name)
         if topic.type is None:
             self.say("warning", f"subscribe: {topic.name} does not exist yet, and no type was given", id)

@@ -2,9 +2,10 @@
 
 A subscription is given what a publisher keeps, at once. A message like the newest one that comes after a renewal may be
 that sample, or one that was published with the same content. It is therefore held, and the topic subscribed to once
-more: what a publisher keeps is given each time, what it published is not. Without such an answer the message is
-recorded late, with its delay. With enough of them it is dropped only after a while without a new message: a topic that
-goes on gives what looks like answers. No message is lost, and a kept sample is recorded once where nothing new comes.
+more, without an end between: what a publisher keeps is given each time, what it published is not. Without such an
+answer in time the message is recorded, with its delay. With enough of them it is dropped only after a while without a
+new message: a topic that goes on gives what looks like answers. No message is lost, and a kept sample is recorded once
+where nothing new comes.
 
 Pure: time is an argument, on a monotonic clock in seconds.
 """
@@ -55,6 +56,8 @@ class Held:
 class _Doubt:
     needed: int
     held: list[Held]
+    last_s: float
+    within_s: float  # in which an answer comes
     answers: int = 0
     probed_s: float = -math.inf
     is_kept: bool = False  # it had its answers: what is held is dropped, if nothing new comes
@@ -87,13 +90,14 @@ class Doubtful:
         if doubt is None:
             if needed is None or len(self._doubts) >= MOST_HELD or self._is_full(one.size):
                 return Verdict(record=(one,))
-            doubt = self._doubts[topic] = _Doubt(needed, [])
+            doubt = self._doubts[topic] = _Doubt(needed, [], one.at_s, within_s)
         elif self._is_full(one.size) or not (doubt.is_kept or one.at_s - doubt.probed_s <= within_s):
             return Verdict(record=(*self.settled(topic), one))
         else:
             doubt.answers += 1
         doubt.held.append(one)
-        doubt.probed_s = one.at_s
+        doubt.probed_s = doubt.last_s = one.at_s
+        doubt.within_s = within_s
         doubt.is_kept = doubt.is_kept or doubt.answers >= doubt.needed
         self._bytes += one.size
         return Verdict(probes=not doubt.is_kept)
@@ -104,7 +108,7 @@ class Doubtful:
         doubt, held = self._doubts.get(topic), self.settled(topic)
         if doubt is None or not doubt.is_kept:
             return held
-        interval_s = max(later.at_s - sooner.at_s for sooner, later in pairwise(held))
+        interval_s = max((later.at_s - sooner.at_s for sooner, later in pairwise(held)), default=0.0)
         goes_on = one.at_s - held[-1].at_s <= max(GOES_ON * interval_s, GOES_ON_S)
         return held if goes_on or is_same(held[0].message, one.message) else ()
 
@@ -122,9 +126,18 @@ class Doubtful:
         for topic, doubt in list(self._doubts.items()):
             if not is_heard:
                 doubt.is_kept = False
-            if now_s - doubt.held[-1].at_s > SETTLED_AFTER_S:
+            if now_s - doubt.last_s > SETTLED_AFTER_S:
                 held = self.settled(topic)
-                yield topic, () if doubt.is_kept else held
+                if held:
+                    yield topic, () if doubt.is_kept else held
+            elif doubt.held and not doubt.is_kept and now_s - doubt.probed_s > doubt.within_s:
+                yield topic, self._given_up(doubt)
+
+    def _given_up(self, doubt: _Doubt) -> tuple[Held, ...]:
+        """What is held without an answer in time. The doubt stays: a late answer must not begin another one."""
+        held, doubt.held = tuple(doubt.held), []
+        self._bytes -= sum(one.size for one in held)
+        return held
 
     def all(self) -> Iterator[tuple[str, Held]]:
         """What is held and to be recorded, once: a part of the recording ends."""

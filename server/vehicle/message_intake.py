@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -23,6 +24,8 @@ from server.vehicle.sent_again import Arrival, SentAgain, is_same
 from server.vehicle.tick_parts import TickParts
 from server.vehicle.transform_pace import TransformPace
 from server.vehicle.undelivered import CLIENT_COUNT
+
+log = logging.getLogger("catgraph.frames")
 
 RECORDING = "recording of messages"  # its name where it fails
 OF_ANY_NODE = recorded_topics.EVENTS | {"rosbridge_msgs/ConnectedClients", "rosgraph_msgs/Clock"}  # the bridge's too
@@ -66,6 +69,7 @@ class MessageIntake:
         """Another car's messages come."""
         self._scans = ScanFeed(self._vehicle, self._bus)
         self._pace = TransformPace()
+        self._needed: set[bytes] = set()  # of frames that place a sensor, one in the text of each
         self._sent_again = SentAgain(self._read_s)
         self._doubtful = Doubtful()
 
@@ -103,7 +107,7 @@ class MessageIntake:
         if not (is_recorded or is_transforms):
             return False
         now_s, size = self._now(), len(frame.payload)
-        if is_transforms and (is_static(frame.topic) or self._pace.is_due(frame, now_s)):
+        if is_transforms and (is_static(frame.topic) or self._is_due(frame, now_s)):
             return False
         arrival = self._arrived(connection, frame.topic, frame, size, now_s)
         if plain_type(topics.others.get(frame.topic, "")) not in OF_ANY_NODE and not (arrival and arrival.is_repeat):
@@ -111,6 +115,11 @@ class MessageIntake:
         if is_recorded and self._is_to_record(connection, frame.topic, _held(frame, size, now_s, arrival), arrival):
             self._record(connection, frame.topic, frame, now_s, size)
         return True
+
+    def _is_due(self, frame: RawFrame, now_s: float) -> bool:
+        """Whether transforms that move are to be parsed."""
+        self._judgement.frames.note_needed(self._needed)
+        return self._pace.is_due(frame, now_s, self._needed)
 
     def message_received(self, topic: str, message: Any, note: str | None) -> None:
         """One message of the car: recorded, decoded, applied and judged in the same pass."""
@@ -157,7 +166,10 @@ class MessageIntake:
     ) -> None:
         """Transforms place sensors; each part of a recording begins with those that are sent once."""
         frames = self._judgement.frames
+        noted = len(frames.notes)
         frames.receive(topic, message)
+        for note in frames.notes[noted:]:
+            log.warning("transforms: topic=%s note=%r", topic, note)
         connection.subscriptions.table.needs_moving = frames.needs_moving
         is_repeat = arrival is not None and arrival.is_repeat
         if not is_repeat:

@@ -171,7 +171,7 @@ class SubscriptionTable:
         """Subscribe to a topic once more, to see whether its publisher keeps a sample; False: it cannot be."""
         if not any(row.topic == topic for row in self.rows):
             return False
-        self._renew(topic, is_quiet=True)
+        self._again(topic, is_quiet=True)
         return True
 
     def tries_another(self) -> bool:
@@ -216,7 +216,7 @@ class SubscriptionTable:
     def renew_quiet(self) -> None:
         """A recording begins, which needs what the bridge keeps of topics that came before."""
         for topic in self._delivery.quiet(self._now()):
-            self._renew(topic)
+            self._again(topic)
 
     def renew_all(self) -> None:
         """A new roscore does not know the old subscriptions."""
@@ -236,8 +236,16 @@ class SubscriptionTable:
             link.subscribe(subscription)
         self._delivery.follow(judged, recorded, now_s=self._now())
 
-    def _renew(self, topic: str, *, is_quiet: bool = False) -> None:
+    def _again(self, topic: str, *, is_quiet: bool = False) -> None:
+        self._note_button(topic, is_quiet=is_quiet)
+        if self._link is not None:
+            self._link.again(topic)
+
+    def _note_button(self, topic: str, *, is_quiet: bool) -> None:
         if topic == car_marks.TOPIC:
             self.button = car_marks.Asked(self._now(), is_renewal=is_quiet)
+
+    def _renew(self, topic: str, *, is_quiet: bool = False) -> None:
+        self._note_button(topic, is_quiet=is_quiet)
         if self._link is not None:
             self._link.renew(topic)

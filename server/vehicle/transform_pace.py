@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Collection
 
 from server.judge.transforms import MAX_FRAMES
 from server.rosbridge.raw_frame import RawFrame
@@ -31,8 +32,9 @@ class TransformPace:
         self._is_binary = False  # as which it came last: a frame looks different then
         self._rest_s: dict[str, float] = {}  # by topic: of messages whose frames are not known, or too many
 
-    def is_due(self, sent: RawFrame, now_s: float) -> bool:
-        """Whether a message is to be parsed, because it has a frame that was not parsed for a while."""
+    def is_due(self, sent: RawFrame, now_s: float, needed: Collection[bytes] = ()) -> bool:
+        """Whether a message is to be parsed, because it has a frame that was not parsed for a while. Names of frames
+        that hold one of `needed` are kept, whatever else a car sends; of the others, the first ones."""
         if sent.is_binary != self._is_binary:
             self._is_binary = sent.is_binary
             self._parsed_s.clear()
@@ -40,15 +42,19 @@ class TransformPace:
         frames = {(topic, name) for name in _CHILD.findall(sent.payload)}
         known = self._parsed_s
         period_s = max(PERIOD_S, len(known) * FRAME_S)
+        kept = {
+            one for one in frames if one in known or len(known) < MAX_FRAMES or any(name in one[1] for name in needed)
+        }
         rest_s = self._rest_s.get(topic, -math.inf)
-        is_full = len(known) >= MAX_FRAMES
-        has_rest = not frames or (is_full and not frames <= known.keys())
-        oldest_s = min((known.get(one, rest_s if is_full else -math.inf) for one in frames), default=rest_s)
-        if now_s - oldest_s < period_s:
+        oldest_s = min((known.get(one, -math.inf) for one in kept), default=rest_s)
+        has_rest = len(kept) < len(frames) or not frames
+        if now_s - (min(oldest_s, rest_s) if has_rest else oldest_s) < period_s:
             return False
         if has_rest:
             self._rest_s[topic] = now_s
-        for one in frames:
-            if one in known or len(known) < MAX_FRAMES:
-                known[one] = now_s
+        for one in kept:
+            known.pop(one, None)
+            known[one] = now_s  # the newest last
+        while len(known) > MAX_FRAMES:
+            del known[next(iter(known))]
         return True

@@ -138,3 +138,15 @@ def test_a_frozen_stamp_keeps_no_pace(is_frozen: bool) -> None:
     (other,) = state.snapshot(20.0).compared.of("position")
     assert other.made is not None
     assert other.made.mps == pytest.approx(0.0, abs=0.1)
+
+
+def test_the_only_source_of_the_motion_is_not_followed_until_there_is_another() -> None:
+    """Nothing could be compared with it, and each of its messages would cost time."""
+    state = State()
+    state.link(replace(opened(0.0), carriers={"speed": "/vel"}, compared={}))
+    driven(state, 6.0)
+    assert "speed" not in state.snapshot(6.0).compared.stated
+    state.link(replace(opened(0.0), carriers={"speed": "/vel", "position": "/fix"}, compared={}))
+    for step in range(60, 120):
+        state.receive("speed", Twist(speed_mps=3.0), step / 10)
+    assert state.snapshot(12.0).compared.stated["speed"] is not None

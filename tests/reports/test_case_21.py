@@ -20,6 +20,7 @@ from server.recording.read.read import open_recording
 from server.replay import replay_frames
 from tests.reports.cases import judged, made, raised
 from tests.server.recording.bags import Drive, Row, write_ros1
+from tests.server.recording.export.ours import as_ours
 
 UNKNOWN = "unit unknown: 0 to 1 or 0 to 100 %"
 
@@ -139,6 +140,18 @@ def test_an_export_has_the_numbers_and_says_that_their_unit_is_unknown(bag: Path
     assert "brake.csv" not in files
     assert f"600 of 600 messages for brake: {UNKNOWN}." in notes
     assert "their unit is not known" in "\n".join(files["README.txt"])
+
+
+def test_an_export_names_the_unit_that_the_operator_chose(tmp_path: Path) -> None:
+    bag = pedals(tmp_path, [0.0] * 40 + [60.0] * 80)
+    chosen = '[units]\nbrake = "nm"\n'
+    ours = as_ours(bag, tmp_path / "ours.mcap", settings=chosen)
+    files, _ = exported(ours, tmp_path / "pedals.zip")
+    lines = files["brake-in-nm.csv"]
+    assert lines[0].endswith(",as published [Nm]")
+    assert [line.rsplit(",", 1)[1] for line in (lines[1], lines[-1])] == ["0.0", "60.0"]
+    assert "brake-unit-unknown.csv" not in files
+    assert "Brake, the numbers as they were published: in Nm." in "\n".join(files["README.txt"])
 
 
 def test_an_export_in_a_decided_unit_is_in_the_unit_of_the_signal(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from monitor.runner import Monitor
 from monitor.state import State
 from server.judge import pipeline
 from server.judge.phone_report import phone_report
-from server.judge.profiles import GENERIC
+from server.judge.profiles import GENERIC, Profile
 from server.judge.reception_stats import Reception
 from server.judge.topics import map_signals
 from server.protocol import commands
@@ -108,7 +108,9 @@ class Ride:
         return [one.alarm for one in self.events if one.change == "raised"]
 
 
-def ride(rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[Planned] = ()) -> Ride:
+def ride(
+    rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[Planned] = (), profile: Profile = GENERIC
+) -> Ride:
     """The car's speed and position and the phone's words before the checks of both, for so long."""
     car = SimulatedCar(seed=seed, plan=plan)
     sources = pipeline.by_topic(
@@ -151,7 +153,7 @@ def ride(rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[P
                     None,
                     reception=reception,
                     state=state,
-                    profile=GENERIC,
+                    profile=profile,
                     tyre_rad_per_unit=0.0,
                 )
                 judge(now_s, changed)

@@ -173,6 +173,24 @@ async def test_what_is_recorded_late_is_as_old_as_it_is_shown_and_the_next_one_i
     assert true_s - ROUNDED_S <= shown_s <= true_s + TRANSPORT_S
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("after_s", [0.02, 0.15, 0.4])
+async def test_what_comes_while_a_doubt_is_settled_is_not_missed(tmp_path: Path, after_s: float) -> None:
+    """On a real bridge a topic whose only subscription ended needs time to find its publishers again."""
+    bridge = KeepingBridge(both(is_latched=False))
+    async with monitored(bridge, tmp_path):
+        await drive(bridge, 4.0, hz=4.0)
+        bridge.publish(SWITCH, {"data": True})
+        await drive(bridge, 3.0, hz=4.0)
+        bridge.renew(SWITCH)
+        bridge.connects_s = 0.3
+        again = asyncio.create_task(publish_now(bridge, SWITCH, 0.1, {"data": True}))
+        new = asyncio.create_task(publish_now(bridge, SWITCH, 0.1 + after_s, {"data": False}))
+        await drive(bridge, 8.0, hz=4.0)
+        await asyncio.gather(again, new)
+    assert recorded(tmp_path, SWITCH) == [[True, True, False]]
+
+
 def held(at_s: float) -> Held:
     return Held({"data": True}, 10, at_s, at_s)
 
@@ -190,11 +208,20 @@ def test_a_fast_topic_is_recorded_at_once_and_a_quiet_one_needs_few_answers() ->
 def test_without_an_answer_in_time_all_are_recorded() -> None:
     doubtful = Doubtful()
     assert doubtful.came("/a", held(1.0), 2).probes
-    assert not list(doubtful.overdue(5.9, is_heard=True))
-    assert list(doubtful.overdue(6.1, is_heard=True)) == [("/a", (held(1.0),))]
+    assert not list(doubtful.overdue(1.2, is_heard=True))
+    assert list(doubtful.overdue(1.4, is_heard=True)) == [("/a", (held(1.0),))], "a kill loses no more than that"
     assert not list(doubtful.overdue(20.0, is_heard=True))
     assert doubtful.came("/a", held(21.0), 2).probes
     assert doubtful.came("/a", held(22.0), 2).record == (held(21.0), held(22.0))
+
+
+def test_an_answer_that_comes_too_late_is_recorded_and_begins_no_other_doubt() -> None:
+    doubtful = Doubtful()
+    doubtful.came("/a", held(1.0), 2)
+    assert list(doubtful.overdue(1.4, is_heard=True)) == [("/a", (held(1.0),))]
+    assert doubtful.came("/a", held(1.6), 2) == Verdict(record=(held(1.6),))
+    assert not list(doubtful.all())
+    assert doubtful._bytes == 0
 
 
 def kept() -> Doubtful:
@@ -216,8 +243,9 @@ def test_what_had_its_answers_is_dropped_only_if_nothing_new_comes() -> None:
 
 def test_without_a_link_it_is_not_known_that_nothing_new_came() -> None:
     doubtful = kept()
-    assert not list(doubtful.overdue(3.0, is_heard=False))
-    assert list(doubtful.overdue(6.3, is_heard=True)) == [("/a", (held(1.0), held(1.1), held(1.2)))]
+    assert list(doubtful.overdue(3.0, is_heard=False)) == [("/a", (held(1.0), held(1.1), held(1.2)))]
+    assert not list(doubtful.overdue(6.3, is_heard=True))
+    assert doubtful._bytes == 0
 
 
 def test_an_answer_may_need_a_round_trip_from_when_the_subscription_was_sent() -> None:

@@ -9,8 +9,9 @@ from typing import Any
 
 from monitor.signals import SIGNALS, Signal
 from monitor.values import Diagnostics, LaserScan
+from server.judge.units import Unit, unit_named
 
-WITHOUT_UNIT = "-unit-unknown.csv"  # the end of a table's name, after that of its signal
+WITHOUT_UNIT, IN_UNIT = "-unit-unknown", "-in-"  # in the name of a table of numbers as they were published
 TIMES = ("time", "since start [s]", "stamp by the car [s since 1970]")
 
 
@@ -20,6 +21,21 @@ class Table:
 
     columns: tuple[str, ...]  # with their units
     rows: Callable[[Any], Iterator[tuple[Any, ...]]]  # of one value; mostly one
+
+
+def number_table(signal: str, unit: Unit | None) -> str:
+    """The name of the table of a signal's numbers as they were published; `unit` None: not known."""
+    return f"{signal}{WITHOUT_UNIT if unit is None else f'{IN_UNIT}{unit.name}'}.csv"
+
+
+def about_numbers(name: str) -> str | None:
+    """What such a table holds; None: it is another one."""
+    signal, _, unit_name = name.removesuffix(".csv").removesuffix(WITHOUT_UNIT).partition(IN_UNIT)
+    unit = unit_named(signal, unit_name)
+    if signal not in SIGNALS or name != number_table(signal, unit):
+        return None
+    why = "their unit is not known" if unit is None else f"in {unit.label}"
+    return f"{SIGNALS[signal].label}, the numbers as they were published: {why}."
 
 
 def _table(**columns: str) -> Table:

@@ -8,9 +8,11 @@ from typing import Any
 
 from server.judge.drive import Drive
 from server.judge.offline import Observer, OfflineRun
+from server.judge.pipeline import OnNumber
 from server.judge.profiles import Profile
 from server.judge.reception_stats import Reception
 from server.judge.topics import Source
+from server.judge.units import Unit
 from server.recording.event_channels import read_recorded_events
 from server.recording.export.outcome import Progress, nothing
 from server.recording.read.read import Recording
@@ -18,7 +20,6 @@ from server.recording.read.read import Recording
 REPORT_EVERY = 1000  # messages
 
 OnValue = Callable[[str, Any, float, float | None], None]
-OnNumber = Callable[[str, float, float, float | None], None]
 
 
 class DecodedDrive:
@@ -55,8 +56,9 @@ class DecodedDrive:
     ) -> None:
         """Reads all values of the signals (None: of all) in the order of their reception.
 
-        `on_value` receives signal, value, seconds since 1970 and the stamp by the car; `on_number` the same of numbers
-        whose unit is not known. Raises RecordingUnreadable.
+        `on_value` receives signal, value, seconds since 1970 and the stamp by the car; `on_number` signal, number as it
+        was published, its unit and the same times, where the unit is not known or cannot be converted. Raises
+        RecordingUnreadable.
         """
         recording = self.recording
         drive = self._drive if signals is None else self._of(signals)
@@ -117,7 +119,9 @@ class _Values(Observer):
         """Reports the value."""
         self._on_value(signal, value, self._start_s + now_s, stamp_s)
 
-    def number_decoded(self, signal: str, number: float, now_s: float, stamp_s: float | None) -> None:
+    def number_decoded(
+        self, signal: str, number: float, unit: Unit | None, now_s: float, stamp_s: float | None
+    ) -> None:
         """Reports the number."""
         if self._on_number is not None:
-            self._on_number(signal, number, self._start_s + now_s, stamp_s)
+            self._on_number(signal, number, unit, self._start_s + now_s, stamp_s)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from monitor.signals import SIGNALS
-from server.recording.export.columns import OWN_TABLES, WITHOUT_UNIT
+from server.recording.export.columns import OWN_TABLES, about_numbers
 from server.recording.export.decoded_drive import DecodedDrive
 from server.recording.verification import of_files
 from server.version import catgraph_version
@@ -70,9 +70,8 @@ def _what(name: str) -> str:
         return "Every event of the alarm log: raised, acknowledged, cleared, and events of the monitoring itself."
     if name == "marks.csv":
         return "Moments that somebody marked, late ones too; voice notes and photos are in the folder marks."
-    if name.endswith(WITHOUT_UNIT):
-        label = SIGNALS[name.removesuffix(WITHOUT_UNIT)].label
-        return f"{label}, the numbers as they were published: their unit is not known."
+    if (numbers := about_numbers(name)) is not None:
+        return numbers
     signal = SIGNALS.get(name.removesuffix(".csv"))
     if signal is not None:
         return signal.about

@@ -27,6 +27,7 @@ from server.recording.read.source import Channel, Damage, FileSource, why_not_de
 from server.recording.read.steady_time import ClockStep, make_steady, notes_on
 from server.recording.read.time_order import Stream, in_time_order
 from server.recording.read.unpack import PartTooLarge
+from server.recording.read.untyped import type_of_first
 
 __all__ = ["Recording", "RecordingUnreadable", "TopicInfo", "open_recording"]
 
@@ -88,19 +89,18 @@ class Recording:
         self.clock_notes = notes_on(self.clock_steps)  # for a person
         self.ros_version: RosVersion = next((s for s in sources if s.channels), sources[0]).ros_version
         self.topics: dict[str, TopicInfo] = {}
-        self.metadata: dict[str, str] = next(
-            (s.metadata for s in sources if isinstance(s, McapFile) and s.metadata), {}
-        )
+        ours = (source.metadata for source in sources if isinstance(source, McapFile) and source.metadata)
+        self.metadata: dict[str, str] = next(ours, {})
         self.rejected: dict[str, int] = {}  # messages by topic that could not be decoded while reading
         self.why_rejected: dict[str, str] = {}
         self._readers: list[dict[int, _ChannelReader]] = []
         decoders: dict[tuple[str, str, str], Decode] = {}
+        self._untyped: set[str] = set()  # topics whose type is by their messages
         left_out: Counter[tuple[str, str]] = Counter()  # messages by topic and reason
         for source in sources:
             self._readers.append(self._readers_of(source, decoders, left_out))
-        self.notes = [  # topics left out, each with the reason, for a person
-            f"{topic} ({count} messages) is left out: {why}" for (topic, why), count in left_out.items()
-        ]
+        # Topics left out, each with the reason, for a person.
+        self.notes = [f"{topic} ({count} messages) is left out: {why}" for (topic, why), count in left_out.items()]
         filled = [source for source in sources if any(channel.count for channel in source.channels)]
         self._start_ns = min((source.start_ns for source in filled), default=0)
         end_ns = max((source.end_ns for source in filled), default=self._start_ns)
@@ -201,14 +201,14 @@ class Recording:
         left_out: Counter[tuple[str, str]],
     ) -> dict[int, _ChannelReader]:
         readers: dict[int, _ChannelReader] = {}
-        for channel in source.channels:
+        for channel in sorted(source.channels, key=lambda one: not one.type):
             if channel.topic.startswith(PREFIX) and channel.encoding == "json":
                 continue
             type = _spelled(channel.type, self.ros_version)
             key = (channel.type, channel.definition, channel.encoding)
             try:
                 known = self.topics.get(channel.topic)
-                if known is not None and known.type != type:
+                if known is not None and type not in ("", known.type) and channel.topic not in self._untyped:
                     raise Undecodable(f"it has the type {type} and also {known.type}")
                 if key not in decoders:
                     decoders[key] = _decoder(channel, source)
@@ -216,6 +216,10 @@ class Recording:
                 if channel.count:
                     left_out[channel.topic, str(why)] += channel.count
                 continue
+            if not type and known is None:
+                self._untyped.add(channel.topic)
+                type = type_of_first(source, channel, decoders[key])
+            type = type or (known.type if known else "")
             readers[channel.number] = _ChannelReader(topic=channel.topic, type=type, decode=decoders[key])
             self.topics[channel.topic] = TopicInfo(
                 type=type,

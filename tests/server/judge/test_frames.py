@@ -425,11 +425,43 @@ def test_what_is_kept_is_bounded() -> None:
         by.receive(f"/ns{number}/tf", {"transforms": [row("base_link", "laser")]})
         scanned(Laser(beams=3), [], by, frame=f"frame_{number}")
     assert len(by._trees) <= 8
-    assert len(by._trees[""]._links) == 500
+    assert 400 < len(by._trees[""]._links) <= 500
     assert len(by._kept) <= 64
     assert 0 < len(by.notes) <= 200
     for junk in (None, 3, "tf", {}, {"transforms": None}, {"transforms": 3}):
         by.receive("/tf", junk)
+
+
+@pytest.mark.parametrize("topic", ["/tf", "/tf_static"])
+def test_a_needed_frame_is_never_forgotten_though_names_come_without_end(topic: str) -> None:
+    """Only the laser is sent once, before all others; those are named by a counter."""
+    by = frames(Laser(yaw_rad=1.0).transform("mast", "laser"), topic="/tf_static")
+    by.receive("/tf", {"transforms": [row("base_link", "mast", 0.5)]})
+    for number in range(3_000):
+        scanned(Laser(beams=3), [], by)
+        for part in range(10):
+            by.receive(topic, {"transforms": [row("map", f"goal_{number}_{part}")]})
+    assert scanned(Laser(), [], by).mounting.yaw_rad == pytest.approx(1.0, abs=1e-4)  # type: ignore[union-attr]
+    assert by.notes == ["More than 500 frames are sent: the longest unused are forgotten, goal_0_0 first."]
+
+
+def test_a_static_frame_that_no_sensor_asked_for_yet_outlives_those_that_move() -> None:
+    by = frames(Laser(yaw_rad=1.0).transform(), topic="/tf_static")
+    for number in range(2_000):
+        by.receive("/tf", {"transforms": [row("map", f"goal_{number}")]})
+    assert scanned(Laser(), [], by).mounting.origin == "transforms"  # type: ignore[union-attr]
+
+
+def test_a_laser_whose_frame_is_named_by_a_counter_is_placed_each_time() -> None:
+    by = Frames()
+    names: set[bytes] = set()
+    for number in range(2_000):
+        by.receive("/tf", {"transforms": [Laser(yaw_rad=1.0).transform("base_link", f"laser_{number}")]})
+        assert scanned(Laser(beams=3), [], by, frame=f"laser_{number}").mounting.why_not is None  # type: ignore[union-attr]
+        by.note_needed(names)
+        assert f"laser_{number}".encode() in names
+    assert len(by._asked) <= 64
+    assert len(by._trees[""]._placed) <= 64
 
 
 # -- which looks ahead -----------------------------------------------------------------------------------------------

@@ -9,9 +9,11 @@ from typing import Any
 import pytest
 
 from monitor.mounting import Mounting
+from server.analysis.rehearse import rehearse
 from server.judge.drive import Drive as JudgedDrive
 from server.judge.frames import Frames
 from server.judge.offline import OfflineRun
+from server.judge.signals.scan import laser_scan
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, open_recording
 from server.replay import checkpoint
@@ -60,7 +62,6 @@ def test_transforms_hold_for_the_whole_drive_wherever_they_are_in_it(
     path = written(tmp_path / "drive", version, [*scans(0.0, 10.0), sent(at_s, BACKWARDS.transform(), topic=topic)])
     with open_recording([path]) as recording:
         drive = judged_drive(recording)
-        assert drive.moving_transforms == (frozenset() if topic == "/tf_static" else {"/tf"})
         for from_s in (0.0, 7.0):  # a replay that starts in the middle too
             run = OfflineRun(recording, drive, from_s=from_s)
             run.advance(from_s + 1.0)
@@ -93,11 +94,18 @@ def test_a_laser_on_a_tower_that_turns_is_where_it_was_sent_last_also_after_a_ch
         assert mounting(again).yaw_rad == pytest.approx(1.6, abs=1e-4)
 
 
-def test_what_moves_is_not_decoded_where_static_transforms_place_the_laser(tmp_path: Path) -> None:
+def test_what_moves_is_not_decoded_where_static_transforms_place_the_laser(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     moving = [sent(0.1 * n, row("odom", "base_link", 0.1 * n), topic="/tf") for n in range(100)]
     path = written(tmp_path / "drive", 2, [*scans(0.0, 10.0), *moving, sent(0.0, BACKWARDS.transform())])
     with open_recording([path]) as recording:
-        assert judged_drive(recording).moving_transforms == frozenset()
+        run = OfflineRun(recording, judged_drive(recording))
+        received: list[Any] = []
+        monkeypatch.setattr(Frames, "receive", lambda *what: received.append(what))
+        run.advance(9.9)
+        assert mounting(run).origin == "transforms"
+        assert received == []
 
 
 def test_a_frame_that_is_renamed_in_mid_drive_ends_the_check(tmp_path: Path) -> None:
@@ -108,6 +116,61 @@ def test_a_frame_that_is_renamed_in_mid_drive_ends_the_check(tmp_path: Path) -> 
         assert mounting(run).why_not is None
         run.advance(6.0)
         assert "its frame was laser and is laser_2" in (mounting(run).why_not or "")
+        (tile,) = (tile for tile in run.run_state.monitor.tiles() if "obstacle" in tile.checks)
+        assert tile.verdict == "unknown"
+
+
+@pytest.mark.parametrize("topic", ["/tf_static", "/tf"])
+def test_a_replay_that_begins_after_a_frame_was_renamed_knows_that_it_was(tmp_path: Path, topic: str) -> None:
+    rows = [*scans(0.0, 5.0), *scans(5.0, 10.0, frame="laser_2"), sent(0.0, BACKWARDS.transform(), topic=topic)]
+    with open_recording([written(tmp_path / "drive", 2, rows)]) as recording:
+        run = OfflineRun(recording, judged_drive(recording), from_s=7.0)
+        run.advance(8.0)
+        assert "its frame was laser and is laser_2" in (mounting(run).why_not or "")
+
+
+LATE = {  # what is sent in the middle of a drive: topic, transforms
+    "another parent": ("/tf", [Laser().transform("mast", "laser")]),
+    "another parent, as static": ("/tf_static", [Laser().transform("mast", "laser")]),
+    "another place, as static": ("/tf_static", [Laser(x_m=2.0).transform()]),
+    "nothing": ("/tf", [row("odom", "base_link", 3.0)]),
+}
+
+
+@pytest.mark.parametrize("placed_by", ["/tf_static", "/tf"])
+@pytest.mark.parametrize("late", LATE)
+def test_a_contradiction_that_comes_late_is_said_in_the_same_words_as_live(
+    tmp_path: Path, late: str, placed_by: str
+) -> None:
+    topic, transforms = LATE[late]
+    moving = [sent(0.02 * n, row("odom", "base_link", 0.1 * n), topic="/tf") for n in range(500)]
+    first = sent(0.0, BACKWARDS.transform(), topic=placed_by)
+    rows = [*scans(0.0, 10.0), *moving, first, *(sent(6.0 + 0.2 * n, *transforms, topic=topic) for n in range(3))]
+    with open_recording([written(tmp_path / "drive", 2, rows)]) as recording:
+        run = OfflineRun(recording, drive := judged_drive(recording))
+        run.advance(5.0)
+        before = mounting(run).why_not
+        run.advance(8.0)
+        recorded = mounting(run)
+        report = rehearse(recording)
+        limits = drive.epochs[0].tuning.limits
+    live = Frames()
+    for _, name, kind, message in sorted(rows, key=lambda one: one[0]):
+        if kind == TF:
+            live.receive(name, message)
+    scan = laser_scan(BACKWARDS.scan(POST))
+    expected = live.mounted("/scan", scan, limits).mounting
+    assert expected is not None
+    if topic == "/tf":  # else another one of the two came first
+        assert recorded == expected
+    if late == "nothing":
+        assert (before, recorded.why_not) == (None, None)
+        return
+    assert recorded.why_not is not None
+    assert expected.why_not is not None
+    assert topic == "/tf_static" or before is None, "only what is static is known beforehand"
+    said = {frozenset(note.removesuffix(".").split()) for note in report.notes}
+    assert {frozenset(note.removesuffix(".").split()) for note in live.notes} & said
 
 
 def test_what_is_wrong_with_transforms_is_a_note_of_the_drive(tmp_path: Path) -> None:
@@ -195,7 +258,6 @@ def test_what_is_measured_has_the_cars_axes_whichever_transforms_place_the_senso
     rows = [*measuring(3.0), sent(0.0, *static), *(sent(0.1 * n, *moving, topic="/tf") for n in range(30) if moving)]
     with open_recording([written(tmp_path / "drive", version, rows)]) as recording:
         drive = judged_drive(recording)
-        assert drive.moving_transforms == ({"/tf"} if moving else frozenset())
         run = OfflineRun(recording, drive)
         run.advance(1.05)
         snapshot = run.run_state.state.snapshot(run.at_s)
@@ -240,13 +302,17 @@ def test_what_moves_and_contradicts_a_static_transform_is_noticed(tmp_path: Path
         assert "also below mast" in run.run_state.state.snapshot(run.at_s).unusable["acceleration"].words
 
 
-def test_what_is_not_measured_on_the_car_needs_no_transforms(tmp_path: Path) -> None:
+def test_what_is_not_measured_on_the_car_needs_no_transforms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = [
         *measuring(1.0, frame="base_link"),
         *(sent(0.1 * n, row("odom", "base_link"), topic="/tf") for n in range(9)),
     ]
     with open_recording([written(tmp_path / "drive", 2, rows)]) as recording:
-        assert judged_drive(recording).moving_transforms == frozenset()
+        run = OfflineRun(recording, judged_drive(recording))
+        received: list[Any] = []
+        monkeypatch.setattr(Frames, "receive", lambda *what: received.append(what))
+        run.advance(0.9)
+        assert received == []
 
 
 def wheels(seconds: float) -> list[Row]:

@@ -134,6 +134,16 @@ async def test_a_change_does_not_undo_a_renewal_that_waits() -> None:
     assert await table.of("/any", 3) == ["subscribe /any 0", "unsubscribe /any", "subscribe /any 50"]
 
 
+async def test_a_subscription_made_once_more_has_no_end_between() -> None:
+    table = Table()
+    table.rows.subscribe(ANY)
+    table.fill()
+    table.rows.again("/any")
+    assert await table.of("/any", 2) == ["subscribe /any 0", "subscribe /any 0"]
+    table.rows.closed()
+    table.rows.again("/none")
+
+
 async def test_a_change_alone_is_no_renewal() -> None:
     table = Table()
     table.rows.subscribe(ANY)

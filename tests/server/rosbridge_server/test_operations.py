@@ -148,6 +148,15 @@ async def test_a_latched_topic_gives_newcomers_its_last_message(bridge: RosBridg
     assert (await probe.hear())["msg"] == {"data": "new"}
 
 
+async def test_a_second_subscription_gives_it_again(bridge: RosBridge, probe: Probe) -> None:
+    """As a real bridge does, so that a probe of what its publisher keeps is answered."""
+    bridge.advertise("/map", "std_msgs/String", latch=True)
+    bridge.publish("/map", {"data": "kept"})
+    for _ in range(2):
+        await probe.send(op="subscribe", id="one", topic="/map")
+        assert (await probe.hear())["msg"] == {"data": "kept"}
+
+
 async def test_throttling_leaves_out_and_counts_no_loss(vel: RosBridge, probe: Probe) -> None:
     await probe.subscribe("/vel", throttle_rate=60)
     ends = time.monotonic() + 0.29

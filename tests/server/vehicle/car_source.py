@@ -73,6 +73,9 @@ class CarSource:
     def renew(self, topic: str) -> None:
         pass
 
+    def again(self, topic: str) -> None:
+        pass
+
     def ping(self) -> None:
         self.heard_s = self._now()
 

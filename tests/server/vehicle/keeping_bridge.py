@@ -50,7 +50,9 @@ class KeepingBridge:
         self.clients = clients
         self.stuck: set[str] = set()  # topics of which each subscription is given one message, as on ROS 2
         self.is_open = False
+        self.ahead_s = 0.0  # by which the car's clock is ahead
         self.trip_s = 0.0  # what the link needs there and back
+        self.connects_s = 0.0  # what the bridge needs to find the publishers of a topic whose last subscription ended
         self.heard_s: float | None = None
         self.subscribed: list[tuple[float, str]] = []  # when each subscription was sent
         self._has_rosapi = has_rosapi
@@ -138,6 +140,12 @@ class KeepingBridge:
         self._rows.pop(topic, None)
 
     def renew(self, topic: str) -> None:
+        row = self._rows.pop(topic) if self.connects_s else self._rows[topic]
+        self._begin(row)
+        if self.connects_s:
+            asyncio.get_running_loop().call_later(self.connects_s, self._rows.__setitem__, topic, row)
+
+    def again(self, topic: str) -> None:
         self._begin(self._rows[topic])
 
     def ping(self) -> None:
@@ -155,7 +163,7 @@ class KeepingBridge:
         if service == "/rosapi/topics" and self._has_rosapi:
             return {"topics": [*self.topics], "types": [one.type for one in self.topics.values()]}
         if service == "/rosapi/get_time" and self._has_rosapi:
-            now_ns = time.time_ns()
+            now_ns = time.time_ns() + round(self.ahead_s * 1e9)
             return {"time": {"secs": now_ns // 10**9, "nsecs": now_ns % 10**9}}
         if service == "/rosapi/publishers":
             return {"publishers": [NODE if topic == CLIENT_COUNT else CAR] if topic in self.topics else []}
@@ -187,14 +195,17 @@ class KeepingBridge:
 
 
 @asynccontextmanager
-async def monitored(bridge: KeepingBridge, folder: Path | None = None) -> AsyncIterator[Session]:
-    """A session that monitors the car behind `bridge`, with every part that a server gives it; recorded in `folder`."""
+async def monitored(
+    bridge: KeepingBridge, folder: Path | None = None, *, ahead_s: Callable[[], float] = lambda: 0.0
+) -> AsyncIterator[Session]:
+    """A session that monitors the car behind `bridge`, with every part that a server gives it; recorded in `folder`.
+    `ahead_s`: by which the server's clock is ahead."""
     bus = LocalBus(Journal(None), now=time.monotonic)
     session = Session(
         Vehicle(name="car", address=ADDRESS),
         bus,
         now=time.monotonic,
-        wall_ms=lambda: time.time_ns() // 1_000_000,
+        wall_ms=lambda: time.time_ns() // 1_000_000 + round(ahead_s() * 1000),
         server=dict,  # type: ignore[arg-type]
         recordings=None if folder is None else RecordingsFolder(folder),
         open_source=bridge,

@@ -12,6 +12,7 @@ from monitor.state import State
 from monitor.values import GpsFix, PhoneFix
 from server.app.config import Config
 from server.judge.phone_report import phone_report
+from server.judge.profiles import load as load_profiles
 from server.protocol import commands
 from server.rosbridge_server.server import RosBridge
 from server.simulator.scenarios import planned
@@ -234,8 +235,9 @@ def test_a_healthy_phone_in_the_car_raises_nothing_and_is_really_checked(
     assert all("OK" in found.briefs[check] for check in ("phone_car", "phone_tracks", "phone_missing"))
 
 
-def test_a_phone_left_behind_raises_the_gate_alone() -> None:
-    found = raised(ride(Rider(left_at_s=40.0), 75.0))
+@pytest.mark.parametrize("profile", ["generic", "catvehicle"])
+def test_a_phone_left_behind_raises_the_gate_alone(profile: str) -> None:
+    found = raised(ride(Rider(left_at_s=40.0), 75.0, profile=load_profiles()[profile]))
     assert [alarm for alarm, _ in found] == ["phone_car"]
     assert 42.0 < found[0][1] < 56.0  # the car is 25 m away some 5 s later
 

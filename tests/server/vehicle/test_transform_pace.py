@@ -70,6 +70,18 @@ def test_names_without_end_are_not_kept_and_not_parsed_without_end() -> None:
     assert len(pace._parsed_s) == 500
 
 
+def test_a_needed_frame_is_parsed_in_time_though_names_come_without_end() -> None:
+    pace, found = TransformPace(), []
+    for n in range(5_000):
+        now_s = n * 0.02
+        pace.is_due(sent([stamped(f"frame_{n}", now_s)], is_binary=False), now_s, {b"laser"})
+        if n % 50 == 7 and pace.is_due(sent([stamped("laser", now_s)], is_binary=False), now_s, {b"laser"}):
+            found.append(now_s)
+    assert max(later - sooner for sooner, later in pairwise(found)) <= 3.0
+    assert found[-1] > 95.0
+    assert len(pace._parsed_s) <= 500
+
+
 def test_a_frame_of_another_topic_is_another_one() -> None:
     pace, rows = TransformPace(), [stamped("laser", 0.0)]
     found = [pace.is_due(sent(rows, is_binary=True, topic=topic), 0.0) for topic in ("/one/tf", "/two/tf", "/one/tf")]

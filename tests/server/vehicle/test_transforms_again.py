@@ -25,7 +25,7 @@ def test_a_part_that_began_with_other_messages_gets_what_the_bridge_sends_again(
         release=held.clear,
     )
     judgement: Any = SimpleNamespace(
-        frames=SimpleNamespace(receive=lambda *_: None, forget=lambda: None, needs_moving=False),
+        frames=SimpleNamespace(receive=lambda *_: None, forget=lambda: None, needs_moving=False, notes=[]),
         reception=SimpleNamespace(repeats=0, unasked=0),
         transport=SimpleNamespace(read_s=lambda sent_s: sent_s, given=lambda *_: None, is_new=lambda _: None),
     )

@@ -20,7 +20,8 @@ import orjson
 from monitor.values import GpsFix
 from server.bus.event_table import COLUMNS as ALARM_COLUMNS
 from server.bus.event_table import event_row, safe_cell
-from server.recording.export.columns import OWN_TABLES, TABLES, TIMES, WITHOUT_UNIT, OwnTable
+from server.judge.units import Unit
+from server.recording.export.columns import OWN_TABLES, TABLES, TIMES, OwnTable, number_table
 from server.recording.export.decoded_drive import DecodedDrive
 from server.recording.export.export_format import ExportFormat
 from server.recording.export.later import described_event
@@ -39,7 +40,6 @@ FORMAT = ExportFormat(
     order=30,
 )
 
-NUMBER_COLUMNS = ("as published [unit unknown]",)
 MARK_COLUMNS = ("mark", "category", "words", "voice", "photo", "source", "by", "late")
 _READING = 0.85  # of the work; the rest is packing
 _BLOCK = 1 << 20
@@ -61,8 +61,9 @@ def write_csv_zip(recording: Recording, path: Path, *, progress: Progress = noth
                 for row in table.rows(value):
                     tables.add(f"{signal}.csv", table.columns, at_s, stamp_s, row)
 
-            def add_number(signal: str, number: float, at_s: float, stamp_s: float | None) -> None:
-                tables.add(f"{signal}{WITHOUT_UNIT}", NUMBER_COLUMNS, at_s, stamp_s, (number,))
+            def add_number(signal: str, number: float, unit: Unit | None, at_s: float, stamp_s: float | None) -> None:
+                column = f"as published [{'unit unknown' if unit is None else unit.label}]"
+                tables.add(number_table(signal, unit), (column,), at_s, stamp_s, (number,))
 
             drive.read(add, on_number=add_number, progress=lambda part: progress(part * _READING))
             unfit = _own_tables(recording, tables)
