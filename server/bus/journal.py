@@ -65,14 +65,14 @@ class Journal:
         self._unsaved: dict[str, deque[dict[str, Any]]] = {}
         self._recent: dict[str, deque[dict[str, Any]]] = {}  # of this run, without a gap up to the newest
         self._lost = 0
-        self._why = opened.why
-        if self._why:
+        self.why_refused = opened.why  # why the disk does not take what is written; None: it does
+        if self.why_refused:
             log.error("%s", self.trouble)
 
     @property
     def trouble(self) -> str | None:
         """Why what happens now is not kept on the disk, as a sentence; None: it is."""
-        why, since_s = self._why, self._waits_since_s
+        why, since_s = self.why_refused, self._waits_since_s
         if why is None and since_s is not None and (slow_s := self._now() - since_s) >= SLOW_DISK_S:
             why = f"the disk has not answered for {slow_s:.0f} s"
         if why is None:
@@ -82,11 +82,6 @@ class Journal:
         in_memory = f" {_events(waiting)} in memory only." if waiting else ""
         lost = f" {_events(self._lost)} lost." if self._lost else ""
         return f"The alarm log is not stored: {why}.{in_memory}{lost}"
-
-    @property
-    def is_refused(self) -> bool:
-        """Whether the disk did not take what was written last."""
-        return self._why is not None
 
     def last(self, vehicle: str) -> int:
         """The number of the newest event, 0 where there is none."""
@@ -141,9 +136,9 @@ class Journal:
                         while unsaved and unsaved[0]["n"] <= event["n"]:
                             unsaved.popleft()
                     self._waits_since_s = self._now() if any(self._unsaved.values()) else None
-                if self._why is not None:
+                if self.why_refused is not None:
                     log.warning("alarm log stored again")
-                    self._why = None
+                    self.why_refused = None
 
     def _next(self) -> list[tuple[str, dict[str, Any]]]:
         with self._memory:
@@ -281,9 +276,9 @@ class Journal:
                 except sqlite3.Error:
                     log.debug("nothing to roll back", exc_info=True)
             why = journal_db.why(error)
-            if why != self._why:
+            if why != self.why_refused:
                 log.error("alarm log not stored: %s (%s)", why, error)
-            self._why = why
+            self.why_refused = why
             return else_
 
 

@@ -61,7 +61,7 @@ class LocalBus:
         return numbered
 
     def _release_saved(self) -> None:
-        is_refused = self._journal.is_refused
+        is_refused = self._journal.why_refused is not None
         for vehicle in tuple(self._held):
             self._release(vehicle, self._journal.last(vehicle) if is_refused else self._journal.saved(vehicle))
 

@@ -20,8 +20,8 @@ async def events(
     run: Annotated[str | None, Query(max_length=40, description="In which `after` was read; none: the present")] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> Response:
-    """Numbers are of the `run` in the answer. Who read up to `after` in another run gets the events that are not in that
-    log; those up to `new_after` may be known from there."""
+    """Numbers are of the `run` in the answer. Who read up to `after` in another run gets what follows the common part;
+    events up to `new_after` may be known from there."""
     app = services(request)
     name = vehicle_of(app, vehicle)
     present = app.bus.run(name)

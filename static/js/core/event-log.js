@@ -8,6 +8,7 @@
  */
 
 const KEPT = 500; // rows; the server has the whole log
+const LEFT = 2000; // events that another log did not have: they are not announced again where they come back
 const PAST = 50; // events of before this page that its log begins with
 
 export class EventLog {
@@ -19,8 +20,8 @@ export class EventLog {
   #boot = null;
   /** The run that greeted, until it said where its log goes on for this page. @type {string | null} */
   #joining = null;
-  /** What this page had before it joined. @type {{dropped: Set<string>, newest_ms: number, new_after: number} | null} */
-  #former = null;
+  /** What this page had of logs that it left, oldest first, and the moment of the newest; events after a number are new in the present log. */
+  #left = { events: /** @type {Set<string>} */ (new Set()), newest_ms: -Infinity, new_after: 0 };
   /** @type {{until: number, gap: Gap} | null} what is being caught up with */
   #blind = null;
   /** The gap after which no values came yet. @type {Gap | null} */
@@ -54,10 +55,8 @@ export class EventLog {
   #join({ common, new_after }) {
     const known = this.rows.flatMap(({ event }) => event ?? []);
     this.rows = this.rows.filter(({ event }) => event === null || event.n <= common);
-    this.#former = {
-      dropped: new Set(known.filter(({ n }) => n > common).map(contentOf)),
-      newest_ms: Math.max(...known.map(({ at_ms }) => at_ms)), new_after,
-    };
+    const left = [...this.#left.events, ...known.filter(({ n }) => n > common).map(contentOf).reverse()].slice(-LEFT);
+    this.#left = { events: new Set(left), newest_ms: Math.max(this.#left.newest_ms, ...known.map(({ at_ms }) => at_ms)), new_after };
     this.last = common;
     this.#boot = this.#joining;
     this.#joining = null;
@@ -65,14 +64,15 @@ export class EventLog {
 
   /** Whether this page never had the event, by whatever number. @param {AlarmEvent} event */
   #isNew(event) {
-    const former = this.#former;
-    return !former || (!former.dropped.has(contentOf(event)) && (event.n > former.new_after || event.at_ms > former.newest_ms));
+    const { events, newest_ms, new_after } = this.#left;
+    return (event.n > new_after || event.at_ms > newest_ms) && !events.has(contentOf(event));
   }
 
   /** Forget everything: what comes is of another car. */
   clear() {
     this.rows = [];
-    this.last = this.#boot = this.#joining = this.#former = this.#blind = this.open = null;
+    this.last = this.#boot = this.#joining = this.#blind = this.open = null;
+    this.#left = { events: new Set(), newest_ms: -Infinity, new_after: 0 };
   }
 
   /** The first values after a gap came. @param {number | null} unseen_m the most that the car can have driven since the last ones; null: not known */
