@@ -217,7 +217,7 @@ class NatsAgent:
                 found["events"] = await self._bus.find_events(vehicle, **filters, limit=asked.limit)
             elif asked.do == "resume":
                 resumed = await self._bus.resume(vehicle, asked.run, asked.n)
-                found["resumed"] = (resumed.common, resumed.after, resumed.new_after)
+                found["resumed"] = [resumed.common, resumed.after, resumed.new_after]
         except NotServed as why:
             found["refused"], found["is_unknown"] = str(why), why.outcome == "unknown"
         finally:

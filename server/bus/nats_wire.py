@@ -97,7 +97,7 @@ class Answer(Body):
     last: Number
     answer: dict[str, Any] = {}
     events: Annotated[list[dict[str, Any]], Field(max_length=PORTION)] = []
-    resumed: tuple[Number, Number, Number] | None = None  # `common`, `after` and `new_after`, as of `Resumed`
+    resumed: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = None  # as `Resumed` has them
     refused: str = ""  # not served; why, as a sentence
     is_unknown: bool = False  # a command that was not served may have been carried out
 
