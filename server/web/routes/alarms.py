@@ -25,11 +25,12 @@ async def events(
     app = services(request)
     name = vehicle_of(app, vehicle)
     present = app.bus.run(name)
-    body: dict[str, Any] = {"run": present, "last": app.bus.last_event(name)}
+    body: dict[str, Any] = {"run": present}
     if run is not None and run != present:
         resumed = await app.bus.resume(name, run, after)
         after, body["resumed"] = resumed.after, {"common": resumed.common, "new_after": resumed.new_after}
-    return as_json({"events": await app.bus.events_after(name, after, limit), **body})
+    body["events"] = await app.bus.events_after(name, after, limit)
+    return as_json(body | {"last": app.bus.last_event(name)})
 
 
 @router.get("/api/alarms", summary="The alarms that are active or not acknowledged, most urgent first")

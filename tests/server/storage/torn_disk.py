@@ -1,7 +1,6 @@
-"""A disk whose power can be cut: a copy of it at any moment, without what the page cache of its file system holds.
+"""A disk whose power can be cut: an ext4 on a loop device with direct I/O, above a disk with a volatile cache.
 
-The disk is an image file behind a loop device with direct I/O: a write of its ext4 is in the file, or it is not. The
-file is in a second ext4, which is frozen for the copy, so that the copy is of one moment.
+A copy has what the file system flushed, none of its page cache, and by chance some sectors of later writes.
 """
 
 from __future__ import annotations
@@ -10,12 +9,13 @@ import contextlib
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-OUTER_MB, INNER_MB = 192, 128
+MEGABYTES = 64
 
 
 def run(*command: str | Path) -> str:
@@ -25,7 +25,7 @@ def run(*command: str | Path) -> str:
 
 @contextlib.contextmanager
 def mounted(image: Path, at: Path) -> Iterator[Path]:
-    """The ext4 of an image, mounted by a loop device with direct I/O."""
+    """The ext4 of an image, mounted by a loop device with direct I/O. Raises CalledProcessError."""
     at.mkdir()
     device = run("losetup", "--find", "--show", "--direct-io=on", image)
     try:
@@ -38,46 +38,48 @@ def mounted(image: Path, at: Path) -> Iterator[Path]:
         run("losetup", "--detach", device)
 
 
-def made(image: Path, megabytes: int) -> Path:
-    """An image with an empty ext4."""
-    with image.open("wb") as file:
-        file.truncate(megabytes * 2**20)
-    run("mkfs.ext4", "-q", image)
-    return image
-
-
-def demand_loop_devices(folder: Path) -> None:
-    """Skips where they are not permitted."""
-    if os.geteuid() != 0 or not all(map(shutil.which, ("losetup", "mkfs.ext4", "fsfreeze"))):
-        pytest.skip("loop devices need root, losetup, mkfs.ext4 and fsfreeze")
-    try:
-        with mounted(made(folder / "trial.img", 8), folder / "trial"):
-            pass
-    except subprocess.CalledProcessError as why:
-        pytest.skip(f"loop devices are not permitted: {why.stderr.strip()}")
-
-
 class TornDisk:
     """`folder` is on it."""
 
-    def __init__(self, outer: Path, folder: Path) -> None:
-        self._outer = outer
+    def __init__(self, process: subprocess.Popen[str], folder: Path) -> None:
+        self._process = process
         self.folder = folder
 
-    def cut(self, copy: Path) -> Path:
+    def cut(self, copy: Path, seed: int) -> Path:
         """What a loss of power would leave now, as an image."""
-        run("fsfreeze", "--freeze", self._outer)
-        try:
-            run("cp", "--sparse=always", self._outer / "disk.img", copy)
-        finally:
-            run("fsfreeze", "--unfreeze", self._outer)
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(f"{seed} {copy}\n")
+        self._process.stdin.flush()
+        assert self._process.stdout.readline() == "cut\n"
         return copy
 
 
 @contextlib.contextmanager
 def torn_disk(folder: Path) -> Iterator[TornDisk]:
-    """A disk of which copies are made; skips where loop devices are not permitted."""
-    demand_loop_devices(folder)
-    with mounted(made(folder / "outer.img", OUTER_MB), folder / "outer") as outer:
-        with mounted(made(outer / "disk.img", INNER_MB), folder / "disk") as inner:
-            yield TornDisk(outer, inner)
+    """A disk of which copies are made; skips where loop devices or FUSE are not permitted."""
+    if os.geteuid() != 0 or not all(map(shutil.which, ("losetup", "mkfs.ext4"))) or not Path("/dev/fuse").exists():
+        pytest.skip("needs root, losetup, mkfs.ext4 and /dev/fuse")
+    image, cache = folder / "disk.img", folder / "cache"
+    with image.open("wb") as file:
+        file.truncate(MEGABYTES * 2**20)
+    run("mkfs.ext4", "-q", image)
+    try:
+        with mounted(image, folder / "trial"):
+            pass
+    except subprocess.CalledProcessError as why:
+        pytest.skip(f"loop devices are not permitted: {why.stderr.strip()}")
+    cache.mkdir()
+    command = [sys.executable, "-m", "tests.server.storage.volatile_disk", str(image), str(cache)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    try:
+        if process.stdout.readline() != "ready\n":
+            pytest.skip("FUSE is not permitted")
+        try:
+            with mounted(cache / "disk", folder / "disk") as inner:
+                yield TornDisk(process, inner)
+        finally:
+            run("umount", "--lazy", cache)
+    finally:
+        process.communicate()
