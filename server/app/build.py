@@ -59,7 +59,7 @@ def build(
     folder = None if config.data is None else DataFolder(config.data)
     storage = StorageThread()
     kept = None if config.is_node else config.data  # what belongs to the cars is kept at their agents
-    journal = Journal(kept / "events.sqlite" if kept else None, thread=storage)
+    journal = Journal(kept / "events.sqlite" if kept else None, run=boot, thread=storage)
     bus = LocalBus(journal, now=now, storage=storage)
     access = _access(config, storage, now=now, wall_ms=wall_ms)
     orders = _orders(config, storage, lambda name, by, text: _note_device(running, name, by, text), now, wall_ms)

@@ -9,6 +9,8 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
+from server.bus.log_runs import Resumed
+
 Handler = Callable[[Mapping[str, Any]], Awaitable[Mapping[str, Any]]]
 Watcher = Callable[[str], None]
 ALL = ""  # in the place of a vehicle, whose name is never empty: what is of all of them
@@ -128,7 +130,10 @@ class PageBus(Protocol):
         """Whether it is known which events the vehicle has; before, pages of it are not greeted."""
 
     def run(self, vehicle: str) -> str:
-        """In which run of its session the vehicle's events are numbered; "": in this process."""
+        """In which run of a server the vehicle's events are numbered; "": it was not heard."""
+
+    async def resume(self, vehicle: str, run: str, n: int) -> Resumed:
+        """Where a reader goes on who has read up to `n` in another `run`. Raises NotServed."""
 
     async def request(self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0) -> Mapping[str, Any]:
         """The answer to a command, once the events that it caused may be shown. Raises NotServed."""

@@ -1,12 +1,14 @@
 """The numbered event log of each vehicle, in SQLite: one row per event, append-only.
 
-Numbers start at 1 for each vehicle and continue over restarts, so that a page can request what it missed. If the disk
+Numbers start at 1 for each vehicle and continue over restarts, so that a page can request what it missed; they are of a
+run (`log_runs.py`). A transaction is on the disk once it is committed: what waits is committed together. If the disk
 fails, events stay in memory until they can be stored, and `trouble` reports it.
 """
 
 from __future__ import annotations
 
 import logging
+import secrets
 import sqlite3
 import threading
 import time
@@ -27,7 +29,7 @@ log = logging.getLogger("catgraph.journal")
 _PORTION = 100  # events a transaction: one that is refused has cost little
 RECENT = 200  # recent events of a vehicle, served from memory, because every page requests each one
 MAX_UNSAVED = 10_000  # events of a vehicle that wait in memory for the disk; some 5 MB
-SLOW_DISK_S = 5.0  # a disk that takes longer for one portion is reported
+SLOW_DISK_S = 1.0  # a disk that takes longer for one portion is reported, and its events are shown without it
 T = TypeVar("T")
 
 
@@ -38,10 +40,16 @@ class Journal:
     """
 
     def __init__(
-        self, path: Path | None, *, thread: StorageThread | None = None, now: Callable[[], float] = time.monotonic
+        self,
+        path: Path | None,
+        *,
+        run: str | None = None,
+        thread: StorageThread | None = None,
+        now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """At `path`, or in memory where it is None; written by `thread`, else by the caller. `now`: in seconds."""
-        opened = journal_db.open_at(path)
+        """At `path`, or in memory where it is None; written by `thread`, else by the caller. `run`: of this process,
+        None: any that is new. `now`: in seconds."""
+        opened = journal_db.open_at(path, run or secrets.token_hex(8))
         self._thread = thread
         self._now = now
         self.on_saved: Callable[[], None] = lambda: None  # called by the writing thread, whatever became of it
@@ -52,19 +60,20 @@ class Journal:
         self._waits_since_s: float | None = None  # for how long nothing of what waits was written
         self._database = opened.database
         self.complaint = opened.complaint  # what was found wrong at the start and put right, for the log
+        self.runs = opened.runs
         self._last = dict(opened.last)
         self._unsaved: dict[str, deque[dict[str, Any]]] = {}
         self._recent: dict[str, deque[dict[str, Any]]] = {}  # of this run, without a gap up to the newest
         self._lost = 0
-        self._why = opened.why
-        if self._why:
+        self.why_refused = opened.why  # why the disk does not take what is written; None: it does
+        if self.why_refused:
             log.error("%s", self.trouble)
 
     @property
     def trouble(self) -> str | None:
         """Why what happens now is not kept on the disk, as a sentence; None: it is."""
-        why, since_s = self._why, self._waits_since_s
-        if why is None and since_s is not None and (slow_s := self._now() - since_s) > SLOW_DISK_S:
+        why, since_s = self.why_refused, self._waits_since_s
+        if why is None and since_s is not None and (slow_s := self._now() - since_s) >= SLOW_DISK_S:
             why = f"the disk has not answered for {slow_s:.0f} s"
         if why is None:
             return None
@@ -127,9 +136,9 @@ class Journal:
                         while unsaved and unsaved[0]["n"] <= event["n"]:
                             unsaved.popleft()
                     self._waits_since_s = self._now() if any(self._unsaved.values()) else None
-                if self._why is not None:
+                if self.why_refused is not None:
                     log.warning("alarm log stored again")
-                    self._why = None
+                    self.why_refused = None
 
     def _next(self) -> list[tuple[str, dict[str, Any]]]:
         with self._memory:
@@ -145,6 +154,7 @@ class Journal:
         if self._database is None:
             return False
         self._database.execute("BEGIN IMMEDIATE")
+        journal_db.note_run(self._database, self.runs.present)
         self._database.executemany(
             "INSERT INTO event VALUES (?, ?, ?, ?, ?, ?)",
             ((v, e["n"], e["at_ms"], e.get("alarm"), e["change"], orjson.dumps(e)) for v, e in events),
@@ -266,9 +276,9 @@ class Journal:
                 except sqlite3.Error:
                     log.debug("nothing to roll back", exc_info=True)
             why = journal_db.why(error)
-            if why != self._why:
+            if why != self.why_refused:
                 log.error("alarm log not stored: %s (%s)", why, error)
-            self._why = why
+            self.why_refused = why
             return else_
 
 

@@ -8,18 +8,18 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from server.bus.bus import FRAME_LIVES_S, Frame, Handler, NotServed, Watcher
-from server.bus.journal import Journal
+from server.bus.journal import SLOW_DISK_S, Journal
+from server.bus.log_runs import Resumed
 from server.bus.watchers import Watchers
 from server.storage.storage_thread import StorageThread
-
-SHOWN_AFTER_S = 0.05  # an event that waits longer for the disk is shown without it
 
 
 class LocalBus:
     """Both sides of the bus in one process. `now` is a monotonic clock in seconds.
 
-    Pages get an event once the journal has it on the disk, so that no number is given twice after a crash; but no later
-    than `SHOWN_AFTER_S`, for a slow disk delays no alarm.
+    Pages get an event, and a command is answered, once the journal has it on the disk, so that it survives a loss of
+    power. What the disk refuses is shown at once, and what it has not after `SLOW_DISK_S` then: while the journal
+    reports the trouble, no alarm waits for a disk.
     """
 
     def __init__(self, journal: Journal, *, now: Callable[[], float], storage: StorageThread | None = None) -> None:
@@ -57,12 +57,13 @@ class LocalBus:
         self._journal.on_saved = lambda: _call_soon(loop, self._release_saved)
         numbered = self._journal.append(vehicle, events)
         self._held.setdefault(vehicle, numbered[0]["n"])
-        loop.call_later(SHOWN_AFTER_S, self._release, vehicle, numbered[-1]["n"])
+        loop.call_later(SLOW_DISK_S, self._release, vehicle, numbered[-1]["n"])
         return numbered
 
     def _release_saved(self) -> None:
+        is_refused = self._journal.why_refused is not None
         for vehicle in tuple(self._held):
-            self._release(vehicle, self._journal.saved(vehicle))
+            self._release(vehicle, self._journal.last(vehicle) if is_refused else self._journal.saved(vehicle))
 
     def _release(self, vehicle: str, n: int) -> None:
         """From now on pages get the events up to number `n`."""
@@ -147,7 +148,11 @@ class LocalBus:
         return True
 
     def run(self, vehicle: str) -> str:
-        return ""
+        return self._journal.runs.present.id
+
+    async def resume(self, vehicle: str, run: str, n: int) -> Resumed:
+        """Where a reader goes on who has read up to `n` in `run`."""
+        return self._journal.runs.resume(vehicle, run, n, self.last_event(vehicle))
 
     async def request(self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0) -> Mapping[str, Any]:
         """The answer to a command, once the events that it caused may be shown. Raises NotServed."""
@@ -160,7 +165,7 @@ class LocalBus:
         except TimeoutError:
             raise NotServed(f"{vehicle} did not answer within {deadline_s:g} s", outcome="unknown") from None
         last = self._journal.last(vehicle)
-        while self._held.get(vehicle, last + 1) <= last:  # what is answered survives a crash; `SHOWN_AFTER_S` at most
+        while self._held.get(vehicle, last + 1) <= last:  # `SLOW_DISK_S` at most
             await self._changed.wait()
         return answer
 

@@ -178,7 +178,8 @@ class NatsAgent:
     async def _be_here(self) -> None:
         while True:
             for vehicle in self._published:
-                await self._publish(vehicle, "here", wire.Here(run=self._run, last=self._bus.last_event(vehicle)))
+                here = wire.Here(run=self._run, last=self._bus.last_event(vehicle), resumes=True)
+                await self._publish(vehicle, "here", here)
             now_s = self._now()
             for key in [key for key, looked in self._looked.items() if looked.until_s < now_s]:
                 self._looked.pop(key).close()
@@ -214,6 +215,9 @@ class NatsAgent:
             elif asked.do == "find":
                 filters = {name: value for name, value in asked.filters.items() if name in FILTERS}
                 found["events"] = await self._bus.find_events(vehicle, **filters, limit=asked.limit)
+            elif asked.do == "resume":
+                resumed = await self._bus.resume(vehicle, asked.run, asked.n)
+                found["resumed"] = [resumed.common, resumed.after, resumed.new_after]
         except NotServed as why:
             found["refused"], found["is_unknown"] = str(why), why.outcome == "unknown"
         finally:

@@ -11,6 +11,7 @@ from nats.aio.msg import Msg
 
 from server.bus import nats_wire as wire
 from server.bus.bus import ALL, FRAME_LIVES_S, SUMMARY, UNSERVED, Frame, NotServed, Watcher
+from server.bus.log_runs import Resumed
 from server.bus.nats_heard import GONE_AFTER_S, Heard
 from server.bus.nats_logs import RemoteLogs
 from server.bus.nats_pulls import Pulls
@@ -112,6 +113,7 @@ class NatsBus:
         except wire.Malformed as why:
             return self._questions.refuse(message.subject, why)
         vehicle = wire.vehicle_of(message.subject)
+        self._logs.note_resuming(vehicle, is_able=here.resumes)
         self._meet(vehicle, here.run, here.last)
 
     def _meet(self, vehicle: str, run: str, last: int) -> None:
@@ -193,9 +195,18 @@ class NatsBus:
         recent = self.recent_events(vehicle, n, limit)
         if recent is not None:
             return recent
-        return await self._questions.read(
+        run = self.run(vehicle)
+        found = await self._questions.read(
             vehicle, limit, lambda last, portion: wire.Ask(do="after", n=n if last is None else last, limit=portion)
         )
+        if self._questions.clocks[vehicle].run != run:  # of another run: whoever asked goes on there
+            raise NotServed(f"{vehicle} has started again")
+        return found
+
+    async def resume(self, vehicle: str, run: str, n: int) -> Resumed:
+        """Raises NotServed, as `events_after`."""
+        self._heard.check_known(vehicle)
+        return await self._logs.resume(vehicle, run, n)
 
     async def find_events(self, vehicle: str, **filters: Any) -> list[dict[str, Any]]:
         """Raises NotServed, as `events_after`."""
@@ -214,7 +225,7 @@ class NatsBus:
         vehicle = wire.vehicle_of(message.subject)
         if not news.events or type(first := news.events[0].get("n")) is not int:
             return None
-        if vehicle not in self._logs:
+        if news.run != self.run(vehicle):
             self._meet(vehicle, news.run, first - 1)
         return self._logs.take(vehicle, news.events)
 

@@ -23,11 +23,10 @@ class EventCache:
         return self.newest > self.last
 
     def begin(self, run: str, last: int) -> None:
-        """The agent is there, in this run of it; the first time older events are left where they are."""
-        if not self.run:
+        """The agent is there, in this run of it; older events are left where they are. Those of another run may be of
+        another log."""
+        if run != self.run:
             self.last = self.newest = last
-        elif run != self.run and last < self.last:  # its log was begun anew: all of it is new
-            self.last, self.newest = 0, last
             self._recent.clear()
         self.run = run
         self.newest = max(self.newest, last)

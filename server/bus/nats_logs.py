@@ -9,6 +9,7 @@ from typing import Any
 
 from server.bus import nats_wire as wire
 from server.bus.bus import NotServed
+from server.bus.log_runs import Resumed
 from server.bus.nats_events import EventCache
 from server.bus.nats_questions import Questions
 
@@ -20,6 +21,7 @@ class RemoteLogs:
         self._questions = questions
         self._on_new = on_new
         self._caches: dict[str, EventCache] = {}
+        self._resuming: set[str] = set()  # whose agents answer `resume`
         self._fetches: dict[str, asyncio.Task[None]] = {}
         self._changed = asyncio.Event()
 
@@ -52,8 +54,27 @@ class RemoteLogs:
 
     def begin(self, vehicle: str, run: str, last: int) -> None:
         """The agent is there, in this run of it, and its newest event has this number."""
-        self._caches.setdefault(vehicle, EventCache()).begin(run, last)
+        cache = self._caches.setdefault(vehicle, EventCache())
+        is_other = cache.run not in ("", run)
+        cache.begin(run, last)
+        if is_other:
+            self._on_new(vehicle)  # whoever follows it goes on in this run
         self._fetch_missing(vehicle)
+
+    def note_resuming(self, vehicle: str, *, is_able: bool) -> None:
+        """Whether the agent is of a version that answers `resume`."""
+        (self._resuming.add if is_able else self._resuming.discard)(vehicle)
+
+    async def resume(self, vehicle: str, run: str, n: int) -> Resumed:
+        """As `PageBus.resume`."""
+        if vehicle not in self._resuming:  # of an agent of before, only a shorter log is known to be another one
+            common = n if n <= self.last(vehicle) else 0
+            return Resumed(common=common, after=common, new_after=common)
+        answer = await self._questions.ask(vehicle, wire.Ask(do="resume", run=run, n=n))
+        if answer.resumed is None or answer.run != self.run(vehicle):
+            raise NotServed(f"{vehicle} has started again")
+        common, after, new_after = answer.resumed
+        return Resumed(common=common, after=after, new_after=new_after)
 
     def take(self, vehicle: str, events: list[dict[str, Any]]) -> None:
         """Events that were published or asked for."""
@@ -75,6 +96,8 @@ class RemoteLogs:
             while cache.is_behind:
                 before = cache.last
                 answer = await self._questions.ask(vehicle, wire.Ask(do="after", n=before))
+                if answer.run != cache.run:  # it says so itself, and then the rest is another's
+                    return
                 self.take(vehicle, answer.events)
                 if cache.last == before:
                     return

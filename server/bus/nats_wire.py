@@ -70,6 +70,7 @@ class FrameHead(Body):
 class Here(Body):
     run: Run
     last: Number
+    resumes: bool = False  # the agent answers `resume`
 
 
 class Events(Body):
@@ -78,9 +79,10 @@ class Events(Body):
 
 
 class Ask(Body):
-    """`command`: only until `not_after_s` of the agent's run `run`; `after` and `find`: events; `clock`: only that."""
+    """`command`: only until `not_after_s` of the agent's run `run`; `after` and `find`: events; `clock`: only that;
+    `resume`: where to go on after number `n` of `run`."""
 
-    do: Literal["command", "after", "find", "clock"]
+    do: Literal["command", "after", "find", "clock", "resume"]
     command: dict[str, Any] = {}
     not_after_s: float = 0.0
     run: Run = ""
@@ -95,6 +97,7 @@ class Answer(Body):
     last: Number
     answer: dict[str, Any] = {}
     events: Annotated[list[dict[str, Any]], Field(max_length=PORTION)] = []
+    resumed: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = None  # as `Resumed` has them
     refused: str = ""  # not served; why, as a sentence
     is_unknown: bool = False  # a command that was not served may have been carried out
 

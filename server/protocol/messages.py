@@ -35,13 +35,14 @@ class ServerHello(TypedDict):
 
     kind: Literal["hello"]
     version: str
-    boot: Annotated[str, doc("another one: another run of the server")]
+    boot: Annotated[str, doc("another one: another run of the server; numbers of events are of a run")]
     vehicle: str
     vehicles: list[str]
     build: Annotated[str, doc('of the page that the server has now; "" for single modules')]
     time_ms: int
     last_event: int
     veil_after_s: Annotated[float, doc("without a message for so long a page covers its values")]
+    resumes: NotRequired[Annotated[bool, doc("a page whose hello names another run gets `resumed`")]]
     signs: NotRequired[Annotated[bool, doc("of a web node: orders are signed, as agents require it")]]
 
 
@@ -57,12 +58,24 @@ class Offer(TypedDict):
     of: list[FrameKind]
 
 
+class Resumed(TypedDict):
+    """How the log goes on for a page that read it in another run."""
+
+    common: Annotated[
+        int, doc("up to this number it is the log that the page has; what the page has beyond is not in it")
+    ]
+    new_after: Annotated[int, doc("events after this number are new; those up to it may be known from another log")]
+
+
 class Events(TypedDict):
     """Events of the log, at most 100."""
 
     kind: Literal["events"]
     events: list[LogEvent]
     last: Annotated[int, doc("the newest number there is")]
+    resumed: NotRequired[
+        Annotated[Resumed, doc("with the first ones for a page whose hello names another run; then there may be none")]
+    ]
 
 
 class RefusedAddress(ConnectionProblem):

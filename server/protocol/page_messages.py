@@ -18,7 +18,7 @@ class PageHello(TypedDict):
 
     kind: Literal["hello"]
     have_event: NotRequired[Annotated[int | None, doc("number of the newest event that the page has")]]
-    boot: NotRequired[Annotated[str | None, doc("of the server that it is of")]]
+    boot: NotRequired[Annotated[str | None, doc("of the run that it is of")]]
     name: NotRequired[Annotated[str, doc("what its operator calls it")]]
     build: NotRequired[
         Annotated[

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from server.bus.bus import NotServed, PageBus
+from server.bus.log_runs import Resumed
 
 AGAIN_S = 1.0
 
@@ -21,6 +22,20 @@ class EventFeed:
         self._reading: asyncio.Task[list[dict[str, Any]]] | None = None
         self._reading_after = 0
         self._again: asyncio.TimerHandle | None = None
+        self._resuming: asyncio.Task[None] | None = None
+
+    def resume(self, run: str, n: int, then: Callable[[Resumed], None]) -> None:
+        """Calls `then` with where a page goes on that has read up to `n` in another run."""
+        self._resuming = asyncio.create_task(self._resume(run, n, then))
+
+    async def _resume(self, run: str, n: int, then: Callable[[Resumed], None]) -> None:
+        while True:
+            try:
+                found = await self._bus.resume(self._vehicle, run, n)
+            except NotServed:  # the agent does not answer
+                await asyncio.sleep(AGAIN_S)
+            else:
+                return then(found)
 
     def after(self, n: int, limit: int) -> list[dict[str, Any]]:
         """The events after number `n`; none yet where the disk must be read, for which `on_read` is called."""
@@ -49,7 +64,8 @@ class EventFeed:
 
     def close(self) -> None:
         """Ends a reading that is under way."""
-        if self._reading is not None:
-            self._reading.cancel()
+        for task in (self._reading, self._resuming):
+            if task is not None:
+                task.cancel()
         if self._again is not None:
             self._again.cancel()

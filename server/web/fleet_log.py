@@ -28,7 +28,8 @@ class FleetLog:
         self._unwatch: Callable[[], None] | None = None
         self._events: deque[FleetEvent] = deque(maxlen=KEPT)
         self._count = 0  # of all that there were: the number of the newest
-        self._read: dict[str, int] = {}  # of each car, the number of the newest event that was looked at
+        self._read: dict[str, int] = {}  # of each car, the number of the newest event that was looked at, of its run
+        self._runs: dict[str, str] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._following: set[str] = set()
         self._is_ready = False
@@ -70,6 +71,7 @@ class FleetLog:
             task.cancel()
         self._events.clear()
         self._read.clear()
+        self._runs.clear()
         self._following.clear()
         self._count, self._is_ready = 0, False
 
@@ -91,6 +93,7 @@ class FleetLog:
 
     def _start(self, vehicle: str) -> asyncio.Task[None]:
         """Read the past of a car; what follows is new."""
+        self._runs[vehicle] = self._bus.run(vehicle)
         self._read[vehicle] = last = self._bus.last_event(vehicle)
         return self._spawn(self._past_of(vehicle, last))
 
@@ -111,8 +114,9 @@ class FleetLog:
 
     async def _follow(self, vehicle: str) -> None:
         try:
-            if self._bus.last_event(vehicle) < self._read[vehicle]:
-                self._read[vehicle] = 0  # its log was begun anew
+            if (run := self._bus.run(vehicle)) != self._runs[vehicle]:
+                resumed = await self._bus.resume(vehicle, self._runs[vehicle], self._read[vehicle])
+                self._runs[vehicle], self._read[vehicle] = run, resumed.new_after
             while events := await self._bus.events_after(vehicle, self._read[vehicle], PORTION):
                 self._read[vehicle] = _number(events[-1])
                 self._add(vehicle, events)

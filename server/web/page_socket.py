@@ -124,7 +124,7 @@ class Page:
             case "hello":
                 await self._commands.begin(message)
                 is_former = "page" in message and "build" not in message  # a page of before the builds were named
-                self._writer.begin(message.get("have_event"), is_former=is_former)
+                self._writer.begin(message.get("have_event"), message.get("boot"), is_former=is_former)
             case "present":
                 await self._commands.present(message)
             case "replay":

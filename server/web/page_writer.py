@@ -15,6 +15,7 @@ import orjson
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from server.bus.bus import UNSERVED, NotServed, PageBus
+from server.bus.log_runs import Resumed
 from server.protocol import messages
 from server.protocol.alarm_state import LogEvent
 from server.protocol.messages import FrameKind, Hello
@@ -61,7 +62,10 @@ class PageWriter:
         self._is_taking = False  # the page requested the newest
         self._replies: list[messages.ToPage] = []
         self._event = 0  # the last number sent; from the greeting on
-        self._have: int | None = None  # the newest event that the page has, as it said
+        self._have: int | None = None  # the newest event that the page has, as it said, and the run that it is of
+        self._have_run: str | None = None
+        self._is_resuming = False  # where a page of another run goes on is not known yet
+        self._resumed: messages.Resumed | None = None  # to be sent with the next events
         self._is_greeted = False
         self._run = ""  # of the vehicle's session when the page was greeted
         self._feed = EventFeed(bus, vehicle, on_read=lambda: self.on_new("events"))
@@ -103,12 +107,12 @@ class PageWriter:
 
     # -- what the page answers ---------------------------------------------------------------------------------------
 
-    def begin(self, have_event: object, *, is_former: bool = False) -> None:
-        """The page said hello, and which event is the newest that it has; only the first hello counts. `is_former`: it
-        knows the former names of phases."""
+    def begin(self, have_event: object, run: object = None, *, is_former: bool = False) -> None:
+        """The page said hello, and which event is the newest that it has, of which run; only the first hello counts.
+        `is_former`: it knows the former names of phases."""
         self._is_former = self._is_former or (is_former and not self._has_begun)
         if not self._has_begun and type(have_event) is int:
-            self._have = have_event
+            self._have, self._have_run = have_event, run if isinstance(run, str) else None
             if self._is_greeted:
                 self._go_on()
         self._has_begun = True
@@ -116,9 +120,21 @@ class PageWriter:
 
     def _go_on(self) -> None:
         """Events follow those that the page has, where that can be."""
-        if self._have is not None and 0 <= self._have <= self._bus.last_event(self._vehicle):
+        if self._have is None or self._have < 0:
+            return
+        if self._have_run and self._have_run != self._run:
+            self._is_resuming = True
+            self._feed.resume(self._have_run, self._have, self._on_resumed)
+        elif self._have <= self._bus.last_event(self._vehicle):
             self._event = self._have
             self._are_events_due = True
+
+    def _on_resumed(self, found: Resumed) -> None:
+        self._is_resuming = False
+        self._event = found.after
+        self._resumed = {"common": found.common, "new_after": found.new_after}
+        self._are_events_due = True
+        self._wake.set()
 
     def take(self) -> None:
         """The page takes what was offered."""
@@ -201,7 +217,8 @@ class PageWriter:
         for message in waiting:
             await self._send(message)
         has_begun = self._has_begun or self._now() >= self._since_s + HELLO_WITHIN_S
-        if self._is_greeted and self._are_events_due and has_begun and not self._are_events_unanswered:
+        may_send = self._is_greeted and has_begun and not (self._are_events_unanswered or self._is_resuming)
+        if may_send and self._are_events_due:
             await self._send_events()
         if self._is_taking:
             self._is_taking = False
@@ -214,12 +231,15 @@ class PageWriter:
     async def _send_events(self) -> None:
         self._are_events_due = False
         events = self._feed.after(self._event, EVENTS_A_BATCH)
-        if events:
+        if events or self._resumed:
             self._are_events_unanswered = True
             self._is_catching_up = len(events) == EVENTS_A_BATCH
-            self._event = events[-1]["n"]
+            self._event = events[-1]["n"] if events else self._event
             last = self._bus.last_event(self._vehicle)
-            await self._send({"kind": "events", "events": cast(list[LogEvent], events), "last": last})
+            message: messages.Events = {"kind": "events", "events": cast(list[LogEvent], events), "last": last}
+            if self._resumed:
+                message["resumed"], self._resumed = self._resumed, None
+            await self._send(message)
 
     async def _offer(self) -> None:
         fresh = [kind for kind in self._view.kinds if self._is_new(kind)]

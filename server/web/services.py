@@ -170,6 +170,7 @@ class Services:
             "time_ms": self.wall_ms(),
             "last_event": self.bus.last_event(vehicle),
             "veil_after_s": 2.0,
+            "resumes": True,
         }
         if self.bus.grows:
             found["signs"] = True

@@ -37,6 +37,7 @@ class Viewer:
         self.states: list[dict[str, Any]] = []
         self.scans: list[bytes] = []
         self.events: list[dict[str, Any]] = []
+        self.resumed: dict[str, int] | None = None  # where another run went on
         self.offers: list[dict[str, Any]] = []
         self.other: list[dict[str, Any]] = []
         self.got_s: list[float] = []  # when each state came, wall clock
@@ -66,7 +67,8 @@ class Viewer:
                         await self.send({"kind": "take", "seq": frame["seq"]})
                 case "events":
                     self.events.extend(frame["events"])
-                    await self.send({"kind": "have", "event": frame["events"][-1]["n"]})
+                    self.resumed = frame.get("resumed", self.resumed)
+                    await self.send({"kind": "have", "event": frame["events"][-1]["n"] if frame["events"] else 0})
                 case _:
                     self.other.append(frame)
         async with self._changed:
@@ -132,17 +134,19 @@ async def viewer(
     *,
     vehicle: str | None = None,
     have_event: int | None = None,
+    boot: str | None = None,
     name: str | None = None,
     page: str | None = None,
     fleet: bool = False,
     key: str | None = None,
 ) -> AsyncIterator[Viewer]:
-    """A viewer that reads in the background; `base` is the server's http address. `fleet`: of all cars."""
+    """A viewer that reads in the background; `base` is the server's http address. `boot`: the run that `have_event` is
+    of. `fleet`: of all cars."""
     url = base.replace("http://", "ws://") + "/ws" + (f"?vehicle={vehicle}" if vehicle else "?fleet=1" if fleet else "")
     headers = {} if key is None else {"Authorization": f"Bearer {key}"}
     async with websockets.connect(url, max_size=2**24, additional_headers=headers) as socket:
         one = Viewer(socket, name=name or "operator", page=page)
-        named = {key: value for key, value in (("name", name), ("page", page)) if value}
+        named = {key: value for key, value in (("name", name), ("page", page), ("boot", boot)) if value}
         await one.send({"kind": "hello", "have_event": have_event, "build": ""} | named)
         reading = asyncio.create_task(one.read())
         try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
@@ -19,11 +19,20 @@ async def events(
     request: Request,
     vehicle: VehicleName = None,
     after: Annotated[int, Query(ge=0, le=2**53)] = 0,
+    run: Annotated[str | None, Query(max_length=40, description="In which `after` was read; none: the present")] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> Response:
+    """Numbers are of the `run` in the answer. Who read up to `after` in another run gets what follows the common part;
+    events up to `new_after` may be known from there."""
     app = services(request)
     name = vehicle_of(app, vehicle)
-    return as_json({"events": await app.bus.events_after(name, after, limit), "last": app.bus.last_event(name)})
+    present = app.bus.run(name)
+    body: dict[str, Any] = {"run": present}
+    if run is not None and run != present:
+        resumed = await app.bus.resume(name, run, after)
+        after, body["resumed"] = resumed.after, {"common": resumed.common, "new_after": resumed.new_after}
+    body["events"] = await app.bus.events_after(name, after, limit)
+    return as_json(body | {"last": app.bus.last_event(name)})
 
 
 @router.get(

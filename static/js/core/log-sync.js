@@ -40,24 +40,24 @@ export class LogSync {
    * @param {number} blind_s for so long nothing fresh had come
    */
   greeted(hello, self, blind_s) {
-    const have_event = this.#log.greet(hello.boot, hello.last_event, blind_s, Date.now());
+    const have_event = this.#log.greet(hello, blind_s, Date.now());
     this.#owed = () => {
       this.#owed = null;
-      this.#send({ kind: 'hello', have_event, boot: hello.boot, ...self });
+      this.#send({ kind: 'hello', have_event, boot: this.#log.boot, ...self });
     };
     if (this.#mayGreet) this.#owed();
     this.#caughtUp();
     this.#emitter.emit('open', hello);
   }
 
-  /** @param {import('./protocol-types.js').LogEvent[]} events */
-  take(events) {
+  /** @param {import('./protocol-types.js').LogEvent[]} events @param {import('./protocol-types.js').Resumed} [resumed] */
+  take(events, resumed) {
     if (this.#owed) { // they came before this page told what it has: from there they are sent again, and in order
       this.#owed();
       this.#send({ kind: 'have', event: this.#log.last ?? 0 });
       return;
     }
-    const fresh = this.#log.take(events);
+    const fresh = this.#log.take(events, resumed);
     this.#send({ kind: 'have', event: this.#log.last ?? 0 });
     if (fresh.length) this.#emitter.emit('log', fresh);
     this.#caughtUp();

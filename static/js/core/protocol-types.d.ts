@@ -688,6 +688,8 @@ export interface Events {
   events: Array<LogEvent>;
   /** the newest number there is */
   last: number;
+  /** with the first ones for a page whose hello names another run; then there may be none */
+  resumed?: Resumed;
 }
 
 export interface ExportFormat {
@@ -825,7 +827,7 @@ export interface HeldState {
 export interface Hello {
   kind: "hello";
   version: string;
-  /** another one: another run of the server */
+  /** another one: another run of the server; numbers of events are of a run */
   boot: string;
   vehicle: string;
   vehicles: Array<string>;
@@ -835,6 +837,8 @@ export interface Hello {
   last_event: number;
   /** without a message for so long a page covers its values */
   veil_after_s: number;
+  /** a page whose hello names another run gets `resumed` */
+  resumes?: boolean;
   /** of a web node: orders are signed, as agents require it */
   signs?: boolean;
   who: Identity;
@@ -1356,7 +1360,7 @@ export interface PageHello {
   kind: "hello";
   /** number of the newest event that the page has */
   have_event?: number | null;
-  /** of the server that it is of */
+  /** of the run that it is of */
   boot?: string | null;
   /** what its operator calls it */
   name?: string;
@@ -1961,6 +1965,14 @@ export interface Reply {
 export interface ResumeCommand {
   id?: string | null;
   kind: "resume";
+}
+
+/** How the log goes on for a page that read it in another run. */
+export interface Resumed {
+  /** up to this number it is the log that the page has; what the page has beyond is not in it */
+  common: number;
+  /** events after this number are new; those up to it may be known from another log */
+  new_after: number;
 }
 
 /** Dials at once. */

@@ -213,7 +213,7 @@ export class Store extends Known {
       case 'duty':
         this.duty = message;
         return this.#emitter.emit('duty');
-      case 'events': return this.sync.take(message.events);
+      case 'events': return this.sync.take(message.events, message.resumed);
       case 'timeline': case 'beside': case 'beside_ended': case 'replay':
         if (message.kind === 'replay') this.replaying = false; // it ended: what comes now is live
         return this.#emitter.emit('replay', message);

@@ -14,9 +14,11 @@ from server.bus import nats_wire as wire
 from server.bus.bus import ALL, FRAME_LIVES_S, NotServed, PageBus
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
+from server.bus.log_runs import Resumed
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_sync import processed
 from server.web.cars_board import CarsBoard
+from server.web.fleet_log import FleetLog
 from tests.page.radio import Radio
 from tests.server.bus.broker import Broker, connected, running_broker
 from tests.server.bus.buses import Buses, Clock, event, local_buses, nats_buses, node, numbers, offering, until
@@ -241,3 +243,32 @@ async def test_which_part_was_lost_is_known_for_each_command() -> None:
         with pytest.raises(NotServed, match="the broker is not connected") as why:
             await both.page.request("ocelot", {"what": 2})
         assert (why.value.outcome, why.value.cut) == ("not_delivered", "server-broker")
+
+
+async def test_an_agent_with_another_log_is_followed_in_it() -> None:
+    """A copied card, whose log is longer: its numbers are no continuation of what the node has."""
+    clock = Clock()
+
+    async def answer(_: Mapping[str, Any]) -> dict[str, Any]:
+        return {"ok": True}
+
+    async with running_broker() as broker, node(broker.address, clock) as page:
+        log = FleetLog(page)
+        log.watch(lambda: None)
+        for run, count in (("run-1", 3), ("run-2", 5)):
+            bus = LocalBus(Journal(None, run=run), now=clock)
+            bus.serve("ocelot", answer)
+            async with offering(bus, broker.address, run, clock):
+                await until(lambda run=run: page.run("ocelot") == run)
+                bus.append("ocelot", [event(f"{run} {n}", change="attention") for n in range(count)])
+                await until(lambda count=count: page.last_event("ocelot") == count)
+                await until(lambda run=run, count=count: told(log)[-1:] == [f"{run} {count - 1}"])
+                if run == "run-2":
+                    assert await page.resume("ocelot", "run-1", 3) == Resumed(common=0, after=0, new_after=0)
+                    found = await page.events_after("ocelot", 0)
+                    assert [one["text"] for one in found] == [f"run-2 {n}" for n in range(5)]
+        assert told(log) == [*(f"run-1 {n}" for n in range(3)), *(f"run-2 {n}" for n in range(5))]
+
+
+def told(log: FleetLog) -> list[str]:
+    return [one["text"] for one in log.after(0)[1]]

@@ -22,21 +22,17 @@ def test_an_older_word_of_the_same_run_takes_nothing_back() -> None:
     assert (cache.last, cache.after(10, 9)) == (11, events(11))
 
 
-def test_a_log_that_was_begun_anew_is_all_new() -> None:
+@pytest.mark.parametrize("last", [3, 51, 60])
+def test_nothing_of_another_run_is_taken_for_this_one(last: int) -> None:
+    """Its log may be another one, restored and grown since; who reads on asks where."""
     cache = EventCache()
     cache.begin("a", 50)
     cache.take(events(51))
-    cache.begin("b", 3)
-    assert (cache.last, cache.newest, cache.is_behind) == (0, 3, True)
-    assert cache.take(events(1, 2, 3))
-    assert cache.after(1, 9) == events(2, 3)
-
-
-def test_another_run_of_the_same_log_goes_on() -> None:
-    cache = EventCache()
-    cache.begin("a", 50)
-    cache.begin("b", 52)
-    assert (cache.last, cache.newest) == (50, 52)
+    cache.begin("b", last)
+    assert (cache.last, cache.newest, cache.is_behind) == (last, last, False)
+    assert cache.after(last - 1, 9) is None
+    assert cache.take(events(last + 1))
+    assert cache.after(last, 9) == events(last + 1)
 
 
 @pytest.mark.parametrize(
