@@ -19,8 +19,8 @@ import { age, timeOfDay } from '../core/format.js';
 
 const NONE = 'No car is listed yet. A car is listed here once this server is started with it (--vehicle NAME=ws://ADDRESS), or once its agent is heard at the broker.';
 /** Two columns and pages; else everything is in one column that scrolls. */
-const WIDE = '(min-width: 760px) and (min-height: 560px)';
-const DESK = '(min-width: 1200px)';
+const WIDE = '(width >= 47.5em) and (height >= 35em)';
+const DESK = '(width >= 75em)';
 
 export class FleetView {
   /** Items of one car each. @type {Item[]} */

@@ -1,7 +1,7 @@
 // Whether all parts of a car stand in sight at once, as panes; below that size the tabs are turned like pages.
 
 /** A desktop, a tablet on its side, a tablet upright, as in watch.css. */
-const FLOOR = ['(min-width: 1000px) and (min-height: 600px)', '(min-width: 700px) and (min-height: 1060px)'];
+const FLOOR = ['(width >= 62.5em) and (height >= 37.5em)', '(width >= 43.75em) and (height >= 66.25em)'];
 
 /** @type {MediaQueryList | null} */
 let query = null;

@@ -1,6 +1,7 @@
 // The place above the rail where the Mark key comes: kept free from the first picture on, so that nothing moves under a finger.
 
 import { listen, need, setAttribute, show } from '../core/dom.js';
+import { scale } from '../core/scale.js';
 
 /** Tabs that show the car. */
 const LIVE = ['home', 'map', 'scan'];
@@ -13,11 +14,12 @@ const LEAST_PX = 520;
 
 /** On a low phone the steps of a slow-down and a warning leave no room: they come first; on its side a warning alone does. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */
 function isCramped(monitor, store) {
-  if (innerWidth < LOW_PX && (monitor.dataset['sheet'] !== undefined || (innerHeight < LIST_PX && monitor.dataset['over'] === 'headed'))) return true;
+  const [width, height] = [innerWidth / scale(), innerHeight / scale()];
+  const isNarrow = width < LOW_PX;
+  if (isNarrow && (monitor.dataset['sheet'] !== undefined || (height < LIST_PX && monitor.dataset['over'] === 'headed'))) return true;
   const state = store.frame?.decelerate?.state;
   const isSlowing = state === 'ordered' || state === 'holding';
-  const isNarrow = innerWidth < LOW_PX;
-  return document.body.hasAttribute('data-snack') && (isSlowing ? innerHeight < (isNarrow ? LOW_PX : LEAST_PX) : isNarrow && innerHeight < LEAST_PX);
+  return document.body.hasAttribute('data-snack') && (isSlowing ? height < (isNarrow ? LOW_PX : LEAST_PX) : isNarrow && height < LEAST_PX);
 }
 
 /** What is marked is the live drive: in a replay there is no such place. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */

@@ -6,13 +6,14 @@ import { eventWords, gapLine } from '../alarms/log-layout.js';
 import { fixed, timeOfDay } from '../core/format.js';
 import { alarmInHead } from './dialogs.js';
 import { areAlarmsInSight } from './layout.js';
+import { scale } from '../core/scale.js';
 import { styled } from '../core/style-sheet.js';
 import { veilOf } from './veil.js';
 import { Lines, peopleLines, signalLines } from './wall-panes.js';
 
 /** @typedef {import('../core/store.js').Store} Store */
 
-/** Height of a line of the log [px], as in watch.css. */
+/** Height of a line of the log, as in watch.css [px of the usual size]. */
 const LINE_PX = 24;
 
 /**
@@ -70,7 +71,7 @@ class Panes {
     const isInSight = frame !== null && areAlarmsInSight();
     void this.list.want(isInSight);
     if (!isInSight) return;
-    if (innerWidth >= 1800) this.dress ??= styled('wall'); // as in wall.css
+    if (innerWidth >= 1800 * scale()) this.dress ??= styled('wall'); // as in wall.css
     const heads = headsOf(frame);
     const covered = veilOf(this.store);
     for (const { name, element } of this.heads) setWords(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // of a covered pane nothing is said
@@ -134,7 +135,7 @@ class LogPane {
     this.store = store;
     this.head = /** @type {HTMLElement} */ (list.parentElement?.querySelector('.ph .end'));
     new ResizeObserver(([entry]) => {
-      this.#lines = Math.floor((entry?.contentRect.height ?? 0) / LINE_PX);
+      this.#lines = Math.floor((entry?.contentRect.height ?? 0) / (LINE_PX * scale()));
       this.draw();
     }).observe(list);
   }

@@ -3,6 +3,7 @@
 import { html, setAttribute, setWords } from '../core/dom.js';
 import { age, counted, fixed, NOTHING } from '../core/format.js';
 import { ABSENT, isAbsent } from '../core/ink.js';
+import { scale } from '../core/scale.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').State} State
@@ -11,7 +12,7 @@ import { ABSENT, isAbsent } from '../core/ink.js';
  * @typedef {{key: string, cells: string[], ink?: string, of?: string}} Line of: the signal whose age it has
  */
 
-/** Height of a line [px], as in wall.css. */
+/** Height of a line, as in wall.css [px of the usual size]. */
 const LINE_PX = 26;
 
 /**
@@ -55,7 +56,7 @@ export class Lines {
   constructor(list) {
     this.list = list;
     this.observer = new ResizeObserver(([entry]) => {
-      this.#lines = Math.floor((entry?.contentRect.height ?? 0) / LINE_PX);
+      this.#lines = Math.floor((entry?.contentRect.height ?? 0) / (LINE_PX * scale()));
     });
     this.observer.observe(list);
   }

@@ -1,9 +1,10 @@
 // One slide of the slow-down: the one in the action bar, or the one at the same pixels in an alarm's sheet.
 
 import { field, listen, need, setAttribute, setText, setWords } from '../core/dom.js';
+import { scale } from '../core/scale.js';
 import { FAR_ENOUGH, KNOB_PX, Slide } from './slide-layout.js';
 
-/** Border and gap at both ends of the slide [px]: slowing.css. */
+/** Border and gap at both ends of the slide, slowing.css [px of the usual size, as all of the gesture]. */
 const ENDS_PX = 8;
 /** How long the hint after a wrong press is shown [ms]. */
 const HINT_MS = 2500;
@@ -59,19 +60,19 @@ export class SlideKey {
     return this.#view.kind === 'armed';
   }
 
-  /** Distance from the end where the knob rests, and the whole distance [px]. @param {number} x_px */
+  /** Distance from the end where the knob rests, and the whole distance [px of the usual size]. @param {number} x_px */
   #along(x_px) {
     const box = this.slide.getBoundingClientRect();
-    return { at_px: (this.#isMirrored ? box.right - x_px : x_px - box.left) - ENDS_PX / 2, way_px: box.width - ENDS_PX - KNOB_PX };
+    return { at_px: (this.#isMirrored ? box.right - x_px : x_px - box.left) / scale() - ENDS_PX / 2, way_px: box.width / scale() - ENDS_PX - KNOB_PX };
   }
 
   #place() {
     const { share, phase } = this.gesture;
-    const moved_px = share * this.#along(0).way_px;
+    const moved_rem = (share * this.#along(0).way_px) / 16;
     setAttribute(this.slide, 'data-moves', phase === 'drag' || phase === 'hold' || null);
     setAttribute(this.slide, 'data-far', (phase === 'drag' && share >= FAR_ENOUGH) || null);
-    this.knob.style.transform = share ? `translateX(${((this.#isMirrored ? -1 : 1) * moved_px).toFixed(1)}px)` : '';
-    this.trail.style.width = share ? `${(moved_px + KNOB_PX).toFixed(1)}px` : '';
+    this.knob.style.transform = share ? `translateX(${((this.#isMirrored ? -1 : 1) * moved_rem).toFixed(3)}rem)` : '';
+    this.trail.style.width = share ? `${(moved_rem + KNOB_PX / 16).toFixed(3)}rem` : '';
   }
 
   /** @param {import('./slide-layout.js').Outcome} outcome @param {number} at_ms */

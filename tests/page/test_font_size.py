@@ -1,0 +1,131 @@
+"""The page grows with the browser's font, and stands at 150 %: each key is in reach, nothing covers another, and no
+digit of the speed is cut."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, Page, async_playwright, expect
+
+from tests.chromium import FLAGS
+from tests.page.canned import Canned
+from tests.page.conftest import Phone, new_phone
+from tests.page.test_overlaps import DRAWN, critical, noticed, opened, several, walk
+
+SIZES: list[tuple[float, float]] = [(360, 740), (412, 915), (820, 1180), (1440, 900)]
+LARGER = 1.5
+#: Keys of the screen in front that no finger can reach: scrolled to, they lie outside the window or under another.
+OUT_OF_REACH = """() => {
+  const keys = [...document.querySelectorAll('#monitor :is(button, a[href], input, select), .snack button')];
+  const seen = keys.filter((one) => !one.closest('[inert], .unseen, dialog:not([open])') && !one.disabled
+    && one.checkVisibility({ visibilityProperty: true, opacityProperty: true, contentVisibilityAuto: true })
+    && one.offsetWidth > 1 && getComputedStyle(one).pointerEvents !== 'none');
+  return seen.filter((one) => {
+    return !['center', 'start', 'end'].some((block) => {
+      one.scrollIntoView({ block, inline: 'nearest' });
+      const { left, right, top, bottom } = one.getBoundingClientRect();
+      return [0.5, 0.15, 0.85].some((share) => {
+        const at = document.elementFromPoint((left + right) / 2, top + share * (bottom - top));
+        return at && (one.contains(at) || [...(one.labels ?? [])].some((it) => it.contains(at)));
+      });
+    });
+  }).map((one) => one.dataset.f || one.id || one.textContent.trim());
+}"""
+#: Height of the speed's digits that is seen, and whether any of it is cut.
+DIGITS = """() => {
+  const one = document.querySelector('.gauge .speed');
+  if (one.closest('[inert]')) return { isCut: false, isLarge: true };
+  one.closest('.panel').scrollTop = 0;
+  const { left, right, top, bottom } = one.getBoundingClientRect();
+  const view = one.closest('.view').getBoundingClientRect();
+  const isCut = left < view.left || right > view.right || top < view.top || bottom > view.bottom;
+  return { isCut, isLarge: bottom - top > 16 };
+}"""
+
+
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def large(chromium: str) -> AsyncIterator[Browser]:
+    """A browser whose font has 24 px in place of 16."""
+    async with async_playwright() as playwright:
+        settings = f"--blink-settings=defaultFontSize={round(16 * LARGER)}"
+        browser = await playwright.chromium.launch(executable_path=chromium, args=[*FLAGS, settings])
+        yield browser
+        await browser.close()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def grown(large: Browser) -> AsyncIterator[Phone]:
+    phone = await new_phone(large)
+    yield phone
+    await phone.page.context.close()
+    assert phone.complaints == []
+
+
+async def all_is_in_reach(phone: Phone, canned: Canned, sizes: list[tuple[float, float]], tab: str) -> None:
+    """Quiet, with all notices, and beside a critical alarm."""
+    canned.vehicle = "Ocelot"
+    page = await opened(phone, canned, tab)
+    assert await faults(page, sizes) == {}
+    several(canned)
+    await noticed(page, canned)
+    await expect(page.locator(".snacks > .asks:not(.other)")).to_be_attached()
+    assert await faults(page, sizes) == {}
+    canned.state["alarms"].append(critical())
+    await expect(page.locator("#sheet-alarm")).to_be_visible()
+    assert await faults(page, sizes, is_asked=True) == {}
+
+
+async def faults(page: Page, sizes: list[tuple[float, float]], *, is_asked: bool = False) -> dict[str, object]:
+    """What is covered, cut or out of reach at each of these sizes; `is_asked`: an alarm is answered first."""
+    found: dict[str, object] = dict(await walk(page, [(round(width), round(height)) for width, height in sizes]))
+    for width, height in sizes:
+        await page.set_viewport_size({"width": round(width), "height": round(height)})
+        await page.evaluate(DRAWN)
+        keys = [] if is_asked else await page.evaluate(OUT_OF_REACH)
+        digits = await page.evaluate(DIGITS)
+        if keys or not digits["isLarge"] or digits["isCut"]:
+            found[f"{width} × {height} reach"] = (keys, digits)
+    return found
+
+
+@pytest.mark.gate
+@pytest.mark.own_phone
+async def test_all_of_the_page_grows_with_the_browsers_font(grown: Phone, phone: Phone, canned: Canned) -> None:
+    """As at 150 %: in a window that is larger by as much, the same parts stand in the same places."""
+    parts = (
+        "#monitor > .top .chip, .strip, .gauge, .tabs, #monitor > .rail, #monitor > .rail .slide, [data-part=nearest]"
+    )
+    boxes = """(parts) => [...document.querySelectorAll(parts)].filter((one) => one.checkVisibility()).map((one) => {
+      const { left, top, width, height } = one.getBoundingClientRect();
+      return [left, top, width, height];
+    })"""
+    found = []
+    for one, larger in ((phone, 1.0), (grown, LARGER)):
+        await one.page.set_viewport_size({"width": round(412 * larger), "height": round(900 * larger)})
+        page = await opened(one, canned)
+        await one.drawn(3)
+        found.append([[px / larger for px in box] for box in await page.evaluate(boxes, parts)])
+    usual, large_ = found
+    assert len(usual) == 7
+    for one, other in zip(usual, large_, strict=True):
+        assert one == pytest.approx(other, abs=2.5)
+
+
+@pytest.mark.gate
+@pytest.mark.own_phone
+async def test_each_key_is_in_reach_with_a_large_font(grown: Phone, canned: Canned) -> None:
+    await all_is_in_reach(grown, canned, [SIZES[0], SIZES[3]], "home")
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("tab", ["home", "map", "scan", "files", "settings"])
+async def test_each_is_with_a_large_font_in_each_window(grown: Phone, canned: Canned, tab: str) -> None:
+    await all_is_in_reach(grown, canned, SIZES, tab)
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("tab", ["home", "map", "scan", "files", "settings"])
+async def test_each_is_at_150_percent(phone: Phone, canned: Canned, tab: str) -> None:
+    await all_is_in_reach(phone, canned, [(width / LARGER, height / LARGER) for width, height in SIZES], tab)
