@@ -1,7 +1,7 @@
 // One check, or the alarm that it raises: what it found and since when, its last minute against its limit, its thresholds, its alarms in this drive.
 
 import { tilesOf } from './alarm-layout.js';
-import { ICONS, keysOf, silentWords, stateWords } from './alarms-layout.js';
+import { keysOf, silentWords, stateWords } from './alarms-layout.js';
 import { drawMinute } from './check-chart.js';
 import { CheckFeed } from './check-feed.js';
 import { TAGS, episodeWords, figuresOf, placeOf, thresholdWords, totalWords } from './check-layout.js';
@@ -11,6 +11,7 @@ import { dialogWords } from './standing.js';
 import { html, icon, listen, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
 import { openScreen } from '../core/open-screen.js';
+import { ICONS } from '../core/priority.js';
 import { speedUnit, speedWords } from '../core/units.js';
 import { showInTrends } from '../home/drive-choice.js';
 import { colours } from '../home/spark.js';
@@ -132,7 +133,7 @@ class CheckView {
     if (causes.length) {
       setText(parts.alarmTitle, title);
       setWords(parts.state, 'suppressed');
-      setWords(parts.story, `Cause: ${causes.join(', ')}. It is announced if it stands when that is over.`);
+      setWords(parts.story, `Cause: ${causes.join(', ')}. It is announced if it is still active when that ends.`);
     }
     if (!alarm) return;
     setText(parts.alarmTitle, alarm.title);

@@ -1,6 +1,7 @@
 // The chart of a drive: what is in view, how its lines are cut, what stands at the cursor. Pure functions, no DOM.
 
 import { fixed, signed, timeOfDay } from '../core/format.js';
+import { RANK } from '../core/priority.js';
 import { shownIn } from '../core/units.js';
 import { SPECS, specOf } from './trends-layout.js';
 
@@ -8,7 +9,6 @@ import { SPECS, specOf } from './trends-layout.js';
 export const LEAST_S = 10;
 /** Marks that would stand closer are one [px]. */
 const MARK_PX = 16;
-const RANK = { critical: 3, warning: 2, advisory: 1 };
 
 /**
  * @typedef {import('../core/protocol-types.js').DriveTrendsAnswer} Answer

@@ -2,6 +2,7 @@
 
 import { byUrgency, titleOf } from '../alarms/alarm-layout.js';
 import { counted, duration } from '../core/format.js';
+import { RANK } from '../core/priority.js';
 
 export const RATES = /** @type {const} */ ([0.25, 0.5, 1, 2, 4, 8, 16]);
 /** The picture is so high [px]: marks above, the speed, its base, the foot of the thumb. */
@@ -21,7 +22,6 @@ const BEHIND_S = 1;
  * @typedef {{x: number, count: number, priority: import('../core/protocol-types.js').Priority, title: string, at_s: number}} Placed
  */
 
-const RANK = { critical: 3, warning: 2, advisory: 1 };
 
 /** @param {number} at_s @param {number} length_s @param {number} width */
 export function xOf(at_s, length_s, width) {
