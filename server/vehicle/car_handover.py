@@ -79,7 +79,9 @@ class CarHandover:
                 if handover.begin(by, self._authorization.lease, to, now_s):
                     self._since_ms = wall_ms
                     self._authorization.answer(to)
-                    self._log_step("offered", f"{by.name} offers control to {to.name}, who reads back what is in force.", by)
+                    self._log_step(
+                        "offered", f"{by.name} offers control to {to.name}, who reads back what is in force.", by
+                    )
             case handover_commands.ReadBack():
                 handover.read(by, command.line, command.is_read, self.lines(now_s, wall_ms))
             case handover_commands.AcceptControl():

@@ -9,6 +9,7 @@ import { whyUnchecked } from './checks.js';
 import { openShelve } from './shelve.js';
 import { dialogWords } from './standing.js';
 import { html, icon, listen, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
+import { fixed } from '../core/format.js';
 import { write } from '../core/ink.js';
 import { openScreen } from '../core/open-screen.js';
 import { ICONS } from '../core/priority.js';
@@ -172,7 +173,7 @@ class CheckView {
     if (minute === null || !isMeasured) return;
     drawMinute(/** @type {HTMLCanvasElement} */ (canvas), minute, unit, momentOf(this.store) ?? Date.now(), this.palette);
     const known = minute.values.filter((value) => value !== null);
-    setAttribute(canvas, 'aria-label', `Last 60 s: lowest ${Math.min(...known).toFixed(1)}, highest ${Math.max(...known).toFixed(1)} ${unit}`);
+    setAttribute(canvas, 'aria-label', `Last 60 s: lowest ${fixed(Math.min(...known))}, highest ${fixed(Math.max(...known))} ${unit}`);
   }
 
   /** The rows of Settings, in place. */

@@ -62,7 +62,7 @@ export function carRows(seen, needing, isSilent) {
     const ink = lost ? 'stale' : row.speed.ink;
     const value_mps = row.speed.value_mps ?? kept?.speed.value_mps ?? null;
     const percent = (lost ? kept : car.summary)?.energy_percent ?? null;
-    const text = isSilent ? 'not known now' : isNew ? 'No data yet' : isOff ? 'Off on purpose' : lost ? 'No data' : row.worst ? row.text.replace(/, ([\d:.]+ s|acknowledged)(?=$| \+)/, '') : row.icon === 'ok' ? '–' : row.text.replace(/:.*/, '');
+    const text = isSilent ? 'not known now' : isNew ? 'No data yet' : isOff ? 'Off on purpose' : lost ? 'No data' : row.worst ? row.text.replace(/, ([\d:.,]+ s|acknowledged)(?=$| \+)/, '') : row.icon === 'ok' ? '–' : row.text.replace(/:.*/, '');
     const was = kept ? kept.holder : '';
     return {
       key: row.name, name: row.name, cars: [row.name],
