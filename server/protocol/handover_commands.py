@@ -21,7 +21,8 @@ class OfHandover(OfCar):
 
 
 class OfferControl(OfHandover):
-    """Offers control to another page, whose operator reads back what is in force; control stays where it is until then."""
+    """Offers control to another page, whose operator reads back what is in force; until then control stays where it
+    is."""
 
     kind: Literal["offer_control"]
     to: Annotated[PageName, doc("the page that is to get it")]

@@ -15,8 +15,9 @@ POINTED = r"""() => {
     const text = node.data.trim(), at = node.parentElement;
     if (/(?<![\d.])\d+\.\d+(?![\d.])/.test(text) && at.checkVisibility()) found.push(text);
   }
-  const typed = [...document.querySelectorAll('#monitor input:not([type=range])')].filter((one) => one.checkVisibility());
-  return [...found, ...typed.map(({ value }) => value).filter((value) => /\d\.\d/.test(value))];
+  const typed = [...document.querySelectorAll('#monitor input:not([type=range])')]
+    .filter((one) => one.checkVisibility() && /\d\.\d/.test(one.value));
+  return [...found, ...typed.map(({ value }) => value)];
 }"""
 GERMAN = {"locale": "de-DE"}
 
