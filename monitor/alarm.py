@@ -51,6 +51,7 @@ class Transition:
     """One step in the life of an alarm, for the journal and the pages."""
 
     alarm_id: str
+    spec: AlarmSpec  # as declared when it happened
     occurrence: int
     change: Change
     at_s: float
@@ -164,6 +165,7 @@ def transition(
     """That `change` has made of the alarm what it is now."""
     return Transition(
         alarm_id=alarm.id,
+        spec=alarm.spec,
         occurrence=alarm.occurrence,
         change=change,
         at_s=at_s,

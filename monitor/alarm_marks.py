@@ -7,11 +7,8 @@ from dataclasses import dataclass
 
 from monitor.alarm import Transition
 from monitor.alarm_spec import Priority
-from monitor.catalog import CHECKS
-from monitor.runner import IMPAIRED, IMPAIRED_SPEC
 
 MOST_MARKS = 2000
-_SPECS = {check.id: check.alarm for check in CHECKS} | {IMPAIRED: IMPAIRED_SPEC}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,9 +30,9 @@ class AlarmMarks:
 
     def add(self, transition: Transition, at_s: float) -> None:
         """Mark it, if it announces an alarm. Beyond `MOST_MARKS` the oldest of the least urgent goes."""
-        spec = _SPECS.get(transition.alarm_id)
-        if not transition.announces or spec is None:
+        if not transition.announces:
             return
+        spec = transition.spec
         mark = AlarmMark(at_s=at_s, alarm=transition.alarm_id, title=spec.title, priority=spec.priority)
         self._marks.append(mark)
         if len(self._marks) > MOST_MARKS:

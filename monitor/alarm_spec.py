@@ -17,6 +17,14 @@ class Priority(StrEnum):
         return _RANK[self]
 
 
+def priority_of(name: object) -> Priority:
+    """By its name; one that this version does not know is the most urgent."""
+    try:
+        return Priority(str(name))
+    except ValueError:
+        return Priority.CRITICAL
+
+
 _RANK = {Priority.CRITICAL: 0, Priority.WARNING: 1, Priority.ADVISORY: 2}
 
 

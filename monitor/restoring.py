@@ -7,17 +7,21 @@ from dataclasses import replace
 
 from monitor.alarm import Alarm, AlarmState, Cause, Transition
 
+MOST = 400  # alarms: a log of our making names fewer
+
 
 def restore(alarms: Mapping[str, Alarm], transitions: Iterable[Transition]) -> dict[str, Alarm]:
     """The alarms after the transitions, oldest first, with times on the current clock (they may be negative).
 
     The announced state is restored: active, acknowledged and by whom, shelved until when, suppressed by what, causes
     and values of the trip, number of the occurrence. Findings are not: every condition is unknown until it is evaluated
-    again, and unknown clears nothing. Transitions of unknown alarms are ignored.
+    again, and unknown clears nothing. An alarm that is not among `alarms` is added as its transitions declare it.
     """
     restored = dict(alarms)
     for transition in transitions:
         alarm = restored.get(transition.alarm_id)
+        if alarm is None and len(restored) < MOST:
+            alarm = Alarm(id=transition.alarm_id, spec=transition.spec)
         if alarm is not None:
             restored[alarm.id] = _after(alarm, transition)
     return restored

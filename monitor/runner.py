@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import replace
 
 from monitor import response
 from monitor.alarm import Alarm, Refused, Transition
@@ -33,6 +34,7 @@ IMPAIRED_SPEC = AlarmSpec(
 )
 
 ENDED = "Monitoring ended"
+NOT_HERE = unknown("This version of catgraph has no such check", short="no such check")
 
 
 class Monitor:
@@ -85,6 +87,9 @@ class Monitor:
         blind = blind_to_the_car(snapshot)
         for row in self._rows if changed is None else self._immediate(changed):
             transitions += self._judge(row, snapshot, blind)
+        if changed is None and len(self.alarms) > len(self._declared) + 1:
+            for name in self.alarms.keys() - {check.id for check in self._declared} - {IMPAIRED}:
+                transitions += self._advance(name, NOT_HERE, snapshot.now_s, ())
         if self.crashes or (changed is None and (self.failed_parts or not self.alarms[IMPAIRED].is_at_rest)):
             transitions += self._advance(IMPAIRED, self._runner.impaired(self.failed_parts), snapshot.now_s, ())
         return tuple(transitions)
@@ -110,8 +115,12 @@ class Monitor:
         return tuple(transitions)
 
     def restore(self, transitions: Iterable[Transition]) -> None:
-        """Restore the alarms after these transitions, oldest first; see `monitor.restoring`."""
-        self.alarms = restore(self.alarms, transitions)
+        """Restore the alarms after these transitions, oldest first; see `monitor.restoring`. An alarm without a check
+        here, of another version, stays as it was until it is acknowledged."""
+        others = restore(self.alarms, transitions)
+        for name in others.keys() - self.alarms.keys():
+            others[name] = replace(others[name], finding=NOT_HERE, latched=others[name].active)
+        self.alarms = others
 
     def number_on(self, transitions: Iterable[Transition]) -> None:
         """Continue the occurrence numbers of these transitions only; their alarms are over or not yet due."""

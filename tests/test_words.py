@@ -51,6 +51,11 @@ SETTLED = {
     r"\bApart\b": "Distance apart",
     r"\bwith nobody\b": "unassigned",
     r"\b[Hh]and on\b": "hand over",
+    r"\b(?:[Nn]ot|[Nn]ever|[Ll]ast|is|been|was) heard\b": "no data, no contact",
+    r"\bheard (?:of|at)\b": "no data of, has not connected",
+    r"^static\S+log-layout\S+ cleared$|(?i:\} cleared\b|\bor cleared\b|alarm (?:is |was )?cleared)": "ended",
+    r"^static\S+slow-layout\S+ Off$": "Not armed",
+    r"\b[Ww]hat stands\b|\bstands? in the report\b": "what is in force, what is shown",
     r"(?i)\balarms? (?:that )?stands?\b|\bno alarm stands\b|\bstill standing\b": "active",
 }
 JS_TEXT = re.compile(r"'((?:[^'\\\n]|\\.)*)'|`((?:[^`\\]|\\.)*)`")

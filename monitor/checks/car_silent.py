@@ -50,7 +50,7 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
 CHECKS = (
     Check(
         id="car_silent",
-        label="Car heard",
+        label="Car sends data",
         tile="Link",
         order=120,
         checked_when="Checked once the first message has come.",

@@ -8,12 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
-from monitor.alarm import Transition
-from monitor.alarm_spec import Priority
 from server.analysis.alarm_load import Load, load_of
 from server.analysis.episodes import Announcement, Episode
+from server.judge.logged_transition import spec_of, transition_of
 from server.recording.read.read import Recording
 from server.recording.standing import read_standing
 
@@ -61,7 +60,7 @@ def read_recorded_log(recording: Recording) -> RecordedLog | None:
         left_out=max(0, len(entries) - MOST_ENTRIES),
         episodes=_episodes(events, start_s, recording.duration_s),
         load=_load(events, start_s, recording.duration_s),
-        titles={event["alarm"]: str(event.get("title") or event["alarm"]) for event in events if event["alarm"]},
+        titles={event["alarm"]: spec_of(event).title for event in events if event["alarm"]},
         settings=_settings(recording),
         clip_of=recording.metadata.get("clip_of") or None,
         clip_at_s=_clip_at_s(recording),
@@ -82,18 +81,11 @@ def _entry(event: Mapping[str, Any], start_s: float) -> Entry:
         at_s=event["at_ms"] / 1000 - start_s,
         at_ms=event["at_ms"],
         change=event["change"],
-        title=str(event.get("title") or event["alarm"] or ""),
-        priority=_priority(event).value if event["alarm"] else "",
+        title=spec_of(event).title if event["alarm"] else "",
+        priority=spec_of(event).priority if event["alarm"] else "",
         text=str(event.get("text") or ""),
         by=str(event.get("by") or ""),
     )
-
-
-def _priority(event: Mapping[str, Any]) -> Priority:
-    try:
-        return Priority(str(event.get("priority")))
-    except ValueError:
-        return Priority.ADVISORY
 
 
 def _episodes(events: Iterable[Mapping[str, Any]], start_s: float, end_s: float) -> tuple[Episode, ...]:
@@ -130,8 +122,8 @@ def _opened(event: Mapping[str, Any], at_s: float, end_s: float) -> Episode:
     text = str(event.get("text") or "")
     return Episode(
         alarm_id=event["alarm"],
-        title=str(event.get("title") or event["alarm"]),
-        priority=_priority(event),
+        title=spec_of(event).title,
+        priority=spec_of(event).priority,
         raised_s=at_s,
         cleared_s=None,
         until_s=max(at_s, end_s),
@@ -148,18 +140,12 @@ def _shown(episode: Episode, hidden_s: dict[str, float], at_s: float) -> Episode
 
 
 def _load(events: Iterable[Mapping[str, Any]], start_s: float, length_s: float) -> Load:
-    transitions = [
-        Transition(
-            alarm_id=event["alarm"],
-            occurrence=0,
-            change=cast("Any", event["change"]),
-            at_s=event["at_ms"] / 1000 - start_s,
-            text="",
-            announces=bool(event.get("announces", event["change"] in _ANNOUNCES)),
-        )
+    found = (
+        transition_of(event, lambda at_ms: at_ms / 1000 - start_s, lambda until_ms: until_ms / 1000 - start_s)
         for event in events
         if event["alarm"] and event["at_ms"] / 1000 >= start_s
-    ]
+    )
+    transitions = [transition for transition in found if transition is not None]
     return load_of(transitions, length_s, 0)
 
 

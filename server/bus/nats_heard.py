@@ -36,7 +36,7 @@ class Heard:
         if client is None or not client.is_connected:
             return "The broker between the server and the car does not answer."
         if vehicle not in self._heard_s:
-            return f"The agent of {vehicle} was not heard since the server started."
+            return f"The agent of {vehicle} has sent nothing since the server started."
         if self._is_heard(vehicle):
             return None
         if self._now() - max(self._newest_s, self._questions.heard_s) <= SILENT_AFTER_S:
@@ -48,7 +48,7 @@ class Heard:
         if vehicle not in self._heard_s:
             is_expected = vehicle in self._expected
             raise NotServed(
-                f"nothing was heard from {vehicle} yet" if is_expected else f"no vehicle is named {vehicle}"
+                f"nothing was received from {vehicle} yet" if is_expected else f"no vehicle is named {vehicle}"
             )
 
     def check(self, vehicle: str) -> None:

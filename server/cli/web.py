@@ -17,14 +17,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="a car that is listed as lost until its agent is heard; can be repeated",
+        help="a car that is listed as lost until its agent connects; can be repeated",
     )
     parser.add_argument(
         "--forget",
         action="append",
         default=[],
         metavar="NAME",
-        help="a car that was heard once and does not exist any more; can be repeated",
+        help="a car whose agent once connected and that does not exist any more; can be repeated",
     )
     add_common_arguments(parser, has_cars=False)
     logging.add_arguments(parser)

@@ -18,7 +18,7 @@ MOST = 64
 MOST_SHOWN = 12
 
 WORDS: dict[ReaderEnded, str] = {
-    "silent": "not heard",
+    "silent": "no contact",
     "blind": "link slow",
     "hidden": "page in the background",
     "undrawn": "page cannot draw",

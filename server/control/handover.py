@@ -92,7 +92,7 @@ class Handover:
         """Confirm a line, or take that back. Raises Refused."""
         offer = self._asked(by)
         if key not in {line.key for line in lines}:
-            raise NotReadBack("This does not stand any more: look at the list again.")
+            raise NotReadBack("This no longer applies: look at the list again.")
         self.offer = replace(offer, read=offer.read | {key} if is_read else offer.read - {key})
 
     def unread(self, lines: Sequence[Line]) -> list[Line]:
@@ -108,7 +108,7 @@ class Handover:
             many = "One line is" if len(left) == 1 else f"{len(left)} lines are"
             raise NotReadBack(f"{many} not read back yet: {left[0].title}.")
         if version != version_of(lines):
-            raise NotReadBack("What stands has changed meanwhile: look at the list again.")
+            raise NotReadBack("The list has changed meanwhile: look at it again.")
         self.offer = None
         return offer
 

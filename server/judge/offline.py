@@ -114,7 +114,7 @@ class OfflineRun:
             trends=Trends(from_s),
             opened_s=from_s,
             at_s=from_s,
-            recorded_alarms=Monitor(limits=limits).alarms,
+            recorded_alarms={},
             reception=Reception(units=UnitWatch(deepcopy(self.drive.unit_evidence))),
             frames=deepcopy(self.drive.frames) if self.drive.moving_transforms else None,
         )

@@ -127,7 +127,7 @@ class CarSummary(TypedDict):
 
 
 class OffOnPurpose(TypedDict):
-    """A person said that a car is off; it holds until the car's agent is heard again."""
+    """A person said that a car is off; it holds until the car's agent sends data again."""
 
     by: str
     since_ms: int

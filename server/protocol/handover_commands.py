@@ -21,14 +21,15 @@ class OfHandover(OfCar):
 
 
 class OfferControl(OfHandover):
-    """Offers control to another page, whose operator reads back what stands; control stays where it is until then."""
+    """Offers control to another page, whose operator reads back what is in force; until then control stays where it
+    is."""
 
     kind: Literal["offer_control"]
     to: Annotated[PageName, doc("the page that is to get it")]
 
 
 class ReadBack(OfHandover):
-    """Confirms one line of what stands; only by who takes over."""
+    """Confirms one line of what is in force; only by who takes over."""
 
     kind: Literal["read_back"]
     line: Annotated[LineKey, doc("its key, as the state names it")]

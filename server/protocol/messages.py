@@ -114,7 +114,7 @@ class Answer(TypedDict):
     conflict: NotRequired[Annotated[bool, doc("the settings changed meanwhile")]]
     version: NotRequired[Annotated[int, doc("of the settings, once changed")]]
     fence: NotRequired[Annotated[int, doc("number of the lease that the page has")]]
-    handover: NotRequired[Annotated[HandoverState | None, doc("what stands now, where a read-back was refused")]]
+    handover: NotRequired[Annotated[HandoverState | None, doc("what is in force now, where a read-back was refused")]]
     handed_over: NotRequired[Annotated[HandedOver, doc("not sent to pages")]]
     held_by: NotRequired[Annotated[str | None, doc("who is in control instead")]]
 

@@ -75,7 +75,7 @@ class PagePresence(TypedDict):
     can: Annotated[bool, doc("an alarm would be audible on it now")]
     why: Annotated[
         ReaderEnded | None,
-        doc("silent: not heard for 3 s; blind: it receives nothing for 2 s; undrawn: its drawing failed"),
+        doc("silent: no contact for 3 s; blind: it receives nothing for 2 s; undrawn: its drawing failed"),
     ]
     why_text: str | None
     here: Annotated[bool, doc("it is seen now, so that control can be handed to it")]

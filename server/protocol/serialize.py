@@ -12,7 +12,6 @@ import numpy as np
 
 from monitor import values
 from monitor.alarm import Alarm, Transition
-from monitor.alarm_spec import AlarmSpec
 from monitor.check import Finding, Quantity, Verdict
 from monitor.load import AlarmLoad
 from monitor.mounting import Mounting, within_half_turn
@@ -249,7 +248,8 @@ def suppressed(alarm: Alarm, alarms: Mapping[str, Alarm], now_s: float, wall_ms:
 
 def explained_by(alarm: Alarm, alarms: Mapping[str, Alarm]) -> list[str]:
     """Titles of what explains the alarm away now."""
-    return [alarms[name].spec.title if name in alarms else "Monitoring is paused" for name in alarm.suppressed_by]
+    titles = {name: one.spec.title for name, one in alarms.items()} | {"paused": "Monitoring is paused"}
+    return [titles.get(name, name) for name in alarm.suppressed_by]
 
 
 def quantity(of: Quantity | None) -> QuantityState | None:
@@ -273,7 +273,7 @@ def _worst(finding: Finding | None) -> Worst | None:
 
 def load(load: AlarmLoad, alarms: Mapping[str, Alarm]) -> LoadState:
     """What the alarms ask of the operator now."""
-    titles = [alarms[name].spec.title for name in load.chattering if name in alarms]
+    titles = [alarms[name].spec.title if name in alarms else name for name in load.chattering]
     return {"in_10_min": load.in_10_min, "flood": load.is_flood, "bearable": load.is_bearable, "chattering": titles}
 
 
@@ -296,12 +296,12 @@ def trends(piece: Piece) -> Trends:
     }
 
 
-def event(transition: Transition, spec: AlarmSpec, at_ms: int, *, now_s: float, settings_version: int) -> NewEvent:
+def event(transition: Transition, at_ms: int, *, now_s: float, settings_version: int) -> NewEvent:
     """A transition as the log keeps it and the pages get it, at `at_ms`, which is `now_s`; the log adds its number.
 
     With it alone a restart knows where the alarm stands (`server.vehicle.restore`).
     """
-    finding = transition.finding
+    finding, spec = transition.finding, transition.spec
     until_s = transition.shelved_until_s
     return {
         "at_ms": at_ms,

@@ -81,9 +81,9 @@ class ConnectionProblem(TypedDict):
 
 class LinkState(TypedDict):
     cut: Annotated[Cut | None, doc("which part of the chain is broken; null: none")]
-    since_ms: Annotated[int | None, doc("when what is beyond the cut was last heard")]
-    bridge_age_s: Annotated[float | None, doc("since the bridge was last heard; null: never")]
-    car_age_s: Annotated[float | None, doc("since the car was last heard; null: never")]
+    since_ms: Annotated[int | None, doc("when the last data came from beyond the cut")]
+    bridge_age_s: Annotated[float | None, doc("since the last data of the bridge; null: none")]
+    car_age_s: Annotated[float | None, doc("since the last data of the car; null: none")]
     problem: Annotated[
         ConnectionProblem | None,
         doc("may be there while cut is null: a part behind the bridge failed, and messages still come"),

@@ -285,10 +285,9 @@ def _check(run: OfflineRun, index: Index, name: str) -> Mapping[str, Any]:
     answer = check_answer(monitor, name, now_s, run.run_state.minute)
     if name not in monitor.alarms:
         return dict(answer)
-    history = index.history(name, now_s)
-    spec, start_s = monitor.alarms[name].spec, run.drive.start_s
+    history, start_s = index.history(name, now_s), run.drive.start_s
     events = [
-        serialize.event(one, spec, round((start_s + one.at_s) * 1000), now_s=one.at_s, settings_version=0)
+        serialize.event(one, round((start_s + one.at_s) * 1000), now_s=one.at_s, settings_version=0)
         for one in history or ()
     ]
     numbered = [{**event, "n": n} for n, event in enumerate(events, 1)]

@@ -74,6 +74,7 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
     link["topics_subscribed"] = len(epoch.published)
     if run.drive.recorded.has_alarms:
         shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms) for alarm in _recorded_standing(run_state)]
+        shown["alarm_load"] = serialize.load(facts.load, run_state.recorded_alarms)
     return shown
 
 

@@ -11,9 +11,7 @@ from collections.abc import Callable, Sequence
 
 from monitor.alarm import Transition
 from monitor.alarm_marks import AlarmMarks
-from monitor.catalog import CHECKS
 from monitor.drive_trends import DriveTrends
-from monitor.runner import IMPAIRED, IMPAIRED_SPEC
 from monitor.state import State
 from server.judge.drive import Drive
 from server.judge.offline import Observer, OfflineRun
@@ -56,7 +54,6 @@ class Index(Observer):
         self._set_limits()
         self.is_done = False
         self.broke_off: str | None = None  # why the recording could not be read to its end
-        self._specs = {check.id: check.alarm for check in CHECKS} | {IMPAIRED: IMPAIRED_SPEC}
         if drive.recorded.has_alarms:
             for at_s, event in drive.recorded.events:
                 if isinstance(event, Transition):
@@ -136,11 +133,11 @@ class Index(Observer):
     def _mark(self, transition: Transition, at_s: float) -> None:
         self.alarm_marks.add(transition, at_s)
         self._history.add(transition, at_s)
-        spec = self._specs.get(transition.alarm_id)
+        spec = transition.spec
         if transition.change == "cleared":
             for ended in self._active.pop(transition.alarm_id, ()):
                 ended["duration_s"] = round(max(0.0, at_s - ended["at_s"]), 1)
-        if not transition.announces or spec is None:
+        if not transition.announces:
             return
         if len(self._marks) >= 10 * MOST_MARKS:
             self._lost_marks += 1

@@ -79,7 +79,9 @@ class CarHandover:
                 if handover.begin(by, self._authorization.lease, to, now_s):
                     self._since_ms = wall_ms
                     self._authorization.answer(to)
-                    self._log_step("offered", f"{by.name} offers control to {to.name}, who reads back what stands.", by)
+                    self._log_step(
+                        "offered", f"{by.name} offers control to {to.name}, who reads back what is in force.", by
+                    )
             case handover_commands.ReadBack():
                 handover.read(by, command.line, command.is_read, self.lines(now_s, wall_ms))
             case handover_commands.AcceptControl():
@@ -101,7 +103,7 @@ class CarHandover:
         offer = self._handover.accept(by, version, lines)
         self._authorization.hand_over(offer.by, offer.fence, offer.to, now_s)
         titles = "; ".join(line.title for line in lines)
-        self._log_step("accepted", f"{by.name} read back what stands: {titles}.", by)
+        self._log_step("accepted", f"{by.name} read back what is in force: {titles}.", by)
         return offer.by
 
     def refusal(self, why: NotReadBack, now_s: float, wall_ms: int) -> Answer:

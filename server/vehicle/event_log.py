@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from typing_extensions import Unpack
 
-from monitor.alarm import Alarm, Transition
+from monitor.alarm import Transition
 from server.bus.bus import SessionBus
 from server.control.acting import acting
 from server.judge.active_settings import ActiveSettings
@@ -65,15 +65,10 @@ class EventLog:
         if self._waiting:
             self._write([])
 
-    def log_transitions(self, transitions: Collection[Transition], alarms: Mapping[str, Alarm], now_s: float) -> None:
+    def log_transitions(self, transitions: Collection[Transition], now_s: float) -> None:
         """What happened to alarms, at `now_s` of the monitor's clock."""
         at_ms = self._wall_ms()
-        self._write(
-            [
-                serialize.event(t, alarms[t.alarm_id].spec, at_ms, now_s=now_s, settings_version=self._version)
-                for t in transitions
-            ]
-        )
+        self._write([serialize.event(one, at_ms, now_s=now_s, settings_version=self._version) for one in transitions])
 
     def note(self, change: str, text: str, *, by: str | None = None, **more: Unpack[EventDetails]) -> None:
         """Something of no alarm."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from monitor.alarm import Alarm, AlarmState, Transition
+from monitor.alarm import AlarmState, Transition
 from monitor.load import KEPT, WINDOW_S
 from monitor.response import SHELVE_AT_MOST_MIN
 from server.bus.bus import SessionBus
@@ -38,9 +38,9 @@ class RestoredState:
         newest = {transition.alarm_id: transition for transition in self.transitions}
         return {name: last for name, last in newest.items() if last.state is not AlarmState.NORMAL}
 
-    def words(self, alarms: Mapping[str, Alarm]) -> str:
+    def words(self) -> str:
         """The log text after a restart."""
-        titles = [alarms[name].spec.title for name in self.standing if name in alarms]
+        titles = [last.spec.title for last in self.standing.values()]
         stood = f" Active alarms: {', '.join(titles)}." if titles else " No alarm was active."
         paused = " Monitoring was paused." if self.paused_s is not None else ""
         car = f" They come back when {self.address} is monitored again." if titles and self.address else ""

@@ -189,7 +189,7 @@ class Session:
         return facts.live_state(shown, self._parts.departure.state(), server, self._tick.lag_s)
 
     def alarms_changed(self, transitions: Collection[Transition]) -> None:
-        self._parts.event_log.log_transitions(transitions, self._parts.judgement.monitor.alarms, self._now())
+        self._parts.event_log.log_transitions(transitions, self._now())
         self._parts.publisher.put_soon()
         self._tick.alarms_changed(self._now())
 

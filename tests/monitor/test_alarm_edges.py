@@ -98,6 +98,7 @@ def test_a_transition_says_all_of_the_alarm() -> None:
     alarm = replace(alarm, shelved_until_s=60.0)
     assert transition(alarm, "recaused", 7.0) == Transition(
         alarm_id="hot",
+        spec=alarm.spec,
         occurrence=1,
         change="recaused",
         at_s=7.0,

@@ -6,11 +6,13 @@ import pytest
 
 from monitor.alarm import Change, Transition
 from monitor.load import KEPT, RecentLoad, most_within
+from tests.monitor.test_alarm import SPEC
 
 
 def change_of(at_s: float, change: Change = "raised", name: str = "a", announces: bool = True) -> Transition:
     return Transition(
         alarm_id=name,
+        spec=SPEC,
         occurrence=1,
         change=change,
         at_s=at_s,

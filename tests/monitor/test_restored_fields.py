@@ -16,7 +16,7 @@ FIRST, SECOND = fault("first"), fault("second")
 
 def transition(change: Change, at_s: float, state: AlarmState = AlarmState.UNACKED, **more: Any) -> Transition:
     fields = {"occurrence": 1, "text": ""} | more
-    return Transition(alarm_id="hot", change=change, at_s=at_s, state=state, **fields)
+    return Transition(alarm_id="hot", spec=SPEC, change=change, at_s=at_s, state=state, **fields)
 
 
 RAISED = transition("raised", 1.0, finding=FIRST, causes=("a",))

@@ -13,8 +13,8 @@ from monitor.alarm_life import advance, end
 from monitor.alarm_spec import AlarmSpec
 from monitor.check import OK, Finding, Quantity, fault, unknown
 from monitor.response import acknowledge, shelve
-from monitor.restoring import numbered_on, restore
-from monitor.runner import Monitor
+from monitor.restoring import MOST, numbered_on, restore
+from monitor.runner import NOT_HERE, Monitor
 from tests.monitor.test_alarm import SPEC
 from tests.monitor.test_alarm_properties import DAY, SPECS, Judge, Tap, happen
 from tests.monitor.test_runner import BAD, Script, at, check
@@ -229,3 +229,33 @@ def test_an_inhibitor_that_stood_explains_nothing_until_it_is_seen_again() -> No
     second.restore(transitions)
     assert [t.alarm_id for t in second.step(at(1.0))] == ["effect"]
     assert second.alarms["cause"].active
+
+
+def test_an_alarm_of_another_version_stands_until_it_is_acknowledged() -> None:
+    """Its check does not exist here: nothing else can end it, and it never looks checked."""
+    _, transitions = lived(TRIP)
+    monitor = Monitor([check("cold", Script())])
+    monitor.restore(transitions)
+    monitor.step(at(1.0))
+    [alarm] = monitor.standing()
+    assert (alarm.id, alarm.state, alarm.trip) == ("hot", AlarmState.UNACKED, TRIP)
+    assert alarm.finding == NOT_HERE
+    monitor.acknowledge("hot", alarm.occurrence, "Ann", 2.0)
+    assert monitor.standing() == []
+
+
+def test_a_shelved_alarm_of_another_version_comes_back() -> None:
+    alarm, transitions = lived(TRIP)
+    _, shelved = shelve(alarm, alarm.occurrence, 5.0, "Ann", 1.0, is_inhibitor=False)
+    monitor = Monitor([check("cold", Script())])
+    monitor.restore([*transitions, *shelved])
+    monitor.step(at(200.0))
+    assert monitor.alarms["hot"].state is AlarmState.SHELVED
+    found = monitor.step(at(400.0))
+    assert [(one.change, one.announces) for one in found] == [("unshelved", True)]
+    assert [one.change for one in monitor.end(401.0)] == ["cleared"]
+
+
+def test_a_log_of_any_size_restores_a_bounded_number() -> None:
+    [raised] = lived(TRIP)[1]
+    assert len(restore({}, (replace(raised, alarm_id=f"a{n}") for n in range(2 * MOST)))) == MOST

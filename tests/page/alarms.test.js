@@ -179,7 +179,7 @@ test('tiles: paused means not checked, but for faults the server finds all the s
 
 test('the log tells what happened', () => {
   const event = /** @type {any} */ ({ n: 1, at_ms: 0, alarm: 'speed_limit', change: 'cleared', title: 'Speed above limit', priority: 'critical', text: 'back under', by: null });
-  assert.deepEqual(eventWords(event), { icon: 'ok', kind: '', title: 'Speed above limit cleared', text: 'back under' });
+  assert.deepEqual(eventWords(event), { icon: 'ok', kind: '', title: 'Speed above limit ended', text: 'back under' });
   assert.equal(eventWords({ ...event, change: 'raised' }).icon, 'crit');
   assert.equal(eventWords({ ...event, alarm: null, change: 'lost', text: 'The bridge closed the connection.' }).title, 'The bridge closed the connection.');
   assert.equal(eventWords({ ...event, change: 'something_new' }).title, 'Speed above limit something_new');

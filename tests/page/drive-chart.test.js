@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { brushPath, clockWords, csvOf, extentOf, foundAt, foundWords, limitAt, lineOf, placedMarks, roundEnds, specFor, valueTicks, viewAfter, within } from '../../static/js/home/drive-layout.js';
+import { brushPath, clockWords, csvOf, extentOf, foundAt, foundWords, limitAt, lineOf, placedMarks, roundEnds, specFor, tagAt, valueTicks, viewAfter, within } from '../../static/js/home/drive-layout.js';
 import { DriveView, emptyWords, stateWords } from '../../static/js/home/drive-view.js';
 import { withFirst } from '../../static/js/home/drive-choice.js';
 
@@ -154,4 +154,13 @@ test('an empty chart says what would fill it', () => {
   assert.equal(emptyWords(of(false), true), 'The recording holds no S0. Choose another signal.');
   assert.equal(emptyWords(of(false, true), false), '');
   assert.equal(emptyWords(of(), false), '');
+});
+
+test('the tag of the cursor stands beside it where it would cover the mark of an alarm', () => {
+  const sizes = { left: 10, right: 410, width: 84, mark: 24 };
+  assert.equal(tagAt(200, [], sizes), 158);
+  assert.equal(tagAt(200, [120], sizes), 158, 'a mark far away');
+  assert.equal(tagAt(200, [200], sizes), 212, 'at the right of the mark beneath the cursor');
+  assert.equal(tagAt(200, [200, 240], sizes), 104, 'else at its left');
+  assert.equal(tagAt(400, [400], sizes), 304, 'inside of the chart');
 });

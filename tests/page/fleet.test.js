@@ -36,7 +36,7 @@ test('who was not taken in time comes first, then the least time left, then what
   assert.equal(said['mine'], 'assigned to you | no timer | Open,Hand over,Release');
   assert.equal(said['asked'], 'Desk 2 asks you to take over | asked for 0:00 | Accept,Decline');
   assert.equal(said['acked'], 'assigned to Desk 2, acknowledged | no timer | Take over');
-  assert.equal(order.find(({ name }) => name === 'gone')?.title, 'Not heard: car may be moving');
+  assert.equal(order.find(({ name }) => name === 'gone')?.title, 'No data: car may be moving');
   assert.equal(headOf(order, order.length), '8 · 4 unassigned');
 });
 
@@ -78,11 +78,11 @@ test('an offer of mine can be withdrawn, and a car whose agent states no item is
   assert.deepEqual(itemsOf(seen({ a: summary({ attention: undefined }) })), []);
 });
 
-test('a car that was never heard is listed, and asks for nobody', () => {
+test('a car that never sent data is listed, and asks for nobody', () => {
   const all = seen({ a: undefined, b: summary() });
   assert.deepEqual(itemsOf(all), []);
   const rows = carRows(all, [], false);
-  assert.deepEqual(rows.map(({ name, text, kind, icon, isAsking }) => [name, text, kind, icon, isAsking]), [['a', 'Never heard', '', 'unknown', false], ['b', '–', '', 'ok', false]]);
+  assert.deepEqual(rows.map(({ name, text, kind, icon, isAsking }) => [name, text, kind, icon, isAsking]), [['a', 'No data yet', '', 'unknown', false], ['b', '–', '', 'ok', false]]);
   assert.equal(lineOf([], [], 0, rows).end, '1 of 2 not monitored');
 });
 
@@ -142,7 +142,7 @@ test('a row says what is known, and nothing of before as if it were now', () => 
   const standing = summary({ speed: { value_mps: 0.02, freshness: 'fresh', age_s: 0.1, horizon_s: 1 } });
   assert.equal(carRows(seen({ a: standing }), [], false)[0]?.mode, 'standing');
   const late = carRows(seen({ a: summary({ holder: 'Ann' }) }, { lag_s: 3.2 }), [], false)[0];
-  assert.deepEqual([late?.text, late?.mode, late?.speed.ink, late?.operator, late?.isLost, late?.energy.ink], ['Not heard', 'unknown', 'stale', 'Ann?', true, 'stale']);
+  assert.deepEqual([late?.text, late?.mode, late?.speed.ink, late?.operator, late?.isLost, late?.energy.ink], ['No data', 'unknown', 'stale', 'Ann?', true, 'stale']);
   assert.deepEqual(carRows(seen({ b: summary(), a: needy() }), [], true).map(({ name, text, mode }) => `${name} ${text} ${mode}`), ['a not known now unknown', 'b not known now unknown']);
   assert.equal(carRows(seen({ a: needy({}, { state: 'ACKED' }) }), ['a'], false)[0]?.text, 'Speed above limit');
 });
@@ -164,7 +164,7 @@ test('each car has one place in the grid, named by its number where that tells i
   assert.deepEqual(labelsOf(['C01', 'C02']), ['01', '02']);
   assert.deepEqual(labelsOf(['Ocelot', 'C02']), ['Ocelot', 'C02']);
   const rows = carRows(seen({ b: null, a: needy(), c: summary() }), ['a', 'b'], false);
-  assert.deepEqual(placesOf(rows).map(({ name, kind, says }) => `${name} ${kind} ${says}`), ['a crit a, Speed above limit', 'b lost b, not heard', 'c  c, driving']);
+  assert.deepEqual(placesOf(rows).map(({ name, kind, says }) => `${name} ${kind} ${says}`), ['a crit a, Speed above limit', 'b lost b, no data', 'c  c, driving']);
 });
 
 test('a range names a row of numbers, else the first few', () => {

@@ -164,8 +164,8 @@ test('the sheet: what would be commanded, who competes, and the one thing this p
 });
 
 test('its row on the connect screen', () => {
-  assert.equal(connectRow(slow('armed'), false).tag, 'Off');
-  assert.deepEqual([connectRow(slow('armed'), true).tag, connectRow(slow('not_armed'), true).tag, connectRow(ordered(), true).tag], ['Armed', 'Off', 'Slowing']);
+  assert.equal(connectRow(slow('armed'), false).tag, 'Not armed');
+  assert.deepEqual([connectRow(slow('armed'), true).tag, connectRow(slow('not_armed'), true).tag, connectRow(ordered(), true).tag], ['Armed', 'Not armed', 'Slowing']);
   assert.deepEqual(connectRow(slow('not_available', { why: 'No link to the car.' }), true), { tag: 'Not available', kind: 'unk', cost: 'No link to the car' });
 });
 

@@ -262,3 +262,27 @@ async def test_a_quiet_list_says_what_was_lately_and_makes_way_for_what_waits(ph
     await expect(lately).to_be_visible()
     canned.silent = True
     await expect(lately).to_be_hidden()
+
+
+@pytest.mark.gate
+async def test_an_alarm_of_another_version_is_a_dialog_with_its_words(phone: Phone, canned: Canned) -> None:
+    """As an agent with a newer version sends it: with an id, a priority, a place and a sound that no page knows."""
+    about = {"text": "rear left", "trip_text": "rear left"}
+    canned.state["alarms"] = [
+        alarm("wheel_lost", "Wheel lost", priority="extreme", place="ceiling", sound="siren", **about)
+    ]
+    await phone.open(canned.address)
+    await phone.live()
+    sheet = phone.page.locator("#sheet-alarm")
+    await expect(sheet).to_have_attribute("data-priority", "critical")
+    await expect(sheet).to_contain_text("Wheel lost")
+    await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "asking")
+    await expect(phone.f("strip")).to_contain_text("Wheel lost")
+    await phone.f("acknowledge", "#sheet-alarm").tap()
+    assert await heard(canned, 1) == ["wheel_lost"]
+    canned.state["alarms"][0] |= {"state": "ACKED", "place": "list"}
+    await expect(sheet).to_be_hidden()
+    await phone.f("strip").tap()
+    row = phone.page.locator("[data-f=alarms] li", has_text="Wheel lost")
+    await expect(row).to_have_attribute("data-priority", "critical")
+    await expect(row).to_contain_text("rear left")

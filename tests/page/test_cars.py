@@ -187,7 +187,7 @@ async def test_another_car_is_shown_without_a_reload_and_nothing_of_the_first(br
         assert answer is not None
         if IS_PARTED:  # its agent may come: until then the page says that it was not heard
             assert answer.status == 200
-            await expect(page.locator("#monitor")).to_contain_text("The agent of Jaguar was not heard")
+            await expect(page.locator("#monitor")).to_contain_text("The agent of Jaguar has sent nothing")
             return
         assert answer.status == 404
         await expect(page.locator("h1")).to_have_text("No car is named Jaguar")

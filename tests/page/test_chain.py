@@ -318,7 +318,7 @@ async def test_a_radio_gap_hides_old_values_and_its_events_come_exactly_once(pho
             await asyncio.sleep(9)
             radio.mend()
             note = phone.page.locator(".snack.note")
-            await expect(note).to_contain_text(re.compile(r"Blind \d+ s: 1 alarm raised, 0 cleared"))
+            await expect(note).to_contain_text(re.compile(r"No data for \d+ s; 1 alarm began, 0 ended"))
             await expect(phone.page.locator("#sheet-alarm")).to_contain_text("Speed above limit")
             await phone.page.locator("#sheet-alarm [data-f=acknowledge]").tap()
             await phone.f("strip").tap()

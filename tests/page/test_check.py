@@ -138,5 +138,5 @@ async def test_a_suppressed_alarm_opens_with_its_cause(phone: Phone, checked: Ca
     await phone.page.locator("[data-f=alarms] li [data-f=open]").press("Enter")
     story = phone.f("check-alarm")
     await expect(story).to_contain_text("GPS jumps suppressed")
-    await expect(story).to_contain_text("Cause: Connection lost. It is announced if it stands when that is over.")
+    await expect(story).to_contain_text("Cause: Connection lost. It is announced if it is still active when that ends.")
     await expect(story.locator("button")).to_have_count(0)

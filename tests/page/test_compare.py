@@ -91,6 +91,12 @@ async def test_a_second_recording_is_shown_beside_the_replay(browser: Browser, a
     await page.keyboard.press("}")
     await page.keyboard.press("]")
     await expect(state).to_have_text("B begins 1.1 s after A")
+    await page.keyboard.press("{")
+    await page.keyboard.press("[")
+    await expect(state).to_have_text("B begins with A")
+    await page.keyboard.press("}")
+    await page.keyboard.press("]")
+    await expect(state).to_have_text("B begins 1.1 s after A")
 
     await page.keyboard.press("End")
     await expect(cards.nth(1).locator(".missing")).to_have_text(re.compile(r"Ended 0:0[45]\.\d earlier"))

@@ -110,7 +110,7 @@ async def is_old_without_answers(walk: Walk) -> None:
     value, state = walk.item("brake").locator(".v"), walk.screen.locator(".state")
     await expect(value).not_to_have_text("–")
     await walk.page.route(ASKED, lambda route: route.abort("connectionrefused"))
-    await expect(state).to_contain_text("What stands here is old.")
+    await expect(state).to_contain_text("What is shown here is old.")
     await expect(value).to_have_text("–")
     await walk.page.unroute(ASKED)
     await expect(state).to_be_hidden()

@@ -76,7 +76,7 @@ async def test_a_node_answers_for_the_cars_of_agents(tmp_path: Path) -> None:
             assert (await room.get(kept)).status_code == 422, "whose is not said"
             assert (await room.get(f"/agents/ocelot{kept}")).status_code == 200, kept
             lost = await room.get(f"/agents/margay{kept}")
-            assert (lost.status_code, "margay was not heard" in lost.json()["detail"]) == (503, True), kept
+            assert (lost.status_code, "margay has sent nothing" in lost.json()["detail"]) == (503, True), kept
         assert (await room.post("/api/slow-down/arm")).status_code == 422, "the car is named, however many were heard"
 
         # An order goes through, and what it causes is in the log of the agent and of the node alike.
@@ -157,7 +157,7 @@ async def test_the_page_of_a_node_names_what_is_lost(phone: Phone, tmp_path: Pat
         # A car that was never heard is no blank page, and another one can be chosen on it.
         await phone.open(f"{one.node.address}/?vehicle=margay")
         start = page.locator("#start")
-        await expect(start).to_contain_text("The agent of margay was not heard", timeout=SOON_S * 1000)
+        await expect(start).to_contain_text("The agent of margay has sent nothing", timeout=SOON_S * 1000)
         await start.locator("[data-f=who]").click()
         await page.locator("dialog[open]").get_by_role("button", name="ocelot").first.click()
         await phone.live()

@@ -200,14 +200,14 @@ async def test_one_silent_car_is_lost_and_the_others_are_not(phone: Phone, canne
     cars = fleet.three()
     page = await opened(phone, canned, cars)
     cars[3] |= {"summary": None, "age_s": 41.0, "trouble": "The agent of Kodkod is silent."}
-    await expect(item(page, "Kodkod")).to_contain_text("Not heard: car may be moving")
+    await expect(item(page, "Kodkod")).to_contain_text("No data: car may be moving")
     await expect(item(page, "Kodkod")).to_contain_text("The agent of Kodkod is silent.")
     keys = item(page, "Kodkod").locator(".key:visible")
     await expect(keys).to_have_text(["Open", "Silence", "It is off"])
     await keys.nth(1).tap()
     await expect(keys).to_have_text(["Open", "It is off"])
     canned.cars = [one | {"summary": None, "age_s": 9.0} for one in cars]
-    await expect(phone.f("lost-title", "#fleet")).to_have_text("No car is heard")
+    await expect(phone.f("lost-title", "#fleet")).to_have_text("No data from any car")
     canned.cars = []
     await expect(phone.f("none", "#fleet")).to_contain_text("--vehicle NAME")
     await expect(phone.f("strip-text", "#fleet")).to_have_text("No car is listed yet")

@@ -323,6 +323,27 @@ async def test_files_of_a_desktop_show_the_chosen_recording_beside_the_list(phon
     await expect(page.locator(".file-sheet:modal")).to_contain_text("1.8 km")
 
 
+@pytest.mark.gate
+async def test_advisories_are_in_no_column_of_warnings(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    await phone.open(f"{canned.address}/#files")
+    await phone.live()
+    counts = page.locator("#panel-files .list .file", has_text="advisories").locator(".counts").first
+    await expect(counts.locator("[data-priority=advisory]")).to_have_text("3 advisories")
+    ends = {
+        name: await counts.locator(f"[data-priority={name}]").bounding_box()
+        for name in ("critical", "warning", "advisory")
+    }
+    critical_box, warning_box, advisory_box = (ends[name] for name in ends)
+    assert critical_box
+    assert warning_box
+    assert advisory_box
+    assert advisory_box["y"] >= warning_box["y"] + warning_box["height"] - 1
+    assert advisory_box["x"] < warning_box["x"]
+    assert critical_box["y"] + critical_box["height"] <= advisory_box["y"] + 1
+
+
 @pytest.mark.parametrize(("width", "height"), [(820, 1180), (1440, 900)])
 async def test_nothing_scrolls_the_speed_out_of_sight(phone: Phone, canned: Canned, width: int, height: int) -> None:
     """Neither a script nor a find in the page: only panels scroll."""

@@ -25,6 +25,7 @@ from monitor.drive_trends import DriveTrends
 from monitor.signals import CHARTED
 from monitor.state import State
 from server.judge.drive import Drive
+from server.judge.logged_transition import spec_of
 from server.judge.offline import Observer, OfflineRun
 from server.judge.speed_trace import SpeedTrace
 from server.protocol.drive_trends import DriveFacts, DriveTrendsAnswer, Wanted, answer
@@ -41,7 +42,7 @@ from server.recording.mcap.chain import read_head
 from server.recording.read.errors import NoRoom
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
 
-VERSION = 10  # of what is found: with another one, files are read again
+VERSION = 11  # of what is found: with another one, files are read again
 PRIORITIES = ("critical", "warning", "advisory")
 MAX_RAISED = 200  # alarms listed one by one; all are counted
 MAX_SENTENCES = 10
@@ -194,8 +195,9 @@ def _raised(recording: Recording) -> tuple[list[tuple[float, dict[str, Any]]], b
     found = []
     for at_s, event in recording.own(_ALARMS):
         has_log = True
-        if event.get("change") == "raised" and event.get("priority") in PRIORITIES:
-            found.append((at_s, event))
+        if event.get("change") == "raised" and event.get("alarm"):
+            spec = spec_of(event)
+            found.append((at_s, {**event, "title": spec.title, "priority": spec.priority}))
     return sorted(found, key=lambda one: one[0]), has_log
 
 

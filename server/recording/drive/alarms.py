@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
+from server.judge.logged_transition import spec_of
 from server.recording.drive.components import component_of
 from server.recording.drive.drive_events import Event, text_of
 
 MOST_ALARMS = 5000
-PRIORITIES = ("critical", "warning", "advisory")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,12 +73,12 @@ def by_component(alarms: Sequence[AlarmInDrive]) -> dict[str, int]:
 
 
 def _raised(alarm: str, event: Event) -> AlarmInDrive:
-    priority, causes = event.get("priority"), event.get("causes")
+    causes, spec = event.get("causes"), spec_of(event)
     named = [text for text in causes[:10] if isinstance(text, str)] if isinstance(causes, list) else []
     return AlarmInDrive(
         alarm=alarm[:120],
-        title=text_of(event, "title", 120) or alarm[:120],
-        priority=str(priority) if priority in PRIORITIES else "advisory",
+        title=text_of(event, "title", 120) or spec.title,
+        priority=spec.priority,
         text=text_of(event, "text", 300),
         component=component_of(alarm, named),
         raised_ms=event["at_ms"],

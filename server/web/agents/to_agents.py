@@ -76,7 +76,7 @@ def _meant(scope: Scope) -> str | None:
 def _refusal(name: str | None, vehicles: tuple[str, ...]) -> ASGIApp | None:
     """Why no agent can be asked; None: one can."""
     if not vehicles:
-        return problem(503, "No vehicle has been heard at the broker yet.")
+        return problem(503, "No vehicle has connected to the broker yet.")
     if name is None and len(vehicles) > 1:
         named = ", ".join(vehicles[:20])
         return problem(422, f"Each car's agent keeps its own: ask at /agents/NAME/api/…, for one of {named}.")

@@ -12,7 +12,7 @@ import orjson
 from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import Response, StreamingResponse
 
-from monitor.alarm_spec import Priority
+from monitor.alarm_spec import Priority, priority_of
 from server.bus.bus import PageBus
 from server.bus.event_table import COLUMNS, event_row
 from server.protocol.alarm_state import LogEvent
@@ -46,7 +46,7 @@ class Which:
         return (
             (self.alarm is None or (event.get("alarm") or "") == self.alarm)
             and (self.change is None or event["change"] == self.change)
-            and (self.priority is None or event.get("priority") == self.priority)
+            and (self.priority is None or _priority(event) == self.priority)
             and (self.text is None or self.text.casefold() in _words_of(event))
             and (self.since_ms is None or event["at_ms"] >= self.since_ms)
             and (self.until_ms is None or event["at_ms"] < self.until_ms)
@@ -66,6 +66,11 @@ def wanted(
 
 
 Wanted = Annotated[Which, Depends(wanted)]
+
+
+def _priority(event: Mapping[str, Any]) -> Priority | None:
+    """None: of no alarm."""
+    return priority_of(event.get("priority")) if event.get("alarm") else None
 
 
 def _words_of(event: Mapping[str, Any]) -> str:

@@ -18,17 +18,17 @@ router = APIRouter(tags=["vehicle"], responses=raises(404, 409))
 Name = Annotated[str, InPath(max_length=40, description="The car's name")]
 
 
-@router.put("/api/off/{vehicle}", summary="Say that a lost car is off on purpose, until it is heard again")
+@router.put("/api/off/{vehicle}", summary="Say that a lost car is off on purpose, until data of it comes again")
 async def off(request: Request, vehicle: Name) -> Done:
     """Refused while its agent is heard."""
     app = _node(request, vehicle)
     if app.bus.trouble(vehicle) is None:
-        raise Problem(409, f"{vehicle} is heard: it is not off.")
+        raise Problem(409, f"{vehicle} sends data: it is not off.")
     app.off.declare(vehicle, _by(request))
     return Done()
 
 
-@router.delete("/api/off/{vehicle}", summary="Say that a car is not off: it is lost while it is not heard")
+@router.delete("/api/off/{vehicle}", summary="Say that a car is not off: it is lost while it sends nothing")
 async def not_off(request: Request, vehicle: Name) -> Done:
     _node(request, vehicle).off.withdraw(vehicle, _by(request))
     return Done()

@@ -47,7 +47,7 @@ class Done(BaseModel):
 
 def vehicle_of(app: Services, name: str | None) -> str:
     if not app.vehicles:
-        raise HTTPException(503, "No vehicle has been heard at the broker yet.")
+        raise HTTPException(503, "No vehicle has connected to the broker yet.")
     if name is None:
         return app.vehicles[0]
     if name not in app.vehicles:

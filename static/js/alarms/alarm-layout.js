@@ -3,6 +3,7 @@
 import { titleOf } from './alarm-title.js';
 import { stripWords } from '../slowdown/slow-layout.js';
 import { fixed, timeOfDay } from '../core/format.js';
+import { RANK } from '../core/priority.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').StandingAlarm} Alarm
@@ -10,7 +11,6 @@ import { fixed, timeOfDay } from '../core/format.js';
  * @typedef {import('../core/protocol-types.js').Sound} SoundName
  */
 
-const RANK = { critical: 3, warning: 2, advisory: 1 };
 const LOUD = /** @type {SoundName[]} */ (['high', 'medium', 'low']);
 
 /** @param {Alarm} alarm */

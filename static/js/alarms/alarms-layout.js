@@ -3,6 +3,7 @@
 import { byUrgency } from './alarm-layout.js';
 import { snackWords } from './standing.js';
 import { fixed, timeOfDay } from '../core/format.js';
+import { ICONS } from '../core/priority.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').StandingAlarm} Alarm
@@ -12,7 +13,6 @@ import { fixed, timeOfDay } from '../core/format.js';
  * @typedef {{key: string, id: string, kind: Kind, icon: string, priority: string, title: string, words: string, at: string, state: string, silent: string, keys: Key[], alarm: Alarm | null}} Row
  */
 
-export const ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
 const KINDS = /** @type {Record<Alarm['state'], Kind>} */ ({ UNACKED: 'unacknowledged', RTN_UNACKED: 'returned', ACKED: 'acknowledged', SHELVED: 'shelved' });
 /** So long a row must have been in sight whole before one tap answers it together with others [ms]. */
 export const SEEN_MS = 1000;

@@ -1,5 +1,6 @@
 // What an open check needs beyond the state frame: requested from the server once a second, its alarms with each new event.
 
+import { ranked } from '../core/priority.js';
 import { tilesOf } from './alarm-layout.js';
 import { episodesOf, meantOf } from './check-layout.js';
 
@@ -112,7 +113,7 @@ export class CheckFeed {
       this.#event = null;
       return;
     }
-    this.answer = answer;
+    [this.answer] = ranked([answer]);
     if (answer.history !== undefined) {
       this.episodes = answer.history && episodesOf(answer.history);
       this.historyProblem = answer.history ? '' : 'still being read';

@@ -1,7 +1,7 @@
 // One check, or the alarm that it raises: what it found and since when, its last minute against its limit, its thresholds, its alarms in this drive.
 
 import { tilesOf } from './alarm-layout.js';
-import { ICONS, keysOf, silentWords, stateWords } from './alarms-layout.js';
+import { keysOf, silentWords, stateWords } from './alarms-layout.js';
 import { drawMinute } from './check-chart.js';
 import { CheckFeed } from './check-feed.js';
 import { TAGS, episodeWords, figuresOf, placeOf, thresholdWords, totalWords } from './check-layout.js';
@@ -9,8 +9,10 @@ import { whyUnchecked } from './checks.js';
 import { openShelve } from './shelve.js';
 import { dialogWords } from './standing.js';
 import { html, icon, listen, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
+import { fixed } from '../core/format.js';
 import { write } from '../core/ink.js';
 import { openScreen } from '../core/open-screen.js';
+import { ICONS } from '../core/priority.js';
 import { speedUnit, speedWords } from '../core/units.js';
 import { showInTrends } from '../home/drive-choice.js';
 import { colours } from '../home/spark.js';
@@ -132,7 +134,7 @@ class CheckView {
     if (causes.length) {
       setText(parts.alarmTitle, title);
       setWords(parts.state, 'suppressed');
-      setWords(parts.story, `Cause: ${causes.join(', ')}. It is announced if it stands when that is over.`);
+      setWords(parts.story, `Cause: ${causes.join(', ')}. It is announced if it is still active when that ends.`);
     }
     if (!alarm) return;
     setText(parts.alarmTitle, alarm.title);
@@ -171,7 +173,7 @@ class CheckView {
     if (minute === null || !isMeasured) return;
     drawMinute(/** @type {HTMLCanvasElement} */ (canvas), minute, unit, momentOf(this.store) ?? Date.now(), this.palette);
     const known = minute.values.filter((value) => value !== null);
-    setAttribute(canvas, 'aria-label', `Last 60 s: lowest ${Math.min(...known).toFixed(1)}, highest ${Math.max(...known).toFixed(1)} ${unit}`);
+    setAttribute(canvas, 'aria-label', `Last 60 s: lowest ${fixed(Math.min(...known))}, highest ${fixed(Math.max(...known))} ${unit}`);
   }
 
   /** The rows of Settings, in place. */

@@ -16,9 +16,10 @@ export const KINDS = /** @type {const} */ ([
 ]);
 export const MARKS = { critical: ['crit', 'c-crit'], warning: ['warn', 'c-warn'], advisory: ['info', ''] };
 const CHANGES = /** @type {Record<string, string>} */ ({
-  raised: '', recaused: 'again', cleared: 'cleared', acknowledged: 'acknowledged', shelved: 'shelved', unshelved: 'no longer shelved', silenced: 'silenced', unsilenced: 'sounds again',
+  raised: '', recaused: 'again', cleared: 'ended', acknowledged: 'acknowledged', shelved: 'shelved', unshelved: 'no longer shelved', silenced: 'silenced', unsilenced: 'sounds again',
   suppressed: 'not announced', unsuppressed: 'announced again',
 });
+const RISES = new Set(['raised', 'recaused', 'unsuppressed']);
 const SLOWING = new Set(['armed', 'disarmed', 'slow_down']);
 const DAYS = ['Sunday', 'Monday', 'Tuesday', 'Wednesday', 'Thursday', 'Friday', 'Saturday'];
 const MONTHS = ['January', 'February', 'March', 'April', 'May', 'June', 'July', 'August', 'September', 'October', 'November', 'December'];
@@ -34,7 +35,7 @@ export function eventWords(event) {
   }
   if (event.alarm === null) return { icon: event.change === 'lost' || event.change === 'stalled' ? 'link-off' : 'info', kind: '', title: event.text || event.change, text: event.by ? `by ${event.by}` : '' };
   const change = CHANGES[event.change] ?? event.change;
-  const isRise = event.change === 'raised' || event.change === 'recaused' || event.change === 'unsuppressed';
+  const isRise = !Object.hasOwn(CHANGES, event.change) || RISES.has(event.change); // a change of another version is no comfort
   const [mark, kind] = isRise ? MARKS[event.priority ?? 'advisory'] : ['ok', ''];
   return {
     icon: mark ?? 'info', kind: kind ?? '', title: `${event.title ?? event.alarm} ${change}`.trim(),
@@ -128,4 +129,3 @@ export function tookWords(event, rows) {
   const raised = rows.find((row) => row.event && row.event.alarm === event.alarm && row.event.occurrence === event.occurrence && RISES.has(row.event.change));
   return raised?.event ? `after ${age((event.at_ms - raised.event.at_ms) / 1000)} s` : '';
 }
-const RISES = new Set(['raised', 'recaused', 'unsuppressed']);

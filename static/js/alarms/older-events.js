@@ -1,5 +1,6 @@
 // Older events of the alarm log than the page has: requested from the server in batches, with the filter of the log.
 
+import { rankedEvents } from '../core/priority.js';
 import { asked, lowest } from './log-layout.js';
 
 const BATCH = 100; // events a request
@@ -50,7 +51,7 @@ export class OlderEvents {
     try {
       const answer = await fetch(`/api/log?${query}`, { cache: 'no-store' });
       const { events, next_before } = await answer.json();
-      if (answer.ok) found = { events: [...events], next_before };
+      if (answer.ok) found = { events: rankedEvents([...events]), next_before };
     } catch {
       // no answer
     }

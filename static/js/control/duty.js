@@ -95,7 +95,7 @@ function handoverNotice(store, say) {
     if (part === 'giver' || isSlowing(store)) {
       if (document.hidden || document.querySelector('dialog:modal')) return; // it could not be seen
       opened = which;
-      const sentence = part === 'taker' ? `${handover.by} hands over to you, with read-back.` : `${handover.name} reads back what stands. You stay in control until the last line.`;
+      const sentence = part === 'taker' ? `${handover.by} hands over to you, with read-back.` : `${handover.name} reads back what is in force. You stay in control until the last line.`;
       say(sentence, 'Control is offered', { label: 'Show', act: () => openHandover(store, say, (isByHand) => { if (!isByHand) opened = ''; }) }); // an alarm closes it: offered again
       return;
     }

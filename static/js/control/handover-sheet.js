@@ -34,7 +34,7 @@ export class HandoverSheet {
     this.by = html('bdi');
     this.to = html('bdi');
     this.words = html('p', { class: 'sub', id: 'handover-words' });
-    this.list = html('ul', { class: 'read-back', 'aria-label': 'What stands' });
+    this.list = html('ul', { class: 'read-back', 'aria-label': 'What is in force' });
     this.keyTitle = html('b');
     this.keyText = html('span');
     this.key = html('button', { type: 'button', class: 'main sign', 'data-f': 'take-over' }, this.keyTitle, this.keyText);
@@ -43,7 +43,7 @@ export class HandoverSheet {
     const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close', 'data-f': 'no' }, icon('close'));
     this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed duty-sheet', id: 'sheet-handover', 'aria-labelledby': 'handover-title', 'aria-describedby': 'handover-words' },
       html('div', { class: 'duty-head' }, html('h2', { id: 'handover-title', tabindex: '-1' }, 'Hand over'), this.count, close),
-      html('div', { class: 'duty-body', tabindex: '0', role: 'group', 'aria-label': 'What stands' },
+      html('div', { class: 'duty-body', tabindex: '0', role: 'group', 'aria-label': 'What is in force' },
         html('div', { class: 'from-to' }, this.by, icon('next'), this.to), this.words, this.list),
       html('div', { class: 'duty-keys' }, this.bad, this.key, this.end)));
     const stops = [store.on('draw', () => this.#draw()), addSheet(this.sheet)];

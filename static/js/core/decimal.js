@@ -1,4 +1,4 @@
-// Decimal numbers as they are typed and shown in fields, with the mark of this browser's language. Pure functions, no DOM.
+// Decimal numbers as they are typed and shown, with the mark of this browser's language. Pure functions, no DOM.
 
 /** The decimal mark of a language: "," in German, "." in English. @param {string} [language] of the browser */
 export function markOf(language = globalThis.navigator?.language) {
@@ -9,9 +9,12 @@ export function markOf(language = globalThis.navigator?.language) {
   }
 }
 
+/** Of this browser, once: every value that is drawn is written with it. */
+const MARK = markOf();
+
 /** A number in the way a program writes it, as this language writes it. @param {string} text @param {string} [mark] */
-export function local(text, mark = markOf()) {
-  return text.replace('.', mark);
+export function local(text, mark = MARK) {
+  return mark === '.' ? text : text.replace('.', mark);
 }
 
 /**
@@ -20,7 +23,7 @@ export function local(text, mark = markOf()) {
  * @param {string} text a typed number
  * @param {string} [mark] of the language
  */
-export function isInDoubt(text, mark = markOf()) {
+export function isInDoubt(text, mark = MARK) {
   const found = /^[+-]?[1-9]\d{0,2}([.,])\d\d(\d)$/.exec(text);
   return found !== null && (found[1] !== mark || found[2] === '0');
 }
@@ -30,7 +33,7 @@ export function isInDoubt(text, mark = markOf()) {
  * @param {string} typed
  * @param {string} [mark] of the language
  */
-export function decimalOf(typed, mark = markOf()) {
+export function decimalOf(typed, mark = MARK) {
   const text = typed.trim();
   return text === '' || isInDoubt(text, mark) ? NaN : Number(text.replace(',', '.'));
 }

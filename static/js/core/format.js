@@ -1,16 +1,18 @@
 // Numbers and times as the operator reads them: pure functions, no DOM.
 
+import { local } from './decimal.js';
+
 export const NOTHING = '–';
 
 /**
- * A number with a fixed count of decimals and a true minus sign; never "−0.0". Unknown is a dash, never 0.
+ * A number with a fixed count of decimals, the decimal mark of this browser's language and a true minus sign; never "−0.0". Unknown is a dash, never 0.
  * @param {number | null | undefined} value
  * @param {number} [digits]
  */
 export function fixed(value, digits = 1) {
   if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
   const text = Math.abs(value).toFixed(digits);
-  return value < 0 && Number(text) !== 0 ? `−${text}` : text;
+  return local(value < 0 && Number(text) !== 0 ? `−${text}` : text);
 }
 
 /**
@@ -20,7 +22,7 @@ export function fixed(value, digits = 1) {
  */
 export function signed(value, digits = 1) {
   const text = fixed(value, digits);
-  return value && value > 0 && Number(text) !== 0 ? `+${text}` : text;
+  return value && value > 0 && Number(value.toFixed(digits)) !== 0 ? `+${text}` : text;
 }
 
 /**
@@ -31,7 +33,7 @@ export function signed(value, digits = 1) {
 export function age(seconds, digits = 1) {
   if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return NOTHING;
   const least = Math.max(0, seconds);
-  if (least < 59.95) return least.toFixed(least < 1 ? digits : 1);
+  if (least < 59.95) return fixed(least, least < 1 ? digits : 1);
   return duration(least);
 }
 
@@ -89,10 +91,13 @@ export function counted(count, one, many = `${one}s`) {
   return `${count} ${count === 1 ? one : many}`;
 }
 
+/** A version has a point in every language. */
+const VERSION = /\b(?:TLS|HTTP|[Vv]ersion)\s$/;
 const NUMBER = /(?<![\p{L}\d_/])[+−-]?\d+(?:[.:,]\d+)*°?(?![\p{L}_])/gu;
 
 /**
- * A sentence cut into numbers and the rest, so that numbers can stand in their own face.
+ * A sentence cut into numbers and the rest, so that numbers can stand in their own face, each with the decimal mark of this
+ * browser's language.
  * @param {string} sentence
  * @returns {{text: string, isNumber: boolean}[]}
  */
@@ -101,7 +106,8 @@ export function pieces(sentence) {
   let from = 0;
   for (const match of sentence.matchAll(NUMBER)) {
     if (match.index > from) found.push({ text: sentence.slice(from, match.index), isNumber: false });
-    found.push({ text: match[0], isNumber: true });
+    const isDecimal = /^[+−-]?\d+\.\d+°?$/.test(match[0]) && !VERSION.test(sentence.slice(0, match.index));
+    found.push({ text: isDecimal ? local(match[0]) : match[0], isNumber: true });
     from = match.index + match[0].length;
   }
   if (from < sentence.length) found.push({ text: sentence.slice(from), isNumber: false });

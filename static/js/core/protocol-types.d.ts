@@ -910,11 +910,11 @@ export interface LeaveReplay {
 export interface LinkState {
   /** which part of the chain is broken; null: none */
   cut: "server-bridge" | "bridge-car" | null;
-  /** when what is beyond the cut was last heard */
+  /** when the last data came from beyond the cut */
   since_ms: number | null;
-  /** since the bridge was last heard; null: never */
+  /** since the last data of the bridge; null: none */
   bridge_age_s: number | null;
-  /** since the car was last heard; null: never */
+  /** since the last data of the car; null: none */
   car_age_s: number | null;
   /** may be there while cut is null: a part behind the bridge failed, and messages still come */
   problem: ConnectionProblem | null;
@@ -1277,7 +1277,7 @@ export interface OdometryValue {
   speed_mps: number | null;
 }
 
-/** A person said that a car is off; it holds until the car's agent is heard again. */
+/** A person said that a car is off; it holds until the car's agent sends data again. */
 export interface OffOnPurpose {
   by: string;
   since_ms: number;
@@ -1290,7 +1290,7 @@ export interface Offer {
   of: Array<"state" | "scan" | "timeline" | "cars" | "beside">;
 }
 
-/** Offers control to another page, whose operator reads back what stands; control stays where it is until then. */
+/** Offers control to another page, whose operator reads back what is in force; control stays where it is until then. */
 export interface OfferControlCommand {
   id?: string | null;
   /** the car that the page named to its operator; refused by any other */
@@ -1384,7 +1384,7 @@ export interface PagePresence {
   name: string;
   /** an alarm would be audible on it now */
   can: boolean;
-  /** silent: not heard for 3 s; blind: it receives nothing for 2 s; undrawn: its drawing failed */
+  /** silent: no contact for 3 s; blind: it receives nothing for 2 s; undrawn: its drawing failed */
   why: "silent" | "blind" | "hidden" | "undrawn" | "sound" | "replay" | null;
   why_text: string | null;
   /** it is seen now, so that control can be handed to it */
@@ -1639,7 +1639,7 @@ export interface ReachState {
   left_out: number;
 }
 
-/** Confirms one line of what stands; only by who takes over. */
+/** Confirms one line of what is in force; only by who takes over. */
 export interface ReadBackCommand {
   id?: string | null;
   /** the car that the page named to its operator; refused by any other */
@@ -1950,7 +1950,7 @@ export interface Reply {
   version?: number;
   /** number of the lease that the page has */
   fence?: number;
-  /** what stands now, where a read-back was refused */
+  /** what is in force now, where a read-back was refused */
   handover?: HandoverState | null;
   /** not sent to pages */
   handed_over?: HandedOver;

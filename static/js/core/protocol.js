@@ -1,5 +1,7 @@
 // The one place that looks at what came off the socket. Its types are made from the server's: protocol-types.d.ts.
 
+import { understood } from './priority.js';
+
 /** @typedef {import('./protocol-types.js').Message} Message */
 
 /**
@@ -46,5 +48,5 @@ export function readMessage(text) {
     const is = Array.isArray(value) ? 'array' : value === null ? 'null' : typeof value;
     if (is !== kind) return null;
   }
-  return message;
+  return understood(message);
 }

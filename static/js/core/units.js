@@ -80,8 +80,8 @@ export function wireOf(value, unit) {
   return unit === 'm/s' && chosen !== 'm/s' ? Number((value / SPEED_UNITS[chosen].factor).toFixed(6)) : value;
 }
 
-const NUMBER = '[+−-]?\\d+(?:\\.\\d+)?';
-const SPEEDS = new RegExp(`(?<![\\p{L}\\d_./:])(${NUMBER}(?: (?:to|→|of|or) ${NUMBER})*) m/s(?![\\p{L}\\d²^/_])`, 'gu');
+const NUMBER = '[+−-]?\\d+(?:[.,]\\d+)?'; // with a point by the server, with either by this page
+const SPEEDS = new RegExp(`(?<![\\p{L}\\d_.,/:])(${NUMBER}(?: (?:to|→|of|or) ${NUMBER})*) m/s(?![\\p{L}\\d²^/_])`, 'gu');
 
 /**
  * A sentence of the server with its speeds in the chosen unit: "12.6 m/s, limit 11.0 m/s" → "45.4 km/h, limit 39.6 km/h".
@@ -95,10 +95,10 @@ export function inUnits(sentence) {
 
 /** One number of a sentence; a whole one stays without decimals where it can. @param {string} text */
 function speedOf(text) {
-  const digits = text.split('.')[1]?.length ?? 0;
-  const shown = fixed(speedIn(Number(text.replace('−', '-'))), Math.max(1, digits));
+  const digits = text.split(/[.,]/)[1]?.length ?? 0;
+  const shown = fixed(speedIn(Number(text.replace('−', '-').replace(',', '.'))), Math.max(1, digits));
   const sign = text.startsWith('+') ? '+' : '';
-  return sign + (digits ? shown : shown.replace(/\.0$/, ''));
+  return sign + (digits ? shown : shown.replace(/[.,]0$/, ''));
 }
 
 /** @returns {SpeedUnit} */

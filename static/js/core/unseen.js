@@ -1,5 +1,6 @@
 // How far the car may have driven since its last value, as monitor/unseen.py has it: |v|·t + a·t²/2.
 
+import { fixed } from './format.js';
 import { speedIn, speedUnit } from './units.js';
 
 /** Remote driving in Germany (StVFernLV): 200 ms at 50 km/h, that is 2.78 m. */
@@ -40,7 +41,7 @@ export function unseenWords(metres) {
   return `≤ ${metres > 99.9 ? Math.ceil(metres) : up(metres)} m unseen`;
 }
 
-const up = (/** @type {number} */ value) => (Math.ceil(value * 10) / 10).toFixed(1);
+const up = (/** @type {number} */ value) => fixed(Math.ceil(value * 10) / 10);
 
 /**
  * The metres unseen at the glass, by the last speed that came; null: not known.
@@ -61,5 +62,5 @@ export function proposalOf(store) {
   const { late_s } = frame.link;
   if (late_s === null) return ['delay', 'not known'];
   const kept_mps = keptSpeed(Math.round(1000 * (late_s + store.lag_s - Math.max(0, store.silence_s))) / 1000);
-  return kept_mps === null ? [] : [`≤ ${(Math.floor(speedIn(kept_mps) * 10) / 10).toFixed(1)} ${speedUnit()}`, `for ${KEPT_M} m`];
+  return kept_mps === null ? [] : [`≤ ${fixed(Math.floor(speedIn(kept_mps) * 10) / 10)} ${speedUnit()}`, `for ${KEPT_M} m`];
 }

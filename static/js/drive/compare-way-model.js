@@ -1,5 +1,7 @@
 // Two drives beside each other: which place or moment of one belongs to which of the other. Pure.
 
+import { fixed } from '../core/format.js';
+
 /**
  * @typedef {import('../core/protocol-types.js').Course} Course
  * @typedef {import('../core/protocol-types.js').CoursePoints} Points
@@ -88,8 +90,8 @@ export function difference({ a, b }, what) {
 
 /** Where they differ most: at most two of speed, one aside, one of steering. @param {Row[]} rows @returns {Difference[]} */
 export function differences(rows) {
-  const speed = peaks(rows, (row) => difference(row, 'speed'), 2, 0.5).map(({ x, value }) => ({ x, text: value < 0 ? 'B slower' : 'B faster', value: `${Math.abs(value).toFixed(1)} m/s` }));
-  const aside = peaks(rows, (row) => row.aside, 1, 1).map(({ x, value }) => ({ x, text: 'B aside', value: `${value.toFixed(1)} m` }));
+  const speed = peaks(rows, (row) => difference(row, 'speed'), 2, 0.5).map(({ x, value }) => ({ x, text: value < 0 ? 'B slower' : 'B faster', value: `${fixed(Math.abs(value))} m/s` }));
+  const aside = peaks(rows, (row) => row.aside, 1, 1).map(({ x, value }) => ({ x, text: 'B aside', value: `${fixed(value)} m` }));
   const steering = peaks(rows, (row) => difference(row, 'steering'), 1, 3).map(({ x, value }) => ({ x, text: value < 0 ? 'B steers further left' : 'B steers further right', value: `${Math.abs(value).toFixed(0)} %` }));
   return [...speed, ...aside, ...steering];
 }

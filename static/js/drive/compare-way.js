@@ -199,13 +199,13 @@ class CompareWay {
   /** @param {number} x */
   #axisWords(x) {
     if (this.#by === 'time') return `${duration(x)} min`;
-    return x >= 1000 ? `${(x / 1000).toFixed(2)} km` : `${x.toFixed(0)} m`;
+    return x >= 1000 ? `${fixed(x / 1000, 2)} km` : `${fixed(x, 0)} m`;
   }
 }
 
 /** @param {Recording} one */
 function nameOf({ started_ms, title, distance_m, length_s }) {
-  const way = distance_m === null ? '' : ` · ${(distance_m / 1000).toFixed(2)} km`;
+  const way = distance_m === null ? '' : ` · ${fixed(distance_m / 1000, 2)} km`;
   return `${dayOf(started_ms)}${title ? ` · ${title}` : ''}${way}${length_s === null ? '' : ` · ${duration(length_s)}`}`;
 }
 

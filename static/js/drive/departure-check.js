@@ -136,7 +136,7 @@ class DepartureView {
   #draw() {
     const departure = this.#departure;
     const old = this.#old;
-    if (old || departure) setWords(this.state, old && departure ? `${old} What stands here is old.` : old);
+    if (old || departure) setWords(this.state, old && departure ? `${old} What is shown here is old.` : old);
     show(this.state, Boolean(this.state.textContent));
     if (!departure) return;
     setWords(this.count, doneOf(departure));

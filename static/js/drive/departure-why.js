@@ -35,7 +35,7 @@ class WhySheet {
     const back = html('button', { type: 'button', class: 'key wide', 'data-f': 'no' }, 'Back');
     this.undo = html('button', { type: 'button', class: 'key wide', 'data-f': 'why-undo' }, 'Take back');
     this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed dep-why', id: 'sheet-departure', 'aria-labelledby': 'departure-why' },
-      html('div', { class: 'bd' }, this.title, html('p', { class: 'sub' }, 'Why? The reason stands in the report.')),
+      html('div', { class: 'bd' }, this.title, html('p', { class: 'sub' }, 'Why? The reason becomes part of the report.')),
       html('div', { class: 'keys' }, this.verdicts, this.chips, html('div', { class: 'field' }, icon('edit'), this.words), this.bad,
         html('div', { class: 'pair' }, back, this.yes), this.undo)));
     show(this.verdicts, item.group !== 'automatic');

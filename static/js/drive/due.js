@@ -1,7 +1,7 @@
 // When an item of the departure check that has an interval is due again: in words, and asked for from the logbook.
 
 import { request } from '../control/request.js';
-import { counted } from '../core/format.js';
+import { counted, fixed } from '../core/format.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').LogbookDue} Due
@@ -36,7 +36,7 @@ export function lastWords({ done_ms, is_least }) {
 }
 
 /** @param {number} value */
-const kilometres = (value) => value.toFixed(value < 100 && value % 1 ? 1 : 0);
+const kilometres = (value) => fixed(value, value < 100 && value % 1 ? 1 : 0);
 
 /** What the logbook of one car says of its items, asked for once. */
 export class DueItems {

@@ -1,5 +1,6 @@
 // The drawings of the logbook: a rate week by week with its median, the distance by mode, faults by component.
 
+import { fixed } from '../core/format.js';
 import { svg } from '../core/dom.js';
 
 /**
@@ -58,7 +59,7 @@ export function modesPlot(weeks, width) {
 }
 
 /** @param {number} value */
-export const numberOf = (value) => (value >= 100 ? value.toFixed(0) : value.toFixed(1));
+export const numberOf = (value) => fixed(value, value >= 100 ? 0 : 1);
 
 /** @param {string} mode @param {number} x @param {number} y @param {number} width @param {number} height */
 function bar(mode, x, y, width, height) {

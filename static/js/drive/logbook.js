@@ -7,7 +7,7 @@ import { modesPlot, numberOf, ratePlot } from './logbook-plots.js';
 import { request, sentenceOf } from '../control/request.js';
 import { keptAt } from '../core/kept-at.js';
 import { html, icon, listen, setAttribute, setText, setWords, show, words } from '../core/dom.js';
-import { counted } from '../core/format.js';
+import { counted, fixed } from '../core/format.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').LogbookAnswer} Answer
@@ -126,7 +126,7 @@ class Logbook {
     const { distance_m, driven_s, modes_m: { autonomous = 0, unknown = 0 } } = totals;
     const share = (/** @type {number} */ part) => (distance_m > 0 ? (100 * part / distance_m).toFixed(0) : null);
     this.figures.replaceChildren(
-      figure('Distance', (distance_m / 1000).toFixed(distance_m < 1e5 ? 1 : 0), 'km', `${(driven_s / 3600).toFixed(driven_s < 36e4 ? 1 : 0)} h`),
+      figure('Distance', fixed(distance_m / 1000, distance_m < 1e5 ? 1 : 0), 'km', `${fixed(driven_s / 3600, driven_s < 36e4 ? 1 : 0)} h`),
       figure('Autonomous', share(autonomous), '%', 'of the distance'),
       figure('Not known', share(unknown), '%', 'mode of the car'),
       figure('Interventions', totals.interventions === null ? null : numberOf(totals.interventions), 'per 100 km', ''),
@@ -177,7 +177,7 @@ const unreadWords = ({ unread = 0 }) => (unread ? [`${counted(unread, 'recording
 /** What stands since the newest signed check; of all drives, whatever the filters say. @param {Check} check @param {Answer['totals']} totals of the drives that are shown @param {boolean} isPartial recordings are yet to be read */
 function checkList({ signed_ms, by, failed, failed_items, distance_m, unmeasured = 0, drives, not_known }, { checks_known, checks_missing }, isPartial) {
   const isLeast = isPartial || unmeasured > 0;
-  const way = distance_m === null ? 'distance not known' : `${isLeast ? 'at least ' : ''}${(distance_m / 1000).toFixed(distance_m < 1e5 ? 1 : 0)} km`;
+  const way = distance_m === null ? 'distance not known' : `${isLeast ? 'at least ' : ''}${fixed(distance_m / 1000, distance_m < 1e5 ? 1 : 0)} km`;
   const unsure = not_known ? `${not_known} of them may have had one: their recordings do not say` : '';
   const rows = signed_ms === null ? [['Signed', isPartial ? 'not known yet' : 'in no drive of this car', unsure]] : [
     ['Signed', daysAgo(signed_ms), by ? `by ${by}` : ''],
@@ -216,7 +216,7 @@ function driveList(drives) {
   return html('ul', { class: 'lb-drives' }, ...drives.map((drive) => html('li', {},
     html('a', { href: keptAt(`/api/recordings/${encodeURIComponent(drive.id)}/report`), target: '_blank', rel: 'noopener' },
       html('b', {}, dayOf(drive.started_ms)), html('span', { dir: 'auto' }, ...words(drive.title || drive.people.join(', '))),
-      html('span', { class: 'n' }, drive.distance_m === null ? '–' : `${(drive.distance_m / 1000).toFixed(2)} km`),
+      html('span', { class: 'n' }, drive.distance_m === null ? '–' : `${fixed(drive.distance_m / 1000, 2)} km`),
       html('small', {}, ...words(driveWords(drive)))))));
 }
 

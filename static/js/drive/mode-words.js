@@ -1,6 +1,6 @@
 // Who drives and what is known of an intervention, in words: pure functions of what the server told.
 
-import { distanceWords, duration } from '../core/format.js';
+import { distanceWords, duration, fixed } from '../core/format.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').ModeState} ModeState
@@ -43,14 +43,14 @@ export function modeWords(mode, now_ms, isLinked) {
 /** @param {ModeState} mode @param {number} now_ms */
 function lasted({ since_ms, way_m }, now_ms) {
   const time = since_ms === null ? '' : duration((now_ms - since_ms) / 1000, true);
-  const way = way_m === null ? '' : way_m < 100 ? `${Math.round(way_m)} m` : way_m >= 1000 && way_m < 100_000 ? `${(way_m / 1000).toFixed(2)} km` : distanceWords(way_m).join(' ');
+  const way = way_m === null ? '' : way_m < 100 ? `${Math.round(way_m)} m` : way_m >= 1000 && way_m < 100_000 ? `${fixed(way_m / 1000, 2)} km` : distanceWords(way_m).join(' ');
   return [time, way].filter(Boolean).join(' · ');
 }
 
 /** Who acted first, as the data show it. @param {Intervention} found @returns {{title: string, value: string, unit: string, text: string}} */
 export function startedWords({ kind_of, initiated_by, brake_percent, acted_before_s }) {
   const by = { driver: 'By the driver', operator: 'By the operator', system: 'By the car', unknown: 'Started by' }[initiated_by] ?? 'Started by';
-  const before = acted_before_s === null || acted_before_s < 0.05 ? '' : `${acted_before_s.toFixed(1)} s before mode`;
+  const before = acted_before_s === null || acted_before_s < 0.05 ? '' : `${fixed(acted_before_s)} s before mode`;
   if (brake_percent !== null) return { title: by, value: String(Math.round(brake_percent)), unit: '% brake', text: before };
   if (kind_of === 'steer') return { title: by, value: 'wheel', unit: '', text: 'against the command' };
   return { title: by, value: initiated_by === 'unknown' ? 'not known' : '–', unit: '', text: before };

@@ -1,5 +1,7 @@
 // A voice note of at most 10 s: what the microphone gives, in pieces, so that what came is kept whatever ends it.
 
+import { fixed } from '../core/format.js';
+
 /** The longest [ms]. */
 export const LONGEST_MS = 10_000;
 /** A piece comes so often: so much at most is lost when the page is killed [ms]. */
@@ -20,7 +22,7 @@ const CUT = { hidden: 'the page was hidden', microphone: 'the microphone was los
  */
 export function cutWords(ending, length_s) {
   const why = ending === 'let go' || ending === 'full' ? '' : CUT[ending];
-  return why ? `voice cut at ${length_s.toFixed(1)} s: ${why}` : '';
+  return why ? `voice cut at ${fixed(length_s)} s: ${why}` : '';
 }
 
 /** Why the microphone cannot be used, in a sentence. @param {unknown} error */

@@ -7,12 +7,12 @@ import { request, sentenceOf } from '../control/request.js';
 import { addressOf } from './files-model.js';
 import { html, icon, listen, setWords, words } from '../core/dom.js';
 import { timeOfDay } from '../core/format.js';
+import { ICONS, ranked } from '../core/priority.js';
 
 /** @typedef {import('./files-layout.js').Recording} Recording */
 
 export const KINDS = /** @type {Record<string, [string, string]>} */ ({ mcap: ['MCAP', 'all of it, for Foxglove and Lichtblick'], bag: ['ROS 1 bag', 'the file as it is'], db3: ['ROS 2 db3', 'the file as it is'], zstd: ['Packed MCAP or db3', 'the file as it is, packed with zstd'] });
 const CLIP_S = 30; // before and after an alarm
-export const PRIORITY_ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
 
 export class FileMaker {
   /** @type {FileJob | null} */
@@ -89,7 +89,7 @@ export class FileMaker {
   /** The alarms that were raised in a recording. @param {Recording} row @returns {Promise<NonNullable<Recording['raised']>>} */
   async raised(row) {
     const whole = /** @type {Recording} */ (await request(addressOf(row.id)));
-    return whole.raised ?? [];
+    return ranked(whole.raised ?? []);
   }
 
   /** The alarms of a recording, to cut out the time around one. @param {Recording} row @param {() => void} back */
@@ -103,7 +103,7 @@ export class FileMaker {
     }
     this.#dialog.show('Cut out an incident', [html('p', { class: 'sub' }, ...words(raised.length ? `From ${CLIP_S} s before an alarm to ${CLIP_S} s after it, as a separate recording.` : 'No alarm was raised in this recording.'))],
       [html('ul', { class: 'menu-list' }, ...raised.map((alarm) => {
-        const key = html('button', { type: 'button' }, icon(PRIORITY_ICONS[alarm.priority], alarm.priority === 'critical' ? 'c-crit' : alarm.priority === 'warning' ? 'c-warn' : ''),
+        const key = html('button', { type: 'button' }, icon(ICONS[alarm.priority], alarm.priority === 'critical' ? 'c-crit' : alarm.priority === 'warning' ? 'c-warn' : ''),
           html('span', { class: 'tx' }, html('b', {}, ...words(alarm.title)), html('small', {}, ...words(alarm.text))), html('span', { class: 'end n' }, timeOfDay(alarm.at_ms)));
         listen(key, 'click', () => this.#cut(row, alarm.at_ms, back));
         return html('li', {}, key);

@@ -2,6 +2,7 @@
 
 import { missingWords, namesWords } from './missing-topics.js';
 import { duration, fixed, NOTHING } from '../core/format.js';
+import { priorityOf, RANK } from '../core/priority.js';
 import { speedWords } from '../core/units.js';
 
 /**
@@ -82,12 +83,10 @@ const WORDS = /** @type {[Priority, string, string][]} */ ([['critical', 'critic
 /** The counts that are not 0, most urgent first. @param {Recording['alarms']} alarms @returns {{priority: Priority, count: number, words: string}[]} */
 export function countsOf(alarms) {
   return WORDS.flatMap(([priority, one, many]) => {
-    const count = alarms?.[priority] ?? 0;
+    const count = Object.entries(alarms ?? {}).reduce((sum, [name, some]) => sum + (priorityOf(name) === priority ? some : 0), 0);
     return count > 0 ? [{ priority, count, words: `${count} ${count === 1 ? one : many}` }] : [];
   });
 }
-
-const URGENCY = /** @type {Priority[]} */ (['critical', 'warning', 'advisory']);
 
 /**
  * The most urgent first, then as they were raised: what is left out of a short list is the least urgent.
@@ -95,7 +94,7 @@ const URGENCY = /** @type {Priority[]} */ (['critical', 'warning', 'advisory']);
  * @param {One[]} raised
  */
 export function byUrgency(raised) {
-  return [...raised].sort((a, b) => URGENCY.indexOf(a.priority) - URGENCY.indexOf(b.priority) || a.at_ms - b.at_ms);
+  return [...raised].sort((a, b) => RANK[b.priority] - RANK[a.priority] || a.at_ms - b.at_ms);
 }
 
 /** "2 critical alarms, 1 warning", "no alarms"; "alarms not recorded" is not the same. @param {Recording['alarms']} alarms */

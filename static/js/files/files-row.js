@@ -39,7 +39,9 @@ function counts(row) {
   const none = COLUMNS.filter((priority) => !found.some((one) => one.priority === priority)).map((priority) => html('span', { class: 'dash', 'data-priority': priority, 'aria-hidden': 'true' }, NOTHING));
   return [...none, ...found.map(({ priority, count, words: said }) => {
     const [glyph, kind] = ICONS[priority] ?? ['info', 'sub'];
-    return html('span', { class: `mini ${kind}`, 'data-priority': priority }, icon(glyph, 's'), html('span', { class: 'n b', 'aria-hidden': 'true' }, String(count)), html('span', { class: 'unseen' }, said));
+    return html('span', { class: `mini ${kind}`, 'data-priority': priority }, icon(glyph, 's'),
+      ...(priority === 'advisory' ? words(said) // it stands in no column of its own
+        : [html('span', { class: 'n b', 'aria-hidden': 'true' }, String(count)), html('span', { class: 'unseen' }, said)]));
   })];
 }
 

@@ -2,7 +2,7 @@
 
 import { annotate, rename } from './file-annotations.js';
 import { FileDialog } from './file-dialog.js';
-import { FileMaker, KINDS, PRIORITY_ICONS } from './file-maker.js';
+import { FileMaker, KINDS } from './file-maker.js';
 import { storeActions, storeItem } from './file-store.js';
 import { FileTrash } from './file-trash.js';
 import { chainLines, verify } from './file-verify.js';
@@ -13,6 +13,7 @@ import { share } from './files-share.js';
 import { thumbnail } from './files-row.js';
 import { duration } from '../core/format.js';
 import { html, icon, setWords, words } from '../core/dom.js';
+import { ICONS } from '../core/priority.js';
 import { NO_ROOM, hasRoom } from '../replay/compare-room.js';
 import { jumpAt } from '../replay/replay-jumps-layout.js';
 
@@ -32,7 +33,7 @@ const MOST_RAISED = 8;
  */
 function raisedLine({ at_ms, priority, title, text }, started_ms, open) {
   const at_s = Math.max(0, at_ms - started_ms) / 1000;
-  const key = html('button', { type: 'button', 'data-priority': priority }, html('span', { class: 'n' }, duration(at_s, true)), icon(PRIORITY_ICONS[priority], `s ${priority === 'critical' ? 'c-crit' : priority === 'warning' ? 'c-warn' : ''}`),
+  const key = html('button', { type: 'button', 'data-priority': priority }, html('span', { class: 'n' }, duration(at_s, true)), icon(ICONS[priority], `s ${priority === 'critical' ? 'c-crit' : priority === 'warning' ? 'c-warn' : ''}`),
     html('span', { class: 'tx' }, html('b', {}, ...words(title)), ' ', ...words(text)), icon('play', 's'));
   key.addEventListener('click', () => open(jumpAt({ at_s })));
   return html('li', {}, key);

@@ -7,7 +7,7 @@ import { Brush } from './drive-brush.js';
 import { chosenSignals } from './drive-choice.js';
 import { DriveFeed } from './drive-feed.js';
 import { mountGestures } from './drive-gestures.js';
-import { foundAt, foundWords, placedMarks, specFor, viewAfter } from './drive-layout.js';
+import { foundAt, foundWords, placedMarks, specFor, tagAt, viewAfter } from './drive-layout.js';
 import { Panes } from './drive-panes.js';
 import { RANGES, build, chartStyles } from './drive-parts.js';
 import { DriveView, stateWords } from './drive-view.js';
@@ -206,7 +206,8 @@ class DriveChart {
     const tag = [];
     if (cursor_s !== null && cursor_s >= from_s && cursor_s <= to_s) {
       const x = left + ((cursor_s - from_s) / (to_s - from_s)) * box.width;
-      const at = Math.max(left, Math.min(left + box.width - TAG_PX, x - TAG_PX / 2));
+      const middles = this.#scene().marks.map((mark) => left + mark.x);
+      const at = tagAt(x, middles, { left, right: left + box.width, width: TAG_PX, mark: 24 });
       tag.push(svg('rect', { class: 'tag-box', x: at.toFixed(1), y: 1, width: TAG_PX, height: 26 }), svg('text', { class: 'n tag-text', x: (at + TAG_PX / 2).toFixed(1), y: 20 }, timeOfDay(this.#clock(cursor_s))));
     }
     head.replaceChildren(...marks, ...tag);

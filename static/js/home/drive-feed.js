@@ -1,5 +1,7 @@
 // Fetches the drive of the chosen signals from the server: the part in view with a margin, and the whole of the first one.
 
+import { ranked } from '../core/priority.js';
+
 /** A view that changes is asked for once it has rested so long [ms]. */
 const REST_MS = 150;
 /** While the drive goes on, a view is asked for again when it has moved by a part of its width, but not more often than this [ms]. */
@@ -129,7 +131,10 @@ export class DriveFeed {
     this.#isAsking = true;
     try {
       const answer = await fetch(`/api/trends/drive?${query}`, { cache: 'no-store' });
-      return answer.ok ? await answer.json() : null;
+      if (!answer.ok) return null;
+      const found = await answer.json();
+      ranked(found.marks);
+      return found;
     } catch {
       return null; // asked again; until then the chart says that it is not live
     } finally {

@@ -1,6 +1,7 @@
 // The chart of a drive: what is in view, how its lines are cut, what stands at the cursor. Pure functions, no DOM.
 
 import { fixed, signed, timeOfDay } from '../core/format.js';
+import { RANK } from '../core/priority.js';
 import { shownIn } from '../core/units.js';
 import { SPECS, specOf } from './trends-layout.js';
 
@@ -8,7 +9,6 @@ import { SPECS, specOf } from './trends-layout.js';
 export const LEAST_S = 10;
 /** Marks that would stand closer are one [px]. */
 const MARK_PX = 16;
-const RANK = { critical: 3, warning: 2, advisory: 1 };
 
 /**
  * @typedef {import('../core/protocol-types.js').DriveTrendsAnswer} Answer
@@ -154,6 +154,19 @@ export function placedMarks(marks, [from_s, to_s], width) {
     }
   }
   return found;
+}
+
+/**
+ * Where the tag of the cursor begins: above the cursor, or beside it where that covers no mark of an alarm.
+ * @param {number} x of the cursor
+ * @param {number[]} marks their middles
+ * @param {{left: number, right: number, width: number, mark: number}} sizes the ends of the chart, widths of tag and mark
+ */
+export function tagAt(x, marks, { left, right, width, mark }) {
+  const inside = (/** @type {number} */ at) => Math.max(left, Math.min(right - width, at));
+  const covers = (/** @type {number} */ at) => marks.filter((one) => one + mark / 2 > at && one - mark / 2 < at + width).length;
+  const places = [x - width / 2, x + mark / 2, x - mark / 2 - width].map(inside);
+  return places.reduce((best, at) => (covers(at) < covers(best) ? at : best));
 }
 
 /** A tick of the clock axis: with seconds where ticks are less than a minute apart. @param {number} at_s since 1970 @param {number} apart_s */

@@ -1,5 +1,7 @@
 // The geometry of the gauge: pure functions. ViewBox 380×250, centre 190,214, angle = 180°·v/V_max from the left.
 
+import { fixed } from '../core/format.js';
+
 export const CENTRE = /** @type {const} */ ({ x: 190, y: 214 });
 
 /**
@@ -100,7 +102,7 @@ export function orderMark(ordered, measured, speed_max, limit) {
  */
 export function digitsBox(digits) {
   const size = digits.length <= 3 ? 110 : digits.length === 4 ? 100 : 80;
-  const wide = [...digits].reduce((sum, letter) => sum + (letter === '.' ? 0.22 : 0.56), 0) * size;
+  const wide = [...digits].reduce((sum, letter) => sum + (letter === '.' || letter === ',' ? 0.22 : 0.56), 0) * size;
   const half = Math.ceil(wide / 2 + 9);
   return { size, x: CENTRE.x - half, width: 2 * half, unitX: digits.length <= 3 ? 278 : CENTRE.x + half + 5 };
 }
@@ -128,7 +130,7 @@ function limitMark(degrees, limit) {
   return {
     line: ray(degrees, 170, 191),
     wedge: `M${at(191, degrees)}L${at(205, degrees - 4)}L${at(205, degrees + 4)}Z`,
-    text: limit.toFixed(1),
+    text: fixed(limit),
     x: isTop ? polar(205, degrees)[0] + 20 : isLeft ? clamp(x - 37, 2, 378) : clamp(x + 37, 2, 378),
     y: isTop ? 18 : clamp(y + 1, 14, 60),
     anchor: /** @type {'start' | 'end'} */ (isTop || isLeft ? 'start' : 'end'),

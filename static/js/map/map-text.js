@@ -3,6 +3,7 @@
 import { bearing_deg, distance_m, placeOf } from '../core/geodesy.js';
 import { ellipseOf } from './map-layout.js';
 import { nameOf } from '../phone/phones-layout.js';
+import { local } from '../core/decimal.js';
 import { age, distanceWords, fixed, heading } from '../core/format.js';
 
 /**
@@ -138,5 +139,5 @@ export function pictureWords(car, phone, apart) {
 
 /** "5 m", "4.2 m", "120 m". @param {number} value_m */
 function metres(value_m) {
-  return value_m < 9.95 ? `${Math.round(value_m * 10) / 10} m` : distanceWords(Math.round(value_m)).join(' ').replace('.0 ', ' ');
+  return value_m < 9.95 ? `${local(String(Math.round(value_m * 10) / 10))} m` : distanceWords(Math.round(value_m)).join(' ').replace(/[.,]0 /, ' ');
 }

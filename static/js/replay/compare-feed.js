@@ -1,6 +1,7 @@
 // Fetches the drives of two recordings: of each the part in view, and the whole of its speed with its alarms.
 
 import { lacks } from './compare-layout.js';
+import { ranked } from '../core/priority.js';
 
 /** A view that changes is asked for once it has rested so long [ms]. */
 const REST_MS = 150;
@@ -108,7 +109,10 @@ async function request(token, asked) {
   query.set('replay', token);
   try {
     const answer = await fetch(`/api/trends/drive?${query}`, { cache: 'no-store' });
-    return answer.ok ? await answer.json() : null;
+    if (!answer.ok) return null;
+    const found = await answer.json();
+    ranked(found.marks);
+    return found;
   } catch {
     return null; // asked again
   }

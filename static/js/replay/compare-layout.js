@@ -119,7 +119,7 @@ export function missingWords(place, { hangs_s, is_seeking, silent_s, is_settled 
   if (hangs_s) return `No answer for ${hangs_s.toFixed(0)} s`;
   if (is_seeking) return 'Seeking';
   if (silent_s === null) return 'No message from the car yet';
-  if (silent_s > 1) return `Nothing recorded for ${silent_s.toFixed(1)} s`;
+  if (silent_s > 1) return `Nothing recorded for ${fixed(silent_s)} s`;
   return is_settled ? '' : 'Checks still warming up';
 }
 

@@ -4,6 +4,7 @@ import { html, icon, setAttribute, setText, setWords, show, svg } from '../core/
 import { timeOfDay } from '../core/format.js';
 import { freshnessStyle } from '../core/freshness.js';
 import { write } from '../core/ink.js';
+import { ICONS } from '../core/priority.js';
 import { shownIn } from '../core/units.js';
 import { nowOf } from '../home/trend-feed.js';
 import { SPECS } from '../home/trends-layout.js';
@@ -14,7 +15,6 @@ import { dateOf } from './replay-layout.js';
 const SILENT_S = 2;
 /** Alarms that a card has room for. */
 const MOST_ALARMS = 3;
-const ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
 
 /**
  * @typedef {import('../core/protocol-types.js').RecordedState} RecordedState

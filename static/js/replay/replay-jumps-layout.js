@@ -3,6 +3,7 @@
 import { categoryWords } from '../drive/mark-model.js';
 import { CATEGORIES, KINDS } from '../drive/mode-words.js';
 import { counted, duration, fixed } from '../core/format.js';
+import { ICONS } from '../core/priority.js';
 
 /** A jump leads to so long before what happened [s]: what led to it is seen. */
 export const LEAD_S = 5;
@@ -12,8 +13,6 @@ export const LEAD_S = 5;
  * @typedef {{at_s: number, kind: import('../core/protocol-types.js').Priority | 'gap' | 'flag' | 'wheel', icon: string, title: string, text: string, length_s: number | null}} Jump
  *   length_s: how long it was active; null: not known, or to the end; of a mark or an intervention: 0
  */
-
-const ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
 
 /**
  * Alarms of every priority, what people marked, interventions, and where nothing was recorded, in the order of time.

@@ -1,7 +1,9 @@
 // Where things stand on the time line of a replay, and in which words: pure functions, no DOM.
 
 import { byUrgency, titleOf } from '../alarms/alarm-layout.js';
-import { counted, duration } from '../core/format.js';
+import { local } from '../core/decimal.js';
+import { counted, duration, fixed } from '../core/format.js';
+import { RANK } from '../core/priority.js';
 
 export const RATES = /** @type {const} */ ([0.25, 0.5, 1, 2, 4, 8, 16]);
 /** The picture is so high [px]: marks above, the speed, its base, the foot of the thumb. */
@@ -21,7 +23,6 @@ const BEHIND_S = 1;
  * @typedef {{x: number, count: number, priority: import('../core/protocol-types.js').Priority, title: string, at_s: number}} Placed
  */
 
-const RANK = { critical: 3, warning: 2, advisory: 1 };
 
 /** @param {number} at_s @param {number} length_s @param {number} width */
 export function xOf(at_s, length_s, width) {
@@ -180,7 +181,7 @@ function long(seconds) {
 
 /** "×0.25", "×16". @param {number} rate */
 export function rateWords(rate) {
-  return `×${rate >= 10 || Number.isInteger(rate) ? Math.round(rate) : Number(rate.toFixed(2))}`;
+  return `×${rate >= 10 || Number.isInteger(rate) ? Math.round(rate) : local(String(Number(rate.toFixed(2))))}`;
 }
 
 /** "19 Nov 2026", by this phone's own calendar. @param {number} at_ms */
@@ -210,7 +211,7 @@ export function momentOf(frame) {
   if (replay.hangs_s) return { kind: 'gap', icon: 'clock', text: `The replay has not answered for ${replay.hangs_s.toFixed(0)} s`, end: '' };
   if (replay.is_seeking) return { kind: '', icon: 'clock', text: `Seeking to ${clockOf(replay.at_s)}`, end: '' };
   if (replay.silent_s === null) return { kind: 'gap', icon: 'unknown', text: 'No message from the car yet', end: '' };
-  if (replay.silent_s > 1) return { kind: 'gap', icon: 'unknown', text: `Nothing recorded for ${replay.silent_s.toFixed(1)} s`, end: '' };
+  if (replay.silent_s > 1) return { kind: 'gap', icon: 'unknown', text: `Nothing recorded for ${fixed(replay.silent_s)} s`, end: '' };
   const standing = alarms.filter((alarm) => alarm.active && alarm.state !== 'SHELVED').sort((a, b) => RANK[b.priority] - RANK[a.priority] || b.raised_ms - a.raised_ms);
   const worst = standing[0];
   const among = standing.length > 1 ? `${counted(standing.length, 'alarm', 'alarms')}, ${end === 're-evaluated' ? end : 'original'}` : end;

@@ -74,7 +74,7 @@ export class ScanReadout {
   #describe(scan, missing) {
     const { at, store } = this;
     const [canvas, text] = [at('canvas'), at('described')];
-    const key = scan ? 'live' : missing.replace(/[\d.:]+ s/, '');
+    const key = scan ? 'live' : missing.replace(/[\d.,:]+ s/, '');
     if (store.now() - this.#described_ms < DESCRIBE_EVERY_MS && text.dataset['key'] === key) return;
     this.#described_ms = store.now();
     text.dataset['key'] = key;

@@ -6,6 +6,7 @@ import { chipOf } from '../control/control-layout.js';
 import { freshnessStyle } from '../core/freshness.js';
 import { chainOf } from '../core/link.js';
 import { age, duration } from '../core/format.js';
+import { ICONS, RANK } from '../core/priority.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').Cars} Cars
@@ -118,9 +119,7 @@ function rowOf(car, time_ms, lag_s, page) {
   };
 }
 
-const PRIORITY = { critical: 3, warning: 2, advisory: 1 };
 const KIND = /** @type {const} */ ({ critical: 'crit', warning: 'warn', advisory: '' });
-const ICON = /** @type {const} */ ({ critical: 'crit', warning: 'warn', advisory: 'info' });
 
 /**
  * @param {import('../core/protocol-types.js').CarSummary} summary
@@ -139,8 +138,8 @@ function stateOf({ phase, paused, waiting }, worst, for_s) {
   const words = !active ? titleOf(worst) : isAsking ? `${title}, ${age(for_s)} s` : `${title}, acknowledged`;
   const more = waiting > 1 ? ` +${waiting - 1}` : '';
   return {
-    rank: isAsking ? (active ? 60 : 35) + 10 * (PRIORITY[priority] - 1) : 25 + PRIORITY[priority],
-    needs: isAsking && priority !== 'advisory', icon: ICON[priority], kind: KIND[priority], isFilled: isAsking && active, text: `${words}${more}`,
+    rank: isAsking ? (active ? 60 : 35) + 10 * (RANK[priority] - 1) : 25 + RANK[priority],
+    needs: isAsking && priority !== 'advisory', icon: ICONS[priority], kind: KIND[priority], isFilled: isAsking && active, text: `${words}${more}`,
   };
 }
 

@@ -74,7 +74,7 @@ export class FleetActs {
     try {
       const answer = await fetch(`/api/off/${encodeURIComponent(name)}`, { method: act === 'off' ? 'PUT' : 'DELETE', cache: 'no-store', headers: { 'x-catgraph-name': this.store.self.name.replace(/[^ -~]/g, '?') } });
       if (!answer.ok) throw new Error((await answer.json()).detail);
-      if (act === 'off') this.say(`${name} is not shown as lost until it is heard again. Not off takes that back.`, 'Off on purpose');
+      if (act === 'off') this.say(`${name} is not shown as lost until data of it comes again. Not off takes that back.`, 'Off on purpose');
     } catch (error) {
       this.say(error instanceof Error && !(error instanceof TypeError) ? error.message : 'The server does not answer.', 'Not done');
     }

@@ -2,6 +2,7 @@
 
 import { titleOf } from '../alarms/alarm-title.js';
 import { counted, duration, timeOfDay } from '../core/format.js';
+import { ICONS, RANK } from '../core/priority.js';
 import { requestItem, supervisorWords } from './fleet-requests.js';
 import { speedWords } from '../core/units.js';
 
@@ -58,9 +59,7 @@ const FLOOD_S = 600;
 /** So many events are kept. */
 const EVENTS = 20;
 
-const PRIORITY = { critical: 3, warning: 2, advisory: 1 };
 const KIND = /** @type {const} */ ({ critical: 'crit', warning: 'warn', advisory: '' });
-const ICON = /** @type {const} */ ({ critical: 'crit', warning: 'warn', advisory: 'info' });
 const LABELS = /** @type {Record<Act, string>} */ ({
   open: 'Open', take: 'Take it', over: 'Take over', accept: 'Accept', decline: 'Decline', hand: 'Hand over', withdraw: 'Withdraw', release: 'Release', hush: 'Silence', off: 'It is off', on: 'Not off', show: 'Show',
 });
@@ -123,11 +122,11 @@ function itemOf(name, summary, seen) {
   const more = summary.waiting > 1 ? `, ${counted(summary.waiting - 1, 'more alarm')}` : '';
   const said = isCut ? lastWords(summary.speed.value_mps, summary.link.car_age_s ?? summary.link.bridge_age_s, seen) : worst?.text ?? '';
   return {
-    key: name, cars: [name], name, icon: isCut ? 'link-off' : worst ? ICON[worst.priority] : 'info', kind: worst ? KIND[worst.priority] : 'warn',
+    key: name, cars: [name], name, icon: isCut ? 'link-off' : worst ? ICONS[worst.priority] : 'info', kind: worst ? KIND[worst.priority] : 'warn',
     isFilled: Boolean(worst?.active && isAsking), title: worst ? titleOf(worst) : 'Needs a person', detail: `${said}${more}`.replace(/^, /, ''),
     since_s: Math.max(0, (seen.now_ms - since_ms) / 1000),
     who: whoOf(summary, seen.page), next: nextOf(summary, seen.now_ms), timer, keys: keysOf(summary, seen),
-    order: [...stepOf(summary, seen), -(worst ? PRIORITY[worst.priority] : 0), raised_s],
+    order: [...stepOf(summary, seen), -(worst ? RANK[worst.priority] : 0), raised_s],
     cause: worst?.id ?? '', raised_s, isUnassigned,
     sound: isUnassigned && worst?.state === 'UNACKED' ? worst.sound : 'none',
   };
@@ -149,7 +148,7 @@ function lostItem(car, seen) {
   const isLoud = kept?.summary.phase !== 'idle' && !seen.hushed?.has(car.name);
   return {
     key: car.name, cars: [car.name], name: car.name, icon: 'link-off', kind: 'crit', isFilled: true,
-    title: 'Not heard: car may be moving',
+    title: 'No data: car may be moving',
     detail: [lastWords(kept?.summary.speed.value_mps ?? null, since_s, seen), car.trouble].filter(Boolean).join('. '),
     since_s, who: { text: had ? `assigned to ${had}?` : 'not known who has it', is: 'unknown' }, next: 'no timer', timer: null, keys: [key('open', true), ...(isLoud ? [key('hush')] : []), ...(car.trouble ? [key('off')] : [])],
     order: [2, 0, -3, -since_s], cause: ' lost', raised_s: since_s, isUnassigned: false, sound: isLoud ? 'high' : 'none',
@@ -160,7 +159,7 @@ function lostItem(car, seen) {
 function offItem(name, { by, since_ms }, since_s, seen) {
   return {
     key: name, cars: [name], name, icon: 'info', kind: '', isFilled: false, title: 'Off on purpose', detail: lastWords(null, since_s, seen), since_s: Math.max(0, (seen.now_ms - since_ms) / 1000),
-    who: { text: `said by ${by} at ${timeOfDay(since_ms)}`, is: 'other' }, next: 'until it is heard', timer: null, keys: [key('on')],
+    who: { text: `said by ${by} at ${timeOfDay(since_ms)}`, is: 'other' }, next: 'until data comes', timer: null, keys: [key('on')],
     order: [9, 0, 0, 0], cause: '', raised_s: 0, isUnassigned: false, isOff: true, sound: 'none',
   };
 }
@@ -169,7 +168,7 @@ function offItem(name, { by, since_ms }, since_s, seen) {
 function lastWords(value_mps, ago_s, seen) {
   if (ago_s === null) return '';
   const at = timeOfDay(seen.wall_ms - ago_s * 1000);
-  return value_mps === null ? `last heard at ${at}` : `last ${speedWords(value_mps).join(' ')} at ${at}`;
+  return value_mps === null ? `last data at ${at}` : `last ${speedWords(value_mps).join(' ')} at ${at}`;
 }
 
 /**
@@ -290,7 +289,7 @@ function groupOf(of, all, isUnfolded) {
   const show = key('show', isLostCars, isUnfolded ? `Hide ${all.length}` : `Show ${all.length}`);
   const keys = isLostCars ? (loudest(all) === 'none' ? [] : [key('hush', false, 'Silence all')]) : isMine ? [key('release', false, 'Release all')] : free ? [key('take', true, 'Take all'), ...(free === all.length ? [key('hand')] : [])] : [key('over', false, 'Take over all')];
   return {
-    ...first, key: of, cars: names, name: counted(all.length, 'car'), title: isLostCars ? 'Not heard: cars may be moving' : first.title,
+    ...first, key: of, cars: names, name: counted(all.length, 'car'), title: isLostCars ? 'No data: cars may be moving' : first.title,
     detail: rangeOf(names), since_s: Math.max(...all.map(({ since_s }) => since_s ?? 0)), who: { text: who, is: free ? 'nobody' : first.who.is },
     keys: [...keys, show], isUnassigned: free > 0, sound: loudest(all), isFilled: all.some(({ isFilled }) => isFilled),
   };

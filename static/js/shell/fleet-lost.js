@@ -17,7 +17,7 @@ const NAMES = ['Page', 'Server', 'Links', 'Cars'];
 /** @param {LostView} view @returns {import('../core/link.js').ChainView} */
 export function lostChain({ lost, silence_s, cars }) {
   const cut = lost === 'server' ? 0 : 1;
-  const silent = silence_s === Infinity ? 'never heard' : `silent ${age(silence_s)} s`;
+  const silent = silence_s === Infinity ? 'no data yet' : `silent ${age(silence_s)} s`;
   const marks = lost === 'server' ? ['here', silent, 'unknown', 'unknown'] : ['here', 'answers', silent, 'unknown'];
   const nodes = NAMES.map((name, i) => ({ name: i === 3 && cars ? counted(cars, 'car') : name, mark: marks[i] ?? '', isBad: i === cut + 1, isKnown: i <= cut }));
   return { word: 'Lost', age_s: silence_s, cut, since_ms: null, nodes, sentence: '', detail: '' };
@@ -28,7 +28,7 @@ export function lostWords({ lost, heard_ms, cars, unserved }) {
   const since = heard_ms === null ? '' : ` Last data at ${timeOfDay(heard_ms)}.`;
   const what = `Nothing here is known now. ${cars ? `Cars may still be moving, and alarms of ${counted(cars, 'car')} do not arrive here.` : ''}`.trim();
   if (lost === 'server') return [`The server stopped answering.${since} This page dials again.`, what];
-  return [`${unserved || 'The server answers, and has heard of no car: the broker or the way to the cars is lost.'}${since}`, what];
+  return [`${unserved || 'The server answers, but no data of any car arrives: the broker or the way to the cars is lost.'}${since}`, what];
 }
 
 export class LostPanel {
@@ -51,7 +51,7 @@ export class LostPanel {
   draw(view, names, silent) {
     show(this.root, view.lost !== null);
     if (view.lost === null) return;
-    setText(this.title, view.lost === 'server' ? 'Server lost' : 'No car is heard');
+    setText(this.title, view.lost === 'server' ? 'Server lost' : 'No data from any car');
     setText(this.age, view.silence_s === Infinity ? '' : `${age(view.silence_s)} s`);
     drawBigChain(this.chain, lostChain(view));
     const [words, what] = lostWords(view);

@@ -62,7 +62,7 @@ export function carRows(seen, needing, isSilent) {
     const ink = lost ? 'stale' : row.speed.ink;
     const value_mps = row.speed.value_mps ?? kept?.speed.value_mps ?? null;
     const percent = (lost ? kept : car.summary)?.energy_percent ?? null;
-    const text = isSilent ? 'not known now' : isNew ? 'Never heard' : isOff ? 'Off on purpose' : lost ? 'Not heard' : row.worst ? row.text.replace(/, ([\d:.]+ s|acknowledged)(?=$| \+)/, '') : row.icon === 'ok' ? '–' : row.text.replace(/:.*/, '');
+    const text = isSilent ? 'not known now' : isNew ? 'No data yet' : isOff ? 'Off on purpose' : lost ? 'No data' : row.worst ? row.text.replace(/, ([\d:.,]+ s|acknowledged)(?=$| \+)/, '') : row.icon === 'ok' ? '–' : row.text.replace(/:.*/, '');
     const was = kept ? kept.holder : '';
     return {
       key: row.name, name: row.name, cars: [row.name],
@@ -147,7 +147,7 @@ export function lineOf(items, shown, flood, rows) {
 
 /** @param {number | null} heard_ms @param {boolean} isServer the server itself is silent @returns {Line} */
 export function lostLine(heard_ms, isServer) {
-  return { kind: 'crit', icon: 'link-off', text: isServer ? 'Server lost' : 'No car is heard', end: heard_ms === null ? '' : `since ${timeOfDay(heard_ms)}`, more: '', isFilled: true };
+  return { kind: 'crit', icon: 'link-off', text: isServer ? 'Server lost' : 'No data from any car', end: heard_ms === null ? '' : `since ${timeOfDay(heard_ms)}`, more: '', isFilled: true };
 }
 
 /** How many cars fit on a page of rows. @param {number} count of cars @param {number} height_px for rows, pager and what is below @param {number} row_px @param {number} below_px least of what is below */
@@ -166,7 +166,7 @@ export function placesOf(rows) {
   const labels = labelsOf(sorted.map(({ name }) => name));
   return sorted.map((row, i) => {
     const kind = row.isLost || (row.isAsking && row.icon === 'link-off') ? 'lost' : row.isAsking ? row.kind : '';
-    const state = row.isLost ? 'not heard' : row.text === '–' ? row.mode : row.text;
+    const state = row.isLost ? 'no data' : row.text === '–' ? row.mode : row.text;
     return { name: row.name, label: labels[i] ?? row.name, kind, isDriving: row.mode === 'driving', says: `${row.name}, ${state}` };
   });
 }

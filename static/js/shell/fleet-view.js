@@ -17,7 +17,7 @@ import { age, timeOfDay } from '../core/format.js';
  * @typedef {import('./fleet-rows-layout.js').Row} Row
  */
 
-const NONE = 'No car is listed yet. A car is listed here once this server is started with it (--vehicle NAME=ws://ADDRESS), or once its agent is heard at the broker.';
+const NONE = 'No car is listed yet. A car is listed here once this server is started with it (--vehicle NAME=ws://ADDRESS), or once its agent has connected to the broker.';
 /** Two columns and pages; else everything is in one column that scrolls. */
 const WIDE = '(width >= 47.5em) and (height >= 35em)';
 const DESK = '(width >= 75em)';

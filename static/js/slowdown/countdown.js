@@ -1,5 +1,6 @@
 // The banner of a slow-down that starts automatically: over everything, with a key that vetoes it.
 
+import { fixed } from '../core/format.js';
 import { field, listen, need, setText, setWords, show } from '../core/dom.js';
 import { Meant } from '../core/meant.js';
 import { countdownOf, nameOf } from './slow-layout.js';
@@ -43,7 +44,7 @@ export class Countdown {
     }
     setWords(at('title'), coming.title);
     setWords(at('text'), coming.text);
-    setText(at('left'), coming.left_s.toFixed(1));
+    setText(at('left'), fixed(coming.left_s));
     at('bar').style.transform = `scaleX(${Math.min(1, coming.left_s / Math.max(0.1, this.#from_s)).toFixed(3)})`;
     this.veto.dataset['trigger'] = coming.trigger;
     this.veto.dataset['vehicle'] = store.vehicle;

@@ -262,11 +262,11 @@ function rivalsOf(rivals) {
  * @returns {{tag: string, kind: 'plain' | 'warn' | 'unk', cost: string}}
  */
 export function connectRow(now, isMonitoring) {
-  if (!isMonitoring || !now) return { tag: 'Off', kind: 'unk', cost: 'can be armed on Home once connected' };
+  if (!isMonitoring || !now) return { tag: 'Not armed', kind: 'unk', cost: 'can be armed on Home once connected' };
   const { text } = guardWords(now.guard);
   if (orderOf(now)) return { tag: 'Slowing', kind: 'warn', cost: 'the car is being slowed now' };
   if (now.state === 'armed') return { tag: 'Armed', kind: 'plain', cost: text };
-  if (now.state === 'not_armed') return { tag: 'Off', kind: 'unk', cost: `can be armed on Home. ${text}` };
+  if (now.state === 'not_armed') return { tag: 'Not armed', kind: 'unk', cost: `can be armed on Home. ${text}` };
   return { tag: 'Not available', kind: 'unk', cost: bare(now.why ?? 'not available') };
 }
 

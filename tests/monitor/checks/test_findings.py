@@ -71,7 +71,7 @@ MORE: dict[str, dict[str, Snapshot]] = {
         "stands": with_more(known(speed=STANDS), reach=ReachFacts(can=0, of=2, why="sound off")),
         "not monitored": known(),
         "old speed": with_more(known(age_s=2.0, speed=DRIVES), reach=ReachFacts()),
-        "reversing": with_more(known(speed=Twist(speed_mps=-3.0)), reach=ReachFacts(can=0, of=1, why="not heard")),
+        "reversing": with_more(known(speed=Twist(speed_mps=-3.0)), reach=ReachFacts(can=0, of=1, why="no contact")),
     },
     "slow_down_unconfirmed": {
         "not sent": slowed(0.0, sending_s=None),

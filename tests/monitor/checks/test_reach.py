@@ -16,7 +16,7 @@ from monitor.values import Twist
 from tests.monitor.checks.known import ask, check_of, known
 
 OK, FAULT, UNKNOWN = Verdict.OK, Verdict.FAULT, Verdict.UNKNOWN
-DEAF = ReachFacts(can=0, of=3, why="2 × sound off, not heard")
+DEAF = ReachFacts(can=0, of=3, why="2 × sound off, no contact")
 ALONE = ReachFacts()
 HEARD = ReachFacts(can=2, of=3, why="sound off")
 

@@ -201,7 +201,7 @@ async def test_a_link_outlives_its_broker(tmp_path: Path) -> None:
             for _ in range(2):
                 await broker.start()
                 await until(lambda: node.trouble("ocelot") is None)
-                assert node.trouble("margay") == "The agent of margay was not heard since the server started."
+                assert node.trouble("margay") == "The agent of margay has sent nothing since the server started."
                 await asks(lambda: node)
                 await broker.kill()
                 await until(lambda: node.trouble("ocelot"))

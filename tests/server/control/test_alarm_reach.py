@@ -56,7 +56,7 @@ def test_two_of_three_operators() -> None:
     reach.hear(one("Cem"), replace(READY, sound="refused"), 0.0)
     assert reach.facts(1.0) == ReachFacts(can=2, of=3, why="sound off")
     reach.hear(one("Cem"), READY, 2.0)
-    assert reach.facts(3.5) == ReachFacts(can=1, of=3, why="2 × not heard")
+    assert reach.facts(3.5) == ReachFacts(can=1, of=3, why="2 × no contact")
 
 
 def test_two_pages_of_one_device_are_one_operator_who_hears_by_either() -> None:
@@ -75,7 +75,7 @@ def test_who_sleeps_counts_for_five_minutes_and_who_leaves_does_not() -> None:
     reach.hear(one("Ann"), READY, 0.0)
     reach.hear(one("Ben"), READY, 0.0)
     reach.leave(one("Ben"))
-    assert reach.facts(FORGOTTEN_S) == ReachFacts(can=0, of=1, why="not heard")
+    assert reach.facts(FORGOTTEN_S) == ReachFacts(can=0, of=1, why="no contact")
     assert reach.facts(FORGOTTEN_S + 0.1).of == 0
 
 

@@ -66,7 +66,7 @@ def test_only_the_taker_reads_back(offered: Handover) -> None:
             offered.read(by, SPEED.key, True, LINES)
         with pytest.raises(Refused):
             offered.accept(by, version_of([]), [])
-    with pytest.raises(NotReadBack, match="does not stand any more"):
+    with pytest.raises(NotReadBack, match="no longer applies"):
         offered.read(BEN, "alarm:gone:1", True, LINES)
     with pytest.raises(Refused):
         offered.end(CEM)

@@ -128,7 +128,7 @@ async def test_a_page_that_is_closed_is_not_waited_for_and_one_that_breaks_off_i
             await ann.state(lambda s: s["reach"]["of"] == 2)
             cem.socket.transport.abort()
             state = await ann.state(lambda s: s["reach"]["can"] == 1)
-            assert (state["reach"]["of"], state["reach"]["why"]) == (2, "not heard")
+            assert (state["reach"]["of"], state["reach"]["why"]) == (2, "no contact")
 
 
 @pytest.mark.virtual_time

@@ -17,6 +17,7 @@ from monitor.catalog import AllLimits
 from monitor.drive_trends import MOST_SPANS, DriveTrends
 from server.protocol.drive_trends import MOST_BUCKETS, DriveFacts, DriveTrendsAnswer, Wanted, answer, of_sketch
 from tests.frames import check_shape
+from tests.monitor.test_alarm import SPEC
 
 EIGHT_HOURS_S = 8 * 3600.0
 FOUR = ("speed", "distance", "brake", "steering")
@@ -97,8 +98,9 @@ def test_the_marks_of_a_drive_are_bounded_and_the_urgent_are_kept() -> None:
         AlarmMark(at_s=i, alarm="x", title="X", priority=Priority.ADVISORY if i % 2 else Priority.CRITICAL)
         for i in range(MOST_MARKS)
     ]
-    one = Transition(alarm_id="speed_limit", occurrence=1, change="raised", at_s=1e6, text="", announces=True)
-    marks.add(replace(one, alarm_id="of no check"), 1e6)
+    one = Transition(
+        alarm_id="speed_limit", spec=SPEC, occurrence=1, change="raised", at_s=1e6, text="", announces=True
+    )
     marks.add(replace(one, announces=False), 1e6)
     assert marks.left_out == 0
     marks.add(one, 1e6)

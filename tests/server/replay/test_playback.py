@@ -19,6 +19,7 @@ from server.replay.alarm_history import AlarmHistory
 from server.replay.manager import summary
 from server.replay.playback import RATES, WARM_UP_S, Playback
 from tests.frames import check_shape
+from tests.monitor.test_alarm import SPEC
 from tests.page import drives
 from tests.page.canned import live
 
@@ -355,7 +356,7 @@ def test_a_history_that_is_too_long_is_not_shown_as_whole(monkeypatch: pytest.Mo
     monkeypatch.setattr(alarm_history, "MOST", 2)
     history = AlarmHistory()
     for at_s in (1.0, 2.0, 3.0):
-        history.add(Transition(alarm_id="a", occurrence=1, change="raised", at_s=at_s, text=""), at_s)
+        history.add(Transition(alarm_id="a", spec=SPEC, occurrence=1, change="raised", at_s=at_s, text=""), at_s)
     assert [one.at_s for one in history.until("a", 2.9) or ()] == [1.0, 2.0]
     assert (history.until("a", 3.0), history.until("b", 2.0)) == (None, [])
 

@@ -30,11 +30,11 @@ def bus() -> LocalBus:
     return LocalBus(Journal(None), now=lambda: 0.0)
 
 
-def keep(one: LocalBus, transitions: list[Transition], spec: AlarmSpec, *, clock_s: float = 0.0) -> None:
+def keep(one: LocalBus, transitions: list[Transition], *, clock_s: float = 0.0) -> None:
     """As a session writes them, whose clock read `clock_s` at WALL_MS."""
     for transition in transitions:
         at_ms = WALL_MS + round((transition.at_s - clock_s) * 1000)
-        event = serialize.event(transition, spec, at_ms, now_s=transition.at_s, settings_version=3)
+        event = serialize.event(transition, at_ms, now_s=transition.at_s, settings_version=3)
         one.append("car", [orjson.loads(orjson.dumps(event))])
 
 
@@ -60,7 +60,7 @@ def test_a_life_written_and_read_again_is_the_same(
             continue
         transitions += list(happened)
     one = bus()
-    keep(one, transitions, spec)
+    keep(one, transitions)
     past = read(one, now_s=boot_s, after_s=now_s)
     again = restore({"hot": Alarm(id="hot", spec=spec)}, past.transitions)["hot"]
     shift_s = boot_s - now_s
@@ -86,7 +86,7 @@ def test_the_values_at_the_trip_come_through_the_log() -> None:
     )
     _, transitions = lived(trip, spec=LATCH)
     one = bus()
-    keep(one, transitions, LATCH)
+    keep(one, transitions)
     found = read(one).transitions[0].finding
     assert found is not None
     assert (found.measured, found.limit, found.causes, found.level) == (trip.measured, trip.limit, ("x",), 2)
@@ -138,32 +138,24 @@ def test_a_pause_that_outlasted_a_restart_is_counted_from_its_beginning() -> Non
 def test_a_shelf_goes_on_by_the_time_of_day(outage_s: float, left_s: float) -> None:
     transitions = [
         Transition(
-            alarm_id="hot", occurrence=1, change="shelved", at_s=0.0, text="", by="Ann", shelved_until_s=300.0,
-            state=lived(fault("bad"), spec=LATCH)[0].state,
+            alarm_id="hot", spec=LATCH, occurrence=1, change="shelved", at_s=0.0, text="", by="Ann",
+            shelved_until_s=300.0, state=lived(fault("bad"), spec=LATCH)[0].state,
         )
     ]  # fmt: skip
     one = bus()
-    keep(one, transitions, LATCH)
+    keep(one, transitions)
     assert read(one, now_s=7.0, after_s=outage_s).transitions[0].shelved_until_s == pytest.approx(7.0 + left_s)
 
 
 def test_nothing_of_the_past_lies_in_the_future() -> None:
     _, transitions = lived(fault("bad"), spec=LATCH)
     one = bus()
-    keep(one, transitions, LATCH)
+    keep(one, transitions)
     assert read(one, now_s=7.0, after_s=-3600.0).transitions[0].at_s == 7.0
 
 
-@pytest.mark.parametrize(
-    "event",
-    [
-        {"change": "raised"},  # older than the word for where an alarm is active
-        {"change": "raised", "state": "NO SUCH"},
-        {"change": "exploded", "state": "UNACKED"},
-        {"change": "raised", "state": None, "occurrence": "x", "causes": 7},
-    ],
-)
-def test_what_cannot_be_read_is_passed_over(event: dict[str, Any]) -> None:
+@pytest.mark.parametrize("event", [{"change": 7}, {"change": None}])
+def test_what_has_no_change_is_passed_over(event: dict[str, Any]) -> None:
     one = bus()
     one.append("car", [{"at_ms": WALL_MS, "alarm": "hot", **event}])
     past = read(one)

@@ -33,9 +33,9 @@ async def test_two_rooms_one_car_and_each_part_that_is_lost_is_named(bridge: Ros
             operator(north, "Ann") as ann,
             operator(south, "Ben") as ben,
         ):
-            await ann.until(lambda: trouble(ann) == ["The agent of ocelot was not heard since the server started."])
+            await ann.until(lambda: trouble(ann) == ["The agent of ocelot has sent nothing since the server started."])
             gone = await ann.ask(kind="take_item", vehicle="ocelot")
-            assert gone["reason"] == "Not delivered: the agent of ocelot was not heard since the server started."
+            assert gone["reason"] == "Not delivered: the agent of ocelot has sent nothing since the server started."
             async with serving(agent):
                 await ann.until(lambda: (item(ann, "ocelot") or {}).get("escalates_ms"), SOON_S)
                 assert trouble(ann) == [None]

@@ -116,7 +116,7 @@ async def test_a_node_answers_as_the_agent_does_and_names_who_does_not_answer(tm
         lost = await room.get("/agents/margay/api/recordings")
         assert (lost.status_code, lost.json()["detail"]) == (
             503,
-            "The agent of margay was not heard since the server started.",
+            "The agent of margay has sent nothing since the server started.",
         )
         await one.stop_agent()
         gone = await room.get("/agents/ocelot/api/recordings")
@@ -200,7 +200,7 @@ async def test_a_car_that_is_off_on_purpose_is_not_lost_until_it_is_heard(tmp_pa
         await until(is_heard)
         found = await health()
         assert found["status"] == "cars lost"
-        assert found["lost"] == {"margay": "The agent of margay was not heard since the server started."}
+        assert found["lost"] == {"margay": "The agent of margay has sent nothing since the server started."}
         ann = {"x-catgraph-name": "Ann"}
         assert (await one.room.put("/api/off/ocelot", headers=ann)).status_code == 409, "it is heard"
         assert (await one.room.put("/api/off/nobody", headers=ann)).status_code == 404

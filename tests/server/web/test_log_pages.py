@@ -66,3 +66,16 @@ async def test_page_by_page_every_event_that_fits_comes_once(
         pytest.fail("it never ends")
     assert seen == sorted(set(seen), reverse=True)
     assert len(seen) == count
+
+
+@pytest.mark.parametrize(
+    ("about", "is_critical"),
+    [
+        ({"alarm": "x", "priority": "extreme"}, True),  # of another version
+        ({"alarm": "x"}, True),
+        ({"alarm": "x", "priority": "advisory"}, False),
+        ({"alarm": None}, False),
+    ],
+)
+def test_a_priority_that_is_not_known_is_found_among_the_most_urgent(about: dict[str, Any], is_critical: bool) -> None:
+    assert Which(priority="critical").has({"at_ms": 1, "change": "raised", **about}) is is_critical

@@ -197,7 +197,7 @@ def test_nonsense_in_a_log_is_left_out(tmp_path: Path) -> None:
     log = log_of(recorded(tmp_path, nonsense))
     assert (log.marks, log.slow_downs, log.people) == ([], [], [])
     assert [(one.speed_mps, one.initiated_by, one.active) for one in log.interventions] == [(None, "unknown", ("a",))]
-    assert [(one.priority, one.component) for one in log.alarms] == [("advisory", "Other")]
+    assert [(one.priority, one.component) for one in log.alarms] == [("critical", "Other")]
     assert (log.departure.state, log.departure.done) == ("open", 0)
 
 
