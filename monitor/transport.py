@@ -24,11 +24,13 @@ from collections.abc import Iterator
 from monitor.car_clock import CarClock, StampedDelay
 
 WINDOW_S = 3.0  # round trips are compared over so long, or over two of the longest
+SHUT_BYTES = 16_384  # a system takes at least so much for a connection (tcp_wmem) before it takes nothing
 JITTER_S = 0.05  # round trips that differ by less do not come from a connection that takes nothing
 EXACT_WITHIN_S = 0.12  # a bound by the queue that costs no more than this is taken as it is
-TRIM_S = 0.18  # the bound is at most so much too high where the link is healthy; stamps take no more off it
+TRIM_S = 0.15  # the bound is at most so much too high where the link is healthy; stamps take no more off it
 OLDER_S = 0.5  # the first message of a topic that is so much older by its stamp was kept for us
 OLDEST_S = 30 * 86_400.0  # a stamp that is further behind is of another clock
+PLACE_PERIODS = 2.0  # a mean of a burst is too short
 KEPT_S = 10.0  # the offset of a clock is the least of the last one to two of these: ±200 ppm are 4 ms
 RECENT_S = 3.0  # a topic that was silent for longer says nothing of the link now …
 FAST_S = 0.5  # … nor does one that comes less often than this, where others come more often
@@ -130,34 +132,46 @@ class TransportDelay:
         for topic in self._topics.values():
             topic.restart()
         self.clock = CarClock()
-        self._unanswered: deque[float] = deque(maxlen=MOST_UNANSWERED)
-        self._trips: deque[tuple[float, float]] = deque()  # (answered, round trip)
+        self._took_bytes = 0
+        self._unanswered: deque[tuple[float, int]] = deque(maxlen=MOST_UNANSWERED)  # (sent, bytes that had come)
+        self._trips: deque[tuple[float, float, bool]] = deque()  # (answered, round trip, the connection may be shut)
         self._answers: deque[tuple[float, float]] = deque(maxlen=MOST_UNANSWERED)  # (sent, answered)
         self._trip_s = self._least_trip_s = self._longest_trip_s = 0.0
+        self._longest_shut_s = self._mark_shut_s = 0.0  # of the trips in which the connection may have taken nothing
         self._is_measured = False
         self._usual_trip_s = self._usual_before_s = float("inf")
         self._usual_since_s = at_s
 
     def sent(self, at_s: float) -> None:
         """A ping was sent."""
-        self._unanswered.append(at_s)
+        self._unanswered.append((at_s, self._took_bytes))
+
+    def took(self, size: int) -> None:
+        """So many bytes came."""
+        self._took_bytes += size
 
     def answered(self, sent_s: float, at_s: float) -> None:
         """The answer to a ping came."""
         if sent_s < self._mark_s or at_s < sent_s:
             return
         self._mark_s, self._is_measured = sent_s, True
-        while self._unanswered and self._unanswered[0] <= sent_s:
-            self._unanswered.popleft()
+        before = 0
+        while self._unanswered and self._unanswered[0][0] <= sent_s:
+            _, before = self._unanswered.popleft()
         self._answers.append((sent_s, at_s))
         trip_s = self._trip_s = at_s - sent_s
         trips = self._trips
-        trips.append((at_s, trip_s))
+        # What waited before the answer came after the ping was sent. Who reports no bytes may have been shut.
+        trips.append((at_s, trip_s, not self._took_bytes or self._took_bytes - before >= SHUT_BYTES))
         since_s = at_s - max(WINDOW_S, 2.0 * max(self._longest_trip_s, trip_s))
         while trips[0][0] < since_s:
             trips.popleft()
-        self._least_trip_s = min(trip for _, trip in trips)
-        self._longest_trip_s = max(trip for _, trip in trips)
+        self._least_trip_s = min(trip for _, trip, _ in trips)
+        self._longest_trip_s = max(trip for _, trip, _ in trips)
+        self._longest_shut_s = max((trip for _, trip, is_shut in trips if is_shut), default=0.0)
+        self._mark_shut_s = max(
+            (trip for answered_s, trip, is_shut in trips if is_shut and answered_s >= sent_s), default=0.0
+        )
         if at_s - self._usual_since_s > USUAL_S:
             self._usual_since_s, self._usual_before_s, self._usual_trip_s = at_s, self._usual_trip_s, float("inf")
         self._usual_trip_s = min(self._usual_trip_s, trip_s)
@@ -250,9 +264,17 @@ class TransportDelay:
             return queued_s
         # The connection takes nothing until it is empty; so long the answer of a ping waits too. Each time it takes
         # something again, at least one message of each topic goes.
+        shut_s = places * self._shut_s(self._longest_shut_s, at_s)
+        if topic.queue_length == 1 and topic.period_s is not None:
+            # A longer queue may hold what came before several shuts. One place holds the newest: it came a
+            # period before what was in the hand was taken; and a shut that ended before the mark was over by then.
+            shut_s = min(shut_s, self._shut_s(self._mark_shut_s, at_s) + PLACE_PERIODS * topic.period_s)
+        return min(queued_s, since_mark_s + shut_s + topic.held_s)
+
+    def _shut_s(self, trip_s: float, at_s: float) -> float:
+        """How long the connection took nothing, by the longest round trip of that time."""
         is_settled = at_s - self._opened_s > WINDOW_S + 2.0 * self._longest_trip_s
-        shut_s = max(0.0, self._longest_trip_s - (self._least_trip_s if is_settled else 0.0) - JITTER_S)
-        return min(queued_s, since_mark_s + places * shut_s + topic.held_s)
+        return max(0.0, trip_s - (self._least_trip_s if is_settled else 0.0) - JITTER_S)
 
     def _excess_s(self, at_s: float) -> float:
         """How much later the stamped neighbours are than the pings indicate: all of them, and more than one."""
@@ -287,9 +309,14 @@ class TransportDelay:
         """How much of that is because more is asked of the link than it carries."""
         return max(0.0, self.late_s(now_s) - min(self._usual_trip_s, self._usual_before_s, USUAL_AT_MOST_S))
 
+    @property
+    def trip_s(self) -> float:
+        """The longest of the last round trips."""
+        return self._longest_trip_s
+
     def waiting_s(self, now_s: float) -> float:
         """Since the oldest ping was sent that is not answered yet."""
-        return now_s - self._unanswered[0] if self._unanswered else 0.0
+        return now_s - self._unanswered[0][0] if self._unanswered else 0.0
 
     def answer_s(self, now_s: float) -> float:
         """The most that the answer to something sent takes now, by all that is known."""

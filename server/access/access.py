@@ -6,6 +6,7 @@ import asyncio
 import ipaddress
 import logging
 from collections.abc import Callable, Coroutine, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -274,6 +275,10 @@ class Access:
     def ticket(self, who: Principal) -> str:
         """A ticket for one socket of `who`, within 5 s."""
         return self._tickets.new(who.id, now_s=self._now())
+
+    def next_ticket(self, who: Principal) -> AbstractContextManager[str | None]:
+        """A ticket for the socket after the one that is served meanwhile; None: none is needed."""
+        return nullcontext() if self.is_open else self._tickets.beside_socket(who.id, now=self._now)
 
     def use_ticket(self, ticket: str, who: Principal) -> bool:
         """Whether `who` may open a socket with it; it is used up."""

@@ -36,6 +36,7 @@ class ServerHello(TypedDict):
     kind: Literal["hello"]
     version: str
     boot: Annotated[str, doc("another one: another run of the server; numbers of events are of a run")]
+    run: Annotated[str, doc("of the server that the page reached; times of another one may be of another clock")]
     vehicle: str
     vehicles: list[str]
     build: Annotated[str, doc('of the page that the server has now; "" for single modules')]
@@ -48,6 +49,9 @@ class ServerHello(TypedDict):
 
 class Hello(ServerHello):
     who: Identity
+    ticket: NotRequired[
+        Annotated[str, doc("for the next socket of this device, until 10 minutes after the end of this one")]
+    ]
 
 
 class Offer(TypedDict):
@@ -56,6 +60,7 @@ class Offer(TypedDict):
     kind: Literal["offer"]
     seq: int
     of: list[FrameKind]
+    time_ms: Annotated[int, doc("when it was sent, after the page's last take was received")]
 
 
 class Resumed(TypedDict):

@@ -185,9 +185,11 @@ class RosLink:
 
     # -- from the protocol -------------------------------------------------------------------------------------------
 
-    def received(self, socket: BridgeProtocol) -> None:
+    def received(self, socket: BridgeProtocol, size: int) -> None:
         if socket is self._socket:
             self.heard_s = self._now()
+            if self._marks is not None:
+                self._marks.took(size)
 
     def opened(self, socket: BridgeProtocol) -> None:
         if self._stopped or self._socket is not None:

@@ -38,7 +38,7 @@ MAX_MARKS = 600
 class SocketOwner(Protocol):
     """Who acts on what happens to a socket; every method returns at once."""
 
-    def received(self, socket: BridgeProtocol) -> None: ...
+    def received(self, socket: BridgeProtocol, size: int) -> None: ...
     def opened(self, socket: BridgeProtocol) -> None: ...
     def closed(self, socket: BridgeProtocol) -> None: ...
     def send_mark(self, socket: BridgeProtocol) -> None: ...
@@ -68,7 +68,7 @@ class BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
 
     def data_received(self, data: bytes) -> None:
         self.heard_s = self.factory.loop.time()
-        self.factory.owner.received(self)
+        self.factory.owner.received(self, len(data))
         super().data_received(data)
 
     def _dataReceived(self, data: bytes) -> None:

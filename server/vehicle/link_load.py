@@ -12,9 +12,12 @@ STEEP_ABOVE_S = 1.5  # later than this, the least at once
 STEP_EVERY_S = 1.0  # what was taken away needs so long to show
 FALLING_S = 0.1  # lateness that falls by so much in that time needs no more
 RESTORE_BELOW_S = 0.35
-RESTORE_AFTER_S = 15.0  # in time for so long: one step back
+RESTORE_AFTER_S = 1.0  # in time for so long: one step back
 PATIENCE_AT_MOST_S = 300.0
 RELAPSE_WITHIN_S = 15.0  # late again so soon after a step back: the next one waits twice as long
+TRIED_S = 3.0  # so long after a step back the least lateness is enough to take it again
+CHANGED_BY = 0.5  # a round trip that is shorter than so much of that at the last step back is of another link …
+SETTLED_S = 3.5  # … once what waited before does not count any more (`monitor.transport.WINDOW_S`)
 SETTLE_S = 6.0  # rates are measured over 5 s
 
 SCANS = frozenset({"scan"})
@@ -65,6 +68,7 @@ class LinkLoad:
         self._looked_s: float | None = None
         self._in_time_since_s: float | None = None
         self._restored_s: float | None = None
+        self._restored_trip_s = 0.0  # the round trip when the last step back was made
         self._patience_s = RESTORE_AFTER_S
         self._judged_since_s: dict[str, float] = {}
 
@@ -72,29 +76,43 @@ class LinkLoad:
     def level(self) -> Level:
         return LEVELS[self.step]
 
-    def look(self, late_s: float, now_s: float) -> bool:
-        """`late_s`: of what comes, beyond what the link needs when nothing waits. True where the step changed."""
+    def look(self, late_s: float, now_s: float, trip_s: float = 0.0) -> bool:
+        """`late_s`: of what comes, beyond what the link needs when nothing waits; `trip_s`: the longest of the last
+        round trips. True where the step changed."""
         before = self.step
-        if late_s <= STEP_ABOVE_S:
+        is_tried = self._restored_s is not None and now_s - self._restored_s <= TRIED_S
+        is_late = late_s > (RESTORE_BELOW_S if is_tried else STEP_ABOVE_S)
+        if not is_late:
             self._late_since_s = None
-        if late_s > STEP_ABOVE_S:
+        if is_late:
             self._in_time_since_s = None
             if self._late_since_s is None:
                 self._late_since_s = now_s
             if now_s - self._late_since_s >= LASTING_S:
-                self._more_late(late_s, now_s)
+                self._more_late(late_s, now_s, is_tried)
         elif late_s > RESTORE_BELOW_S:
             self._in_time_since_s = None
         elif self._in_time_since_s is None:
             self._in_time_since_s = now_s
-        elif self.step and now_s - self._in_time_since_s >= self._patience_s:
-            self.step -= 1
-            self._restored_s = self._in_time_since_s = now_s
+        elif self.step:
+            self._less_late(now_s - self._in_time_since_s, now_s, trip_s)
         return self.step != before
 
-    def _more_late(self, late_s: float, now_s: float) -> None:
+    def _less_late(self, in_time_s: float, now_s: float, trip_s: float) -> None:
+        is_settled = in_time_s >= SETTLED_S
+        if is_settled and trip_s < CHANGED_BY * self._restored_trip_s:
+            self._patience_s = RESTORE_AFTER_S
+        if in_time_s >= self._patience_s:
+            self.step -= 1
+            self._restored_s = self._in_time_since_s = now_s
+            if is_settled:
+                self._restored_trip_s = trip_s
+
+    def _more_late(self, late_s: float, now_s: float, is_tried: bool) -> None:
         top = len(LEVELS) - 1
-        if self._looked_s is None or now_s - self._looked_s >= STEP_EVERY_S:
+        if is_tried:
+            self._looked_s, self._late_before_s, is_falling = now_s, late_s, False
+        elif self._looked_s is None or now_s - self._looked_s >= STEP_EVERY_S:
             is_falling = self._looked_s is not None and late_s < self._late_before_s - FALLING_S
             self._looked_s, self._late_before_s = now_s, late_s
         else:

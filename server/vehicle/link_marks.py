@@ -18,6 +18,9 @@ class LinkMarks:
     def open(self, at_s: float) -> None:
         self._delay.open(at_s)
 
+    def took(self, size: int) -> None:
+        self._delay.took(size)
+
     def sent(self, at_s: float) -> None:
         self._delay.sent(at_s)
 

@@ -34,6 +34,7 @@ class FleetPage:
         principal: Principal,
         limits: Limits,
         now: Callable[[], float],
+        wall_ms: Callable[[], int],
         wakeup: FairWakeup,
         cars: CarsBoard,
         events: FleetLog,
@@ -45,7 +46,7 @@ class FleetPage:
         self._cars = cars
         self._people = people
         self._events = events
-        self._writer = FleetWriter(socket, bus, events, wakeup)
+        self._writer = FleetWriter(socket, bus, events, wakeup, wall_ms=wall_ms)
         self._inbox = PageInbox(limits, now=now, send=self._writer.queue)
         self._commands = FleetCommands(
             bus,

@@ -19,10 +19,19 @@ from server.web.page_writer import MAX_REPLIES
 
 
 class FleetWriter:
-    """Of one page; `wakeup` is shared by all pages."""
+    """Of one page; `wakeup` is shared by all pages, `wall_ms` is the time of day."""
 
-    def __init__(self, socket: WebSocket, bus: PageBus, events: FleetLog, wakeup: FairWakeup) -> None:
+    def __init__(
+        self,
+        socket: WebSocket,
+        bus: PageBus,
+        events: FleetLog,
+        wakeup: FairWakeup,
+        *,
+        wall_ms: Callable[[], int],
+    ) -> None:
         self._socket = socket
+        self._wall_ms = wall_ms
         self._bus = bus
         self._events = events
         self._wakeup = wakeup
@@ -87,7 +96,7 @@ class FleetWriter:
         elif not self._is_offered and frame is not None and frame.number > self._sent:
             self._seq += 1
             self._is_offered = True
-            await self._send({"kind": "offer", "seq": self._seq, "of": ["cars"]})
+            await self._send({"kind": "offer", "seq": self._seq, "of": ["cars"], "time_ms": self._wall_ms()})
 
     async def _send_events(self) -> None:
         number, events = self._events.after(self._events.begins_after if self._event is None else self._event)

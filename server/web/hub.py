@@ -45,6 +45,7 @@ class Hub:
         self._bus = bus
         self._limits = limits
         self._now = now
+        self._wall_ms = wall_ms
         self._replays = replays
         self._server = server
         self._pages: set[Page | FleetPage] = set()
@@ -85,6 +86,7 @@ class Hub:
                 server=self._server,
                 limits=self._limits,
                 now=self._now,
+                wall_ms=self._wall_ms,
                 wakeup=self._wakeup,
                 cars=self._cars,
                 replay=replay,
@@ -102,6 +104,7 @@ class Hub:
                 principal=principal,
                 limits=self._limits,
                 now=self._now,
+                wall_ms=self._wall_ms,
                 wakeup=self._wakeup,
                 cars=self._cars,
                 events=self._fleet_log,

@@ -41,6 +41,7 @@ class Page:
         server: Callable[[], ServerState],
         limits: Limits,
         now: Callable[[], float],
+        wall_ms: Callable[[], int],
         wakeup: FairWakeup,
         cars: CarsBoard,
         replay: replay_commands.OpenReplay | None = None,
@@ -62,7 +63,7 @@ class Page:
             on_new=lambda kind: self._writer.on_replay(kind),
             on_turned=lambda: self._writer.on_turned(),
         )
-        self._writer = PageWriter(socket, bus, vehicle, view, wakeup, now=now)
+        self._writer = PageWriter(socket, bus, vehicle, view, wakeup, now=now, wall_ms=wall_ms)
         self._inbox = PageInbox(limits, now=now, send=self._writer.queue)
         self._commands = PageCommands(
             bus,

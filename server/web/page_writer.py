@@ -33,7 +33,7 @@ MAX_REPLIES = 200  # waiting for a page that does not read
 
 
 class PageWriter:
-    """Of one page. `now` is a monotonic clock in seconds; `wakeup` is shared by all pages."""
+    """Of one page. `now` is a monotonic clock [s], `wall_ms` the time of day; `wakeup` is shared by all pages."""
 
     def __init__(
         self,
@@ -44,6 +44,7 @@ class PageWriter:
         wakeup: FairWakeup,
         *,
         now: Callable[[], float],
+        wall_ms: Callable[[], int],
     ) -> None:
         self._socket = socket
         self._bus = bus
@@ -51,6 +52,7 @@ class PageWriter:
         self._view = view
         self._wakeup = wakeup
         self._now = now
+        self._wall_ms = wall_ms
         self._since_s = now()
         self._wake = asyncio.Event()
         self._sent: dict[FrameKind, int] = dict.fromkeys(view.kinds, 0)  # the newest frame of each kind
@@ -252,7 +254,7 @@ class PageWriter:
         self._seq += 1
         self._is_offered = True
         self._offered_s = self._now()
-        await self._send({"kind": "offer", "seq": self._seq, "of": fresh})
+        await self._send({"kind": "offer", "seq": self._seq, "of": fresh, "time_ms": self._wall_ms()})
 
     def _offer_is_due(self) -> None:
         self._offering = None

@@ -164,6 +164,7 @@ class Services:
             "kind": "hello",
             "version": self.version,
             "boot": self.bus.run(vehicle) or self.boot,
+            "run": self.boot,
             "vehicle": vehicle,
             "vehicles": list(self.vehicles),
             "build": self.build,

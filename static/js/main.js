@@ -114,11 +114,7 @@ async function begin() {
     page.shown();
     void unfold(page);
   };
-  page.front = () => {
-    queueMicrotask(() => {
-      for (const content of contents) content.look();
-    });
-  };
+  page.front = () => queueMicrotask(() => contents.forEach((content) => content.look()));
   listenEverywhere(page, arming);
   followLink(page.store, page.say);
   page.draw();
@@ -153,7 +149,7 @@ class Page {
     const address = () => `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${store.vehicle ? `?vehicle=${encodeURIComponent(store.vehicle)}` : ''}`;
     /** Where devices are paired, each socket needs a ticket. */
     this.admission = access === 'paired' ? new Admission(address, (why) => this.#shut(why)) : null;
-    const store = /** @type {Store} */ (this.store = new Store(() => takeEarly() ?? this.admission?.dial() ?? new WebSocket(address()), () => (this.#name ||= deviceName(navigator.userAgent, keptHere())), ownName));
+    const store = /** @type {Store} */ (this.store = new Store(() => takeEarly() ?? this.admission?.dial(store.socket.trip) ?? new WebSocket(address()), () => (this.#name ||= deviceName(navigator.userAgent, keptHere())), ownName));
     store.vehicle = vehicle ?? '';
     store.painter.undrawn = undrawn = new Undrawn(() => store.frame, () => this.alarmSound.say('high'));
     stop = () => {
@@ -169,6 +165,7 @@ class Page {
     this.router = new Router(store, this.say);
     this.tabs = new Tabs(this.monitor, () => this.front());
     this.router.onShown = () => this.shown();
+    store.on('open', (hello) => this.admission?.greeted(hello));
     store.on('draw', () => this.draw());
   }
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from monitor.transport import TransportDelay
+from server.vehicle.link_load import LinkLoad
 
 STEP_S = 0.002
 PING_EVERY_S = 0.1
@@ -30,6 +31,7 @@ class Stream:
     offset_s: float | None  # of the clock of its stamps; None: it carries none
     ppm: float = 0.0
     queue_length: int = 2
+    signal: str | None = None  # None: it is only recorded
     stamp: Callable[[float], float] | None = None  # of the time, instead
 
     def stamp_s(self, at_s: float) -> float | None:
@@ -57,6 +59,7 @@ class Arrival:
     at_s: float
     true_s: float  # how old it is
     delay_s: float  # how old the estimate has it
+    late_s: float  # how late the estimate has the link
 
 
 @dataclass(slots=True)
@@ -65,16 +68,33 @@ class _Queue:
     next_s: float
     waiting: deque[float] = field(default_factory=deque)
     held: float | None = None
+    length: int = 1
+    throttle_s: float = 0.0
+    sends_s: float = 0.0  # not before
+    is_wanted: bool = True
+
+    def subscribe(self, transport: TransportDelay, load: LinkLoad) -> None:
+        """As a session does at this step of its load: what is of no signal is only recorded."""
+        stream = self.stream
+        self.is_wanted = stream.signal is not None or load.level.records_others
+        self.length = 1 if load.step else stream.queue_length
+        self.throttle_s = load.throttle_ms(stream.signal) / 1000 if stream.signal is not None else 0.0
+        transport.subscribe(stream.topic, self.length, self.throttle_s)
+
+    def is_due(self, now_s: float) -> bool:
+        return bool(self.waiting) and self.held is None and now_s >= self.sends_s
 
 
-def run(link: Link, streams: list[Stream], *, lasts_s: float, seed: int) -> Iterator[Arrival]:
-    """What arrives, judged by `TransportDelay`."""
+def run(
+    link: Link, streams: list[Stream], *, lasts_s: float, seed: int, load: LinkLoad | None = None
+) -> Iterator[Arrival]:
+    """What arrives, judged by `TransportDelay`; `load` decides what is subscribed to."""
     rng = random.Random(seed)
     transport = TransportDelay()
     transport.is_fifo = link.is_fifo
     transport.open(0.0)
     begins_s = link.up_s(0.0)
-    queues = [_Queue(stream, begins_s + rng.random() / stream.hz) for stream in streams]
+    queues = [_Queue(stream, begins_s + rng.random() / stream.hz, length=stream.queue_length) for stream in streams]
     for stream in streams:
         transport.subscribe(stream.topic, stream.queue_length)
     buffer: deque[tuple[int, object]] = deque()
@@ -87,6 +107,9 @@ def run(link: Link, streams: list[Stream], *, lasts_s: float, seed: int) -> Iter
     last_up_s = last_down_s = 0.0
     for step in range(int(lasts_s / STEP_S)):
         now_s = step * STEP_S
+        if load is not None and step % 50 == 0 and load.look(transport.queued_s(now_s), now_s, transport.trip_s):
+            for queue in queues:
+                queue.subscribe(transport, load)
         if now_s >= next_ping_s:
             last_up_s = max(last_up_s, now_s + link.up_s(now_s))
             pings_under_way.append((last_up_s + ANSWER_S, now_s))
@@ -102,9 +125,9 @@ def run(link: Link, streams: list[Stream], *, lasts_s: float, seed: int) -> Iter
                 if link.is_fifo:
                     buffer.append((queue.stream.size, (queue.stream, now_s)))
                     buffered += queue.stream.size
-                else:
+                elif queue.is_wanted:
                     queue.waiting.append(now_s)
-                    if len(queue.waiting) > queue.stream.queue_length:
+                    while len(queue.waiting) > queue.length:
                         queue.waiting.popleft()
         if not link.is_fifo:
             if is_shut and buffered <= link.kernel_bytes:
@@ -114,8 +137,9 @@ def run(link: Link, streams: list[Stream], *, lasts_s: float, seed: int) -> Iter
                 turns = False
                 rng.shuffle(queues)
                 for queue in queues:
-                    if queue.held is None and queue.waiting:
+                    if queue.is_due(now_s):
                         queue.held = queue.waiting.popleft()
+                        queue.sends_s = now_s + queue.throttle_s
                     if queue.held is not None and not is_shut:
                         buffer.append((queue.stream.size, (queue.stream, queue.held)))
                         buffered += queue.stream.size
@@ -124,8 +148,9 @@ def run(link: Link, streams: list[Stream], *, lasts_s: float, seed: int) -> Iter
                         is_shut = buffered > link.kernel_bytes + BUFFER_BYTES
             if is_shut:
                 for queue in queues:
-                    if queue.held is None and queue.waiting:
+                    if queue.is_due(now_s):
                         queue.held = queue.waiting.popleft()
+                        queue.sends_s = now_s + queue.throttle_s
         credit = min(credit + link.rate_Bps(now_s) * STEP_S, 20_000.0 if not buffer else 1e9)
         while buffer and credit >= buffer[0][0]:
             size, what = buffer.popleft()
@@ -137,9 +162,10 @@ def run(link: Link, streams: list[Stream], *, lasts_s: float, seed: int) -> Iter
             credit = min(credit, link.rate_Bps(now_s) * STEP_S)
         while coming and coming[0][0] <= now_s:
             _, what = coming.popleft()
+            transport.took(PING_BYTES if isinstance(what, float) else what[0].size)  # type: ignore[index]
             if isinstance(what, float):
                 transport.answered(what, now_s)
                 continue
             stream, source_s = what  # type: ignore[misc]
             delay_s = transport.receive(stream.topic, now_s, stream.stamp_s(source_s))
-            yield Arrival(stream.topic, now_s, now_s - source_s, delay_s)
+            yield Arrival(stream.topic, now_s, now_s - source_s, delay_s, transport.late_s(now_s))

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from monitor.transport import EXCESS_S, FAST_S, KEPT_S, RECENT_S, TRIM_S, USUAL_S, TransportDelay
+from monitor.transport import (
+    EXCESS_S,
+    FAST_S,
+    KEPT_S,
+    PLACE_PERIODS,
+    RECENT_S,
+    SHUT_BYTES,
+    TRIM_S,
+    USUAL_S,
+    TransportDelay,
+)
 
 
 def opened(at_s: float = 0.0) -> TransportDelay:
@@ -56,12 +66,37 @@ def test_a_queue_without_a_busy_connection_adds_nothing() -> None:
     assert link.receive("/gps", 39.80) == pytest.approx(0.05)
 
 
-def test_each_place_of_the_queue_costs_as_long_as_the_connection_was_shut() -> None:
+@pytest.mark.parametrize("queue_length", [1, 5])
+def test_each_place_of_the_queue_costs_as_long_as_the_connection_was_shut(queue_length: int) -> None:
     link = opened()
-    link.subscribe("/gps", 1)
+    link.subscribe("/gps", queue_length)
     healthy(link, 20.0)
     ping(link, 20.0, 20.36)  # 0.35 s longer than the least, of which 0.05 are jitter
-    assert link.receive("/gps", 20.36) == pytest.approx(0.36 + 2 * 0.30)
+    assert link.receive("/gps", 20.36) == pytest.approx(0.36 + (queue_length + 1) * 0.30)
+
+
+def test_a_place_that_holds_the_newest_costs_a_period_beyond_the_shut_of_now() -> None:
+    link = opened()
+    link.subscribe("/gps", 1)
+    healthy(link, 19.0)
+    for n in range(30):
+        link.receive("/gps", 18.0 + n * 0.05)
+    ping(link, 20.0, 20.36)
+    assert link.receive("/gps", 20.36) <= 0.36 + 0.30 + PLACE_PERIODS * 0.14
+    ping(link, 20.4, 20.41)
+    assert link.receive("/gps", 20.43) <= 0.03 + PLACE_PERIODS * 0.14, "that shut is over"
+
+
+@pytest.mark.parametrize(("waited", "shut_s"), [(SHUT_BYTES - 1, 0.0), (SHUT_BYTES, 0.30)])
+def test_a_connection_that_so_few_bytes_waited_in_was_not_shut(waited: int, shut_s: float) -> None:
+    link = opened()
+    link.subscribe("/gps", 1)
+    link.took(100_000)
+    healthy(link, 20.0)
+    link.sent(20.0)
+    link.took(waited)
+    link.answered(20.0, 20.36)
+    assert link.receive("/gps", 20.36) == pytest.approx(0.36 + 2 * shut_s)
 
 
 def test_a_connection_that_was_slow_from_the_first_message_on_is_not_taken_for_usual() -> None:

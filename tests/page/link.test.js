@@ -11,6 +11,15 @@ test('live: every node answers, and the age is the car’s at the glass', () => 
   assert.ok(chain.nodes.every((node) => node.isKnown && !node.isBad));
 });
 
+test('a weak radio is said, whether it is live or not', () => {
+  const trip = { mean_ms: 900, spread_ms: 100 };
+  const live = chainOf({ ...now, frame: state(), trip });
+  assert.deepEqual([live.word, live.isWeak, live.detail], ['Live', true, 'Weak radio: an answer takes 0.9 s.']);
+  const lost = chainOf({ ...now, frame: state(), isSilent: true, silence_s: 3.4, trip });
+  assert.match(lost.detail, /keeps trying\. Weak radio: an answer takes 0\.9 s\.$/);
+  assert.equal(chainOf({ ...now, frame: state(), trip: { mean_ms: 160, spread_ms: 20 } }).isWeak, undefined);
+});
+
 test('each silence is said of the part that fell silent', () => {
   const server = chainOf({ ...now, frame: state(), isSilent: true, silence_s: 3.4 });
   assert.deepEqual([server.word, server.cut, server.sentence, server.nodes[1]?.mark], ['Lost', 0, 'The server fell silent.', 'silent 3.4 s']);

@@ -11,7 +11,43 @@ const { digitsOf, pinShown, reasonWords, triedWords, waitWords } = await import(
 const { leftWords, removalWords, seenWords } = await import('../../static/js/pairing/devices-layout.js');
 const { thenOf } = await import('../../static/js/boot/pairing-token.js');
 const { forgetWork, OF_THE_WORK } = await import('../../static/js/boot/forget.js');
+const { Admission } = await import('../../static/js/pairing/admission.js');
 const { screenOf } = await import('../../static/js/shell/router.js');
+
+test('the next socket has the ticket that the one before brought, until the server refuses it', async (t) => {
+  /** @type {any[]} */
+  const dialled = [];
+  t.mock.method(globalThis, 'fetch', async () => ({ ok: true, json: async () => ({ ticket: `fetched ${dialled.length}` }) }));
+  t.after(() => { delete /** @type {any} */ (globalThis).WebSocket; });
+  globalThis.WebSocket = /** @type {any} */ (class {
+    /** @param {string} address */
+    constructor(address) {
+      this.address = address;
+      dialled.push(this);
+    }
+
+    close() {}
+  });
+  const admission = new Admission(() => 'ws://car/ws', () => {});
+  const closed = /** @type {string[]} */ ([]);
+  const dial = async () => {
+    const socket = admission.dial(null);
+    Object.assign(socket, { onclose: () => closed.push('closed') });
+    await new Promise((resolve) => { setTimeout(resolve); });
+    return socket;
+  };
+  await dial();
+  dialled[0].onopen();
+  admission.greeted(/** @type {any} */ ({ ticket: 'next' }));
+  dialled[0].onclose();
+  (await dial()).close(); // given up: no answer came
+  dialled[1].onclose();
+  await dial();
+  dialled[2].onclose(); // refused
+  await dial();
+  assert.deepEqual(dialled.map(({ address }) => decodeURIComponent(address.split('ticket=')[1])), ['fetched 0', 'next', 'next', 'fetched 3']);
+  assert.equal(closed.length, 3);
+});
 
 test('a PIN is its digits, however it is typed', () => {
   for (const [typed, digits, shown] of [['', '', ''], ['12', '12', '12'], ['123', '123', '123'], ['123 4', '1234', '123 4'], ['12-34-56-78', '123456', '123 456'], ['a1', '1', '1']]) {

@@ -26,6 +26,7 @@ class Socket {
 }
 
 function set() {
+  let now_ms = 0;
   /** @type {Socket[]} */
   const sockets = [];
   /** @type {string[]} */
@@ -33,8 +34,14 @@ function set() {
   const pageSocket = new PageSocket(
     { opened: () => heard.push('open'), closed: () => heard.push('closed'), text: (text) => heard.push(text), bytes: () => heard.push('bytes') },
     () => /** @type {any} */ (sockets[sockets.push(new Socket()) - 1]),
+    () => now_ms,
   );
-  return { pageSocket, sockets, heard };
+  const at = (/** @type {number} */ ms) => { now_ms = ms; };
+  /** Looks as the page does, from then to then. @param {number} from_ms @param {number} to_ms */
+  const look = (from_ms, to_ms) => {
+    for (now_ms = from_ms; now_ms <= to_ms; now_ms += 100) pageSocket.look(now_ms);
+  };
+  return { pageSocket, sockets, heard, at, look };
 }
 
 test('a quiet connection is given up though the browser reports nothing, and what it still brings is not heard', () => {
@@ -51,19 +58,72 @@ test('a quiet connection is given up though the browser reports nothing, and wha
   assert.deepEqual(heard, ['open', 'closed']);
   assert.equal(first?.onmessage, null);
   assert.equal(typeof late, 'function');
-  pageSocket.look(3600);
-  assert.equal(sockets.length, 1); // not at once
-  pageSocket.look(3801);
   assert.equal(sockets.length, 2);
 });
 
-test('it dials for ever, each time a little later, at most every two seconds beside the time of a dial', () => {
+test('a connection that has just opened is alive, however long its dial took', () => {
+  const { sockets, at, look } = set();
+  look(0, 3900);
+  at(4000);
+  sockets[0]?.onopen();
+  look(4100, 8900);
+  assert.deepEqual([sockets.length, sockets[0]?.isClosed], [1, false]);
+  look(9000, 20_000);
+  assert.equal(sockets[0]?.isClosed, true);
+});
+
+test('a connection of a weak radio gets more time, and what was measured holds for the next one', () => {
+  const { pageSocket, sockets, at, look } = set();
+  pageSocket.look(0);
+  at(1200);
+  sockets[0]?.onopen();
+  for (const [took_ms, came_ms] of [[2000, 2800], [3000, 4500], [5000, 5700]]) {
+    at(Number(took_ms));
+    pageSocket.send({ kind: 'take', seq: 1 });
+    pageSocket.answered(Number(came_ms));
+    pageSocket.answered(Number(came_ms) + 500); // a frame that nobody asked for says nothing of the round trip
+    pageSocket.proof(Number(came_ms));
+  }
+  look(5700, 9200);
+  assert.equal(sockets[0]?.isClosed, false);
+  look(9300, 13_700);
+  assert.deepEqual([sockets[0]?.isClosed, sockets.length, sockets[1]?.isClosed], [true, 2, false]); // the dial, too
+  look(13_800, 14_200);
+  assert.equal(sockets.length, 3);
+});
+
+test('over a good radio that was cut a dial comes every two or three seconds, now and then a longer one', () => {
+  const { pageSocket, sockets, at, look } = set();
+  pageSocket.look(0);
+  at(40);
+  sockets[0]?.onopen();
+  look(100, 2700);
+  const dials = [];
+  for (let ms = 2700, count = sockets.length; ms < 62_700; ms += 100) {
+    pageSocket.look(ms);
+    if (sockets.length > count) dials.push(ms);
+    count = sockets.length;
+  }
+  const gaps = dials.slice(1).map((ms, i) => ms - Number(dials[i]));
+  assert.deepEqual([...new Set(gaps)].map((ms) => Math.round(ms / 1000)).sort(), [2, 4]);
+});
+
+test('a server that refuses at once is dialled every two seconds', () => {
   const { pageSocket, sockets } = set();
-  for (let at = 0; at < 120_000; at += 100) pageSocket.look(at);
+  for (let ms = 0; ms < 60_000; ms += 100) {
+    pageSocket.look(ms);
+    sockets.at(-1)?.onclose?.();
+  }
+  assert.ok(sockets.length >= 60 / 2.2 && sockets.length <= 60 / 2 + 5, String(sockets.length));
+});
+
+test('it dials for ever', () => {
+  const { pageSocket, sockets, look } = set();
+  look(0, 120_000);
   assert.ok(sockets.length >= 120 / 7.2 && sockets.length <= 120 / 5, String(sockets.length));
   pageSocket.hurry();
   const before = sockets.length;
-  for (let at = 120_000; at < 125_300; at += 100) pageSocket.look(at);
+  look(120_000, 130_300);
   assert.ok(sockets.length > before);
 });
 

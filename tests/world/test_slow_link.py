@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
 
+from monitor.checks.link_late import LateLimits
 from monitor.rates import STALE_FLOOR_S
 from monitor.signals import SIGNALS
 from monitor.transport import TransportDelay
@@ -147,6 +149,97 @@ def test_what_waits_before_the_bridge_is_seen_by_the_clock_of_ros(is_stamped: bo
         if not is_stamped:
             delay_s = transport.receive("/vel", at_s + 0.001)
         assert late_s - UNDER_S <= delay_s <= late_s + OVER_S
+
+
+def whole_car() -> list[Stream]:
+    """134 kB/s, of which 54 are only recorded."""
+    rows = [
+        ("/vel", 190, "speed", False),
+        ("/brake", 190, "brake", False),
+        ("/steering", 190, "steering", False),
+        ("/dist", 75, "distance", False),
+        ("/odom", 1100, "odometry", True),
+        ("/scan", 2200, "scan", True),
+        ("/noise", 2700, None, False),
+    ]
+    return [
+        Stream(topic=topic, hz=20, size=size, signal=signal, offset_s=0.0 if stamped else None, queue_length=1)
+        for topic, size, signal, stamped in rows
+    ]
+
+
+class Watched:
+    """A run over a link whose load follows how late it is."""
+
+    def __init__(self, link: Link, lasts_s: float, seed: int = 1) -> None:
+        load = LinkLoad()
+        self.steps: list[tuple[float, int]] = [(0.0, 0)]
+        self.rows: list[tuple[float, float, float]] = []  # time, how late it is stated to be, how late it is
+        newest: dict[str, float] = {}
+        for one in run(link, whole_car(), lasts_s=lasts_s, seed=seed, load=load):
+            if load.step != self.steps[-1][1]:
+                self.steps.append((one.at_s, load.step))
+            if one.topic != "/noise":
+                newest[one.topic] = one.true_s
+                self.rows.append((one.at_s, one.late_s, max(newest.values())))
+
+    def between(self, from_s: float, to_s: float) -> list[tuple[float, float]]:
+        return [(late_s, true_s) for at_s, late_s, true_s in self.rows if from_s <= at_s < to_s]
+
+    def may_alarm(self, from_s: float, to_s: float) -> float:
+        """The share of the time in which the link is called late."""
+        found = self.between(from_s, to_s)
+        return sum(late_s > LateLimits().late_s for late_s, _ in found) / len(found)
+
+
+def even(rate_Bps: Callable[[float], float], *, kernel_bytes: int = 10_000) -> Link:
+    return Link(rate_Bps=rate_Bps, down_s=lambda _: 0.01, up_s=lambda _: 0.01, kernel_bytes=kernel_bytes)
+
+
+@pytest.mark.parametrize("kernel_bytes", [10_000, 100_000])
+def test_a_link_that_carries_what_is_left_is_not_called_late_and_one_that_is_well_again_has_all_of_it_in_seconds(
+    kernel_bytes: int,
+) -> None:
+    rate_Bps = lambda at_s: 14_500.0 if 10.0 <= at_s < 70.0 else 140_000.0  # noqa: E731
+    seen = Watched(even(rate_Bps, kernel_bytes=kernel_bytes), 85.0)
+    assert max(step for _, step in seen.steps) == len(LEVELS) - 1
+    drained_s = 20.0 + kernel_bytes / 10_000 * 2.0
+    assert seen.may_alarm(drained_s, 85.0) == 0.0
+    errors_s = sorted(late_s - true_s for late_s, true_s in seen.between(drained_s, 85.0))
+    assert errors_s[0] >= -UNDER_S
+    assert errors_s[len(errors_s) // 2] <= OVER_S
+    assert seen.steps[-1][1] == 0
+    assert seen.steps[-1][0] < 70.0 + 6.0
+
+
+def test_after_a_minute_of_a_bad_radio_the_link_has_all_of_it_in_seconds() -> None:
+    rng = random.Random(3)
+
+    def way_s(at_s: float) -> float:
+        return 0.2 + rng.random() * 0.2 + (0.6 if rng.random() < 0.01 else 0.0) if 10.0 <= at_s < 70.0 else 0.01
+
+    rate_Bps = lambda at_s: 60_000.0 if 10.0 <= at_s < 70.0 else 150_000.0  # noqa: E731
+    seen = Watched(Link(rate_Bps=rate_Bps, down_s=way_s, up_s=way_s, kernel_bytes=100_000), 85.0)
+    assert (seen.steps[-1][1], seen.steps[-1][0] < 70.0 + 6.0) == (0, True), seen.steps
+
+
+@pytest.mark.parametrize("rate_Bps", [20_000.0, 60_000.0, 110_000.0])
+def test_a_link_that_stays_slow_is_tried_ever_more_seldom(rate_Bps: float) -> None:
+    seen = Watched(even(lambda _: rate_Bps, kernel_bytes=50_000), 150.0)
+    tried = [at_s for (at_s, step), (_, before) in zip(seen.steps[1:], seen.steps, strict=False) if step < before]
+    assert sum(at_s > 75.0 for at_s in tried) <= 6, seen.steps
+    assert seen.may_alarm(30.0, 150.0) < 0.02
+
+
+def test_a_minute_of_a_fair_radio_is_no_alarm() -> None:
+    rng = random.Random(3)
+
+    def way_s(_: float) -> float:
+        return 0.06 + rng.random() * 0.04 + (0.25 if rng.random() < 0.02 else 0.0)
+
+    seen = Watched(Link(rate_Bps=lambda _: 250_000.0, down_s=way_s, up_s=way_s), 60.0)
+    assert seen.may_alarm(1.0, 60.0) == 0.0
+    assert seen.steps == [(0.0, 0)]
 
 
 def test_a_slow_link_is_asked_for_less_step_by_step_and_for_more_again_with_patience() -> None:

@@ -16,7 +16,6 @@ from server.recording.read.read import open_recording
 from server.rosbridge.link import RosLink
 from server.rosbridge.subscription import Subscription
 from server.rosbridge_server.server import RosBridge
-from server.vehicle import link_load
 from server.vehicle.vehicle import Vehicle
 from tests.server.cars import ZERO, scan
 from tests.server.conftest import serving
@@ -146,7 +145,6 @@ def steps(one: Viewer) -> list[int]:
 async def test_old_looks_old_less_is_asked_for_and_all_of_it_once_the_link_is_fast_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(link_load, "RESTORE_AFTER_S", 1.0)
     asked = Asked(monkeypatch)
     async with car() as (port, began_s), slow_proxy(port, None) as proxy:
         config = Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{proxy.port}"),), data=tmp_path)

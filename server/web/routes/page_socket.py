@@ -27,16 +27,18 @@ async def page_socket(
     app = services(socket)
     principal = principal_of(socket)
     role: RoleName = "operator" if principal.is_operator else "viewer"
-
-    def hello(name: str) -> Hello:
-        return {**app.hello(name), "who": {"id": principal.id, "name": principal.name, "role": role}}
-
-    if fleet == "1":
-        await app.hub.serve_fleet(socket, partial(hello, ""), principal=principal)
-        return
     name = vehicle if vehicle is not None else next(iter(app.vehicles), None)
-    if name is None or not app.may_be(name):
+    if fleet != "1" and (name is None or not app.may_be(name)):
         await socket.close(code=1008, reason="no such vehicle")
         return
-    opening = replay_commands.opening(replay, t)
-    await app.hub.serve(socket, name, partial(hello, name), principal=principal, replay=opening)
+    with app.access.next_ticket(principal) as ticket:
+
+        def hello(name: str) -> Hello:
+            found: Hello = {**app.hello(name), "who": {"id": principal.id, "name": principal.name, "role": role}}
+            return found if ticket is None else {**found, "ticket": ticket}
+
+        if fleet == "1" or name is None:
+            await app.hub.serve_fleet(socket, partial(hello, ""), principal=principal)
+        else:
+            opening = replay_commands.opening(replay, t)
+            await app.hub.serve(socket, name, partial(hello, name), principal=principal, replay=opening)

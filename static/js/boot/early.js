@@ -45,6 +45,7 @@
     if (ticket !== null) address.searchParams.set('ticket', ticket);
     const socket = new WebSocket(address);
     early.socket = socket;
+    early.dialled_ms = performance.now();
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => pass('open');
     socket.onmessage = ({ data }) => pass('message', data);

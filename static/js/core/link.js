@@ -1,6 +1,7 @@
 // What is known of the chain phone – server – bridge – car, and in which words: pure functions, no DOM.
 
 import { age, timeOfDay } from './format.js';
+import { isWeak } from './round-trip.js';
 
 /**
  * @typedef {import('./protocol-types.js').State} State
@@ -14,6 +15,7 @@ import { age, timeOfDay } from './format.js';
  * @property {Node[]} nodes phone, server, bridge, car
  * @property {string} sentence what fell silent
  * @property {string} detail what is known beside it
+ * @property {boolean} [isWeak] the radio between phone and server takes long for an answer
  * @property {boolean} [isUnserved] the server answers, and has nothing of the car
  */
 
@@ -30,10 +32,18 @@ const BY_AGENT = ['Phone', 'Server', 'Agent', 'Car'];
  * @param {number} seen.silence_s for how long [s]
  * @param {number} seen.lag_s age of the frame at the glass [s]
  * @param {number | null} seen.heard_ms wall clock of the last fresh frame
+ * @param {import('./round-trip.js').RoundTrip | null} [seen.trip] between phone and server
  * @param {string} [seen.unserved] why nothing comes from the car's agent although the server answers
  * @returns {ChainView}
  */
-export function chainOf({ frame, isSilent, silence_s, lag_s, heard_ms, unserved = '' }) {
+export function chainOf({ trip = null, ...seen }) {
+  const view = viewOf(seen);
+  if (!trip || !isWeak(trip)) return view;
+  return { ...view, isWeak: true, detail: `${view.detail} Weak radio: an answer takes ${age(trip.mean_ms / 1000)} s.`.trim() };
+}
+
+/** @param {Omit<Parameters<typeof chainOf>[0], 'trip'>} seen @returns {ChainView} */
+function viewOf({ frame, isSilent, silence_s, lag_s, heard_ms, unserved = '' }) {
   if (isSilent && frame && silence_s <= 2) return waking(silence_s);
   if (isSilent && unserved) return agentSilent(unserved, silence_s, heard_ms);
   if (isSilent || !frame) return serverSilent(silence_s, heard_ms);

@@ -829,6 +829,8 @@ export interface Hello {
   version: string;
   /** another one: another run of the server; numbers of events are of a run */
   boot: string;
+  /** of the server that the page reached; times of another one may be of another clock */
+  run: string;
   vehicle: string;
   vehicles: Array<string>;
   /** of the page that the server has now; "" for single modules */
@@ -842,6 +844,8 @@ export interface Hello {
   /** of a web node: orders are signed, as agents require it */
   signs?: boolean;
   who: Identity;
+  /** for the next socket of this device, until 10 minutes after the end of this one */
+  ticket?: string;
 }
 
 /** The device that a socket is of. */
@@ -1288,9 +1292,11 @@ export interface Offer {
   kind: "offer";
   seq: number;
   of: Array<"state" | "scan" | "timeline" | "cars" | "beside">;
+  /** when it was sent, after the page's last take was received */
+  time_ms: number;
 }
 
-/** Offers control to another page, whose operator reads back what is in force; control stays where it is until then. */
+/** Offers control to another page, whose operator reads back what is in force; until then control stays where it is. */
 export interface OfferControlCommand {
   id?: string | null;
   /** the car that the page named to its operator; refused by any other */

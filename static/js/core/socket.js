@@ -1,9 +1,11 @@
-// The page's end of the socket: dials for ever, and hangs up on a connection that has gone quiet.
+// The page's end of the socket: dials for ever, and hangs up on a connection that has gone quiet (a browser may never report
+// that one is dead) and on a dial that does not open (a server may be stopped while its port still accepts).
 
-/** A browser may never report a dead connection: without a fresh frame for so long it is given up [ms]. */
-const QUIET_MS = 2500;
-/** A dial that has not opened by then is given up: the server may be stopped while its port still accepts [ms]. */
-const DIAL_MS = 5000;
+import { limitsOf, measured } from './round-trip.js';
+
+/** Of so many dials in a row one gets twice the time: the radio may have become slower than it was measured. */
+const DIALS_A_LONG_ONE = 3;
+/** Least time from one dial to the next [ms]. */
 const FIRST_WAIT_MS = 300;
 const LAST_WAIT_MS = 2000;
 /** A page sends at most 25 messages a second: frames are taken up to the first, a replay is led up to the second; what a person orders never waits. */
@@ -13,7 +15,7 @@ export const LEADS_A_S = 25;
 const EVENLY = { take: [2, 85], replay: [2, 250] };
 
 /**
- * @typedef {Pick<WebSocket, 'binaryType' | 'send' | 'close'> & {onopen: any, onmessage: any, onclose: any, onerror: any}} Socket
+ * @typedef {Pick<WebSocket, 'binaryType' | 'send' | 'close'> & {onopen: any, onmessage: any, onclose: any, onerror: any, dialled_ms?: number}} Socket dialled_ms: when it was, where that was not at once [ms, monotonic]
  *
  * @typedef {object} Ear
  * @property {() => void} opened
@@ -27,7 +29,15 @@ export class PageSocket {
   /** @type {Socket | null} */
   #socket = null;
   #isOpen = false;
+  /** How long an answer takes here, over all connections. @type {import('./round-trip.js').RoundTrip | null} */
+  trip = null;
   #proof_ms = 0;
+  #dialled_ms = -Infinity;
+  /** Dials in a row that did not open. */
+  #failed = 0;
+  /** When the last frame was asked for, or this connection; and whether it is still to come. */
+  #asked_ms = -Infinity;
+  #isOwed = false;
   #wait_ms = FIRST_WAIT_MS;
   #next_ms = -Infinity;
   /** The last messages. @type {{kind: unknown, at_ms: number}[]} */
@@ -37,14 +47,27 @@ export class PageSocket {
   /**
    * @param {Ear} ear
    * @param {() => Socket} dial makes a socket that is connecting
+   * @param {() => number} [now] monotonic [ms]
    */
-  constructor(ear, dial) {
+  constructor(ear, dial, now = () => performance.now()) {
     this.ear = ear;
     this.dial = dial;
+    this.now = now;
   }
 
   get isOpen() {
     return this.#isOpen;
+  }
+
+  /** When that was sent which the server has answered by its next offer or greeting [ms, monotonic]. */
+  get asked_ms() {
+    return this.#asked_ms;
+  }
+
+  /** What was asked for came, fresh or not. @param {number} at_ms */
+  answered(at_ms) {
+    if (this.#isOwed) this.trip = measured(this.trip, at_ms - this.#asked_ms);
+    this.#isOwed = false;
   }
 
   /**
@@ -67,8 +90,14 @@ export class PageSocket {
    * @param {number} now_ms
    */
   look(now_ms) {
-    if (this.#socket && now_ms - this.#proof_ms > (this.#isOpen ? QUIET_MS : DIAL_MS)) this.#drop(now_ms);
+    if (this.#socket && now_ms - this.#proof_ms > this.#limit_ms()) this.#drop();
     if (!this.#socket && now_ms >= this.#next_ms) this.#open(now_ms);
+  }
+
+  #limit_ms() {
+    const { dial_ms, quiet_ms } = limitsOf(this.trip);
+    if (this.#isOpen) return quiet_ms;
+    return this.#failed % DIALS_A_LONG_ONE === DIALS_A_LONG_ONE - 1 ? 2 * dial_ms : dial_ms;
   }
 
   /**
@@ -79,7 +108,9 @@ export class PageSocket {
   send(message) {
     if (!this.#socket || !this.#isOpen) return false;
     this.#socket.send(JSON.stringify(message));
-    this.#sent = [...this.#sent.slice(-LEADS_A_S), { kind: 'kind' in message ? message.kind : '', at_ms: performance.now() }];
+    const [kind, at_ms] = ['kind' in message ? message.kind : '', this.now()];
+    this.#sent = [...this.#sent.slice(-LEADS_A_S), { kind, at_ms }];
+    if (kind === 'take') [this.#asked_ms, this.#isOwed] = [at_ms, true];
     return true;
   }
 
@@ -92,7 +123,7 @@ export class PageSocket {
   inTurn(most, run, kind = '') {
     const [few, within_ms] = EVENLY[kind] ?? [most, 0];
     const counted = kind === 'replay' ? this.#sent.filter((one) => one.kind === kind) : this.#sent;
-    const wait_ms = Math.max(1000 + (this.#sent.at(-most)?.at_ms ?? -Infinity), within_ms + (counted.at(-few)?.at_ms ?? -Infinity)) - performance.now();
+    const wait_ms = Math.max(1000 + (this.#sent.at(-most)?.at_ms ?? -Infinity), within_ms + (counted.at(-few)?.at_ms ?? -Infinity)) - this.now();
     if (wait_ms > 0) setTimeout(() => this.inTurn(most, run, kind), wait_ms);
     else run();
   }
@@ -120,27 +151,34 @@ export class PageSocket {
 
   /** @param {number} now_ms */
   #open(now_ms) {
-    this.#proof_ms = now_ms;
+    this.#proof_ms = this.#dialled_ms = now_ms;
     const socket = this.dial();
     socket.binaryType = 'arraybuffer';
     this.#socket = socket;
-    socket.onopen = () => {
+    socket.onopen = (/** @type {{at_ms?: number} | undefined} */ event) => {
       this.#isOpen = true;
+      this.#failed = 0;
+      this.#proof_ms = this.now();
+      this.#asked_ms = socket.dialled_ms ?? now_ms;
+      this.trip ??= measured(null, ((event?.at_ms ?? this.#proof_ms) - this.#asked_ms) / 2); // to connect, and to become a WebSocket
       this.ear.opened();
     };
     socket.onmessage = (/** @type {{data: any, at_ms?: number}} */ event) => {
       if (typeof event.data === 'string') this.ear.text(event.data, event.at_ms);
-      else this.ear.bytes(event.data);
+      else {
+        this.answered(this.now());
+        this.ear.bytes(event.data);
+      }
     };
-    socket.onclose = () => this.#drop(performance.now());
+    socket.onclose = () => this.#drop();
     socket.onerror = () => {}; // a close always follows
   }
 
-  /** @param {number} now_ms */
-  #drop(now_ms) {
+  #drop() {
     const wasOpen = this.#isOpen;
+    if (!wasOpen) this.#failed += 1;
     this.#hangUp();
-    this.#next_ms = now_ms + this.#wait_ms;
+    this.#next_ms = this.#dialled_ms + this.#wait_ms;
     this.#wait_ms = Math.min(LAST_WAIT_MS, this.#wait_ms * 1.7);
     if (wasOpen) this.ear.closed();
   }
@@ -148,7 +186,7 @@ export class PageSocket {
   #hangUp() {
     const socket = this.#socket;
     this.#socket = null;
-    this.#isOpen = false;
+    this.#isOpen = this.#isOwed = false;
     if (!socket) return;
     // Forgotten before it is closed: a frame still under way on the old socket is never heard again.
     socket.onopen = socket.onmessage = socket.onclose = socket.onerror = null;

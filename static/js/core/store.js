@@ -69,7 +69,6 @@ export class Store extends Known {
         opened: () => this.#emitter.guard(() => {
           this.#granted = null;
           this.unserved = '';
-          this.#clock.reset();
           this.scans.opened();
         }),
         text: (text, at_ms) => this.#emitter.guard(() => this.#heard(text, at_ms)),
@@ -128,7 +127,6 @@ export class Store extends Known {
   #forget() {
     this.#granted = null;
     this.deadMan = new DeadMan();
-    this.#clock.reset();
     this.#delay_ms = 0;
     this.#started_ms = this.now();
     this.log.clear();
@@ -166,7 +164,7 @@ export class Store extends Known {
 
   /** The chain as it stands now. */
   get chain() {
-    return chainOf({ frame: this.frame, isSilent: this.isSilent, silence_s: this.silence_s, lag_s: this.lag_s, heard_ms: this.heard_ms, unserved: this.socket.isOpen ? this.unserved : '' });
+    return chainOf({ frame: this.frame, isSilent: this.isSilent, silence_s: this.silence_s, lag_s: this.lag_s, heard_ms: this.heard_ms, trip: this.socket.trip, unserved: this.socket.isOpen ? this.unserved : '' });
   }
 
   /** Age of the list of cars at the glass [s]. */
@@ -200,12 +198,13 @@ export class Store extends Known {
   #heard(text, at_ms = this.now()) {
     const message = readMessage(text);
     if (!message) return void (this.unreadable += 1);
+    if (message.kind === 'state' || message.kind === 'cars') this.socket.answered(at_ms);
     switch (message.kind) {
-      case 'hello':
-        return this.#greeted(message, at_ms);
-      case 'offer': return this.socket.takeInTurn(() => this.scans.offered(message.seq, this.now()));
-      case 'state':
-        return this.#state(message, at_ms);
+      case 'hello': return this.#greeted(message, at_ms);
+      case 'offer':
+        this.#clock.note(message.time_ms, at_ms, this.socket.asked_ms);
+        return this.socket.takeInTurn(() => this.scans.offered(message.seq, this.now()));
+      case 'state': return this.#state(message, at_ms);
       case 'cars':
         this.list(message);
         this.#cars_ms = at_ms - this.#clock.note(message.time_ms, at_ms);
@@ -232,7 +231,7 @@ export class Store extends Known {
   #greeted(hello, at_ms) {
     if (!this.greet(hello)) return;
     this.seal.greeted(hello);
-    this.#clock.note(hello.time_ms, at_ms);
+    this.#clock.greeted(hello, at_ms, this.socket.asked_ms);
     this.sync.greeted(hello, { name: this.name, build: ownBuild(), ...(this.page ? { page: this.page } : {}) }, this.heard_ms === null ? 0 : this.silence_s);
   }
 

@@ -30,7 +30,7 @@ export class MarkClock {
 
   /** A new connection: its first message starts afresh; until then the old measure holds. */
   reset() {
-    this.#server.reset();
+    this.#server.forget();
   }
 
   /**

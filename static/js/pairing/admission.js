@@ -1,7 +1,6 @@
 // How this page is let in where devices are paired: each socket with a fresh ticket, and the pairing screen where there is none.
 
-/** A ticket that does not come by then is asked for again with the next socket [ms]. */
-const TICKET_MS = 4000;
+import { limitsOf } from '../core/round-trip.js';
 
 /**
  * @typedef {{code?: string, detail?: string}} Refusal as the server words it
@@ -10,6 +9,8 @@ const TICKET_MS = 4000;
 export class Admission {
   /** While the device is not paired: goes on once it is. @type {{promise: Promise<void>, go: () => void} | null} */
   #shut = null;
+  /** For the next socket, given with the one before. @type {string | null} */
+  #next = null;
 
   /**
    * @param {() => string} address of the socket
@@ -20,9 +21,21 @@ export class Admission {
     this.onShut = onShut;
   }
 
-  /** A socket that is connecting, as `new WebSocket` gives one. @returns {import('../core/socket.js').Socket} */
-  dial() {
-    return new TicketSocket(this.address(), (isWanted) => this.#ticket(isWanted));
+  /** The server greeted this page. @param {import('../core/protocol-types.js').Hello} hello */
+  greeted({ ticket }) {
+    this.#next = ticket ?? null;
+  }
+
+  /**
+   * A socket that is connecting, as `new WebSocket` gives one.
+   * @param {import('../core/round-trip.js').RoundTrip | null} trip how long an answer takes here
+   * @returns {import('../core/socket.js').Socket}
+   */
+  dial(trip) {
+    const next = this.#next;
+    if (next === null) return new TicketSocket(this.address(), (isWanted) => this.#ticket(isWanted, limitsOf(trip).ticket_ms));
+    // One that is given up was hardly shown; one that the server refuses was.
+    return new TicketSocket(this.address(), async () => next, () => { this.#next = null; });
   }
 
   /** The device was paired: what waits goes on. */
@@ -31,14 +44,14 @@ export class Admission {
     this.#shut = null;
   }
 
-  /** @param {() => boolean} isWanted @returns {Promise<string | null>} */
-  async #ticket(isWanted) {
+  /** @param {() => boolean} isWanted @param {number} within_ms @returns {Promise<string | null>} */
+  async #ticket(isWanted, within_ms) {
     while (isWanted()) {
       if (this.#shut) {
         await this.#shut.promise;
         continue;
       }
-      const answer = await fetch('/api/ticket', { method: 'POST', cache: 'no-store', signal: AbortSignal.timeout(TICKET_MS) });
+      const answer = await fetch('/api/ticket', { method: 'POST', cache: 'no-store', signal: AbortSignal.timeout(within_ms) });
       if (answer.ok) return (await answer.json()).ticket;
       if (answer.status !== 401) return null;
       const why = await answer.json().catch(() => ({}));
@@ -72,9 +85,17 @@ class TicketSocket {
   /** @type {WebSocket | null} */
   #socket = null;
   #isClosed = false;
+  #onRefused;
+  /** @type {number | undefined} */
+  dialled_ms;
 
-  /** @param {string} address @param {(isWanted: () => boolean) => Promise<string | null>} ticketOf */
-  constructor(address, ticketOf) {
+  /**
+   * @param {string} address
+   * @param {(isWanted: () => boolean) => Promise<string | null>} ticketOf
+   * @param {() => void} [onRefused] it closed by itself before it opened
+   */
+  constructor(address, ticketOf, onRefused = () => {}) {
+    this.#onRefused = onRefused;
     ticketOf(() => !this.#isClosed).catch(() => null).then((ticket) => this.#open(address, ticket));
   }
 
@@ -97,10 +118,18 @@ class TicketSocket {
     }
     const socket = new WebSocket(`${address}${address.includes('?') ? '&' : '?'}ticket=${encodeURIComponent(ticket)}`);
     this.#socket = socket;
+    this.dialled_ms = performance.now();
+    let hasOpened = false;
     socket.binaryType = this.binaryType;
-    socket.onopen = () => this.onopen?.();
+    socket.onopen = () => {
+      hasOpened = true;
+      this.onopen?.();
+    };
     socket.onmessage = (event) => this.onmessage?.(event);
-    socket.onclose = () => this.onclose?.();
+    socket.onclose = () => {
+      if (!hasOpened && !this.#isClosed) this.#onRefused();
+      this.onclose?.();
+    };
     socket.onerror = () => this.onerror?.();
   }
 }

@@ -69,7 +69,7 @@ export class FleetStore {
   constructor(dial, self) {
     this.self = self;
     this.socket = new PageSocket({
-      opened: () => this.#clock.reset(),
+      opened: () => {},
       text: (text, at_ms) => this.#emitter.guard(() => this.#heard(text, at_ms)),
       bytes: () => {},
       closed: () => this.#emitter.guard(() => this.#requests.broke()),
@@ -161,6 +161,7 @@ export class FleetStore {
       case 'hello':
         return this.#greeted(message, at_ms);
       case 'offer':
+        this.#clock.note(message.time_ms, at_ms, this.socket.asked_ms);
         return void this.socket.send({ kind: 'take', seq: message.seq });
       case 'cars':
         return this.#list(message, at_ms);
@@ -188,14 +189,15 @@ export class FleetStore {
     this.seal.greeted(hello);
     this.isAnswering = true;
     this.unserved = '';
-    this.#clock.note(hello.time_ms, at_ms);
+    this.#clock.greeted(hello, at_ms, this.socket.asked_ms);
     this.socket.send({ kind: 'hello', boot: hello.boot, name: this.self.name, page: this.self.page });
     this.#hasGreeted = true;
-    this.#emitter.emit('open');
+    this.#emitter.emit('open', hello);
   }
 
   /** @param {Cars} cars @param {number} at_ms */
   #list(cars, at_ms) {
+    this.socket.answered(at_ms);
     const delay_ms = this.#clock.note(cars.time_ms, at_ms);
     if (!this.deadMan.frame(at_ms, delay_ms)) return; // of long ago
     this.cars = cars;

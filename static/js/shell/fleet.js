@@ -33,7 +33,8 @@ function begin() {
   const address = () => `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws?fleet=1`;
   const admission = dataset['admission'] === 'paired' ? new Admission(address, () => location.replace(PAIRING)) : null;
   const self = { name: deviceName(navigator.userAgent, keptHere()), page: ownName() };
-  const store = new FleetStore(() => admission?.dial() ?? new WebSocket(address()), self);
+  const store = new FleetStore(() => admission?.dial(store.socket.trip) ?? new WebSocket(address()), self);
+  store.on('open', (hello) => admission?.greeted(hello));
   const alarmSound = new AlarmSound();
   store.painter.undrawn = undrawn = new Undrawn(() => frameOf(store), () => alarmSound.say('high'));
   stops.push(() => store.stop(), () => alarmSound.say(null));

@@ -136,6 +136,21 @@ def test_a_ticket_lasts_five_seconds(later_s: float, is_in: bool) -> None:
     assert tickets.use(tickets.new("a", now_s=1.0), "a", now_s=1.0 + later_s) is is_in
 
 
+@pytest.mark.parametrize(("away_s", "is_in"), [(0.0, True), (599.0, True), (601.0, False)])
+def test_a_ticket_of_a_socket_lasts_ten_minutes_beyond_it(away_s: float, is_in: bool) -> None:
+    tickets, times = Tickets(), iter((0.0, 50_000.0))
+    with tickets.beside_socket("a", now=lambda: next(times)) as ticket:
+        tickets.new("b", now_s=49_000.0)
+    assert tickets.use(ticket, "a", now_s=50_000.0 + away_s) is is_in
+
+
+def test_a_ticket_of_a_socket_that_was_used_meanwhile_stays_used() -> None:
+    tickets = Tickets()
+    with tickets.beside_socket("a", now=lambda: 0.0) as ticket:
+        assert tickets.use(ticket, "a", now_s=0.0)
+    assert not tickets.use(ticket, "a", now_s=0.0)
+
+
 def test_a_ticket_is_used_up_by_whoever_shows_it() -> None:
     tickets = Tickets()
     mine, other = tickets.new("a", now_s=0.0), tickets.new("a", now_s=0.0)

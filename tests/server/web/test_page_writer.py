@@ -106,7 +106,7 @@ async def watching(*, replays: bool) -> AsyncIterator[tuple[OnePage, LocalBus, T
         on_new=lambda kind: writer.on_replay(kind),
         on_turned=lambda: writer.on_turned(),
     )
-    writer = PageWriter(cast(WebSocket, page), bus, "car", view, FairWakeup(), now=time.monotonic)
+    writer = PageWriter(cast(WebSocket, page), bus, "car", view, FairWakeup(), now=time.monotonic, wall_ms=lambda: 0)
     page.writer = writer
     unwatch = bus.watch("car", writer.on_new)
     writer.watch_scan(True)

@@ -240,6 +240,21 @@ async def test_a_picture_on_a_strangers_page_fetches_nothing(served: Served) -> 
 # -- sockets and tickets ---------------------------------------------------------------------------------------------
 
 
+async def test_a_greeting_brings_the_ticket_of_the_next_socket(served: Served) -> None:
+    async with served.paired(Role.VIEWER) as browser, served.paired(Role.VIEWER, "Tablet") as other:
+        cookie = cookie_of(browser)
+        async with served.socket(await served.ticket(browser), cookie=cookie) as page:
+            ticket = json.loads(await page.recv())["ticket"]
+            assert await refused(served, ticket=ticket, cookie=cookie_of(other))
+        async with served.socket(await served.ticket(browser), cookie=cookie) as page:
+            ticket = json.loads(await page.recv())["ticket"]
+            async with served.socket(ticket, cookie=cookie) as again:  # the server has not seen the end of the first
+                after = json.loads(await again.recv())["ticket"]
+            assert await refused(served, ticket=ticket, cookie=cookie)  # used
+        async with served.socket(after, cookie=cookie) as again:
+            assert json.loads(await again.recv())["kind"] == "hello"
+
+
 async def test_a_socket_opens_once_with_a_fresh_ticket_and_the_cookie_it_was_given_to(served: Served) -> None:
     async with served.paired(Role.VIEWER) as browser, served.paired(Role.OPERATOR, "Other") as other:
         cookie = cookie_of(browser)

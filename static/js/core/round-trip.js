@@ -1,0 +1,42 @@
+// What the radio needs: the round trip and its spread as RFC 6298 has them, and the limits of a connection by them.
+
+/**
+ * @typedef {{mean_ms: number, spread_ms: number}} RoundTrip smoothed round trip, and its mean deviation
+ * @typedef {{dial_ms: number, ticket_ms: number, quiet_ms: number}} Limits a socket that does not open, a ticket that does not come, and a connection without a fresh frame are given up after so long
+ */
+
+/** Above this the radio is called weak. */
+const WEAK_MS = 300;
+/** Before anything is measured, the slowest radio is assumed. @type {Limits} */
+const UNKNOWN = { dial_ms: 5000, ticket_ms: 5000, quiet_ms: 5000 };
+/** The system repeats an unanswered request for a connection after 1 s (RFC 6298, 2.1): sooner, no limit may end. */
+const REPEATED_MS = 1000;
+const LONGEST_MS = 8000;
+const QUIET_AT_LEAST_MS = 2500;
+
+/**
+ * The estimate with one more measurement (RFC 6298, 2.2 and 2.3).
+ * @param {RoundTrip | null} trip null: there was none yet
+ * @param {number} sample_ms
+ * @returns {RoundTrip}
+ */
+export function measured(trip, sample_ms) {
+  if (!trip) return { mean_ms: sample_ms, spread_ms: sample_ms / 2 };
+  return {
+    mean_ms: trip.mean_ms + (sample_ms - trip.mean_ms) / 8,
+    spread_ms: trip.spread_ms + (Math.abs(sample_ms - trip.mean_ms) - trip.spread_ms) / 4,
+  };
+}
+
+/** @param {RoundTrip | null} trip @returns {Limits} */
+export function limitsOf(trip) {
+  if (!trip) return UNKNOWN;
+  const answer_ms = trip.mean_ms + 4 * trip.spread_ms; // RFC 6298's time-out
+  const dial_ms = Math.min(LONGEST_MS, 2 * REPEATED_MS + answer_ms);
+  return { dial_ms, ticket_ms: dial_ms, quiet_ms: Math.min(LONGEST_MS, Math.max(QUIET_AT_LEAST_MS, 2 * answer_ms)) };
+}
+
+/** @param {RoundTrip | null} trip */
+export function isWeak(trip) {
+  return trip !== null && trip.mean_ms >= WEAK_MS;
+}
