@@ -93,9 +93,9 @@ test('no speed is proposed unless the setting says so, nor while nothing comes',
 
 test('a blind time has its metres once the first values after it came', () => {
   const log = new EventLog();
-  log.greet('a', 0, 0, 0);
+  log.greet({ boot: 'a', last_event: 0 }, 0, 0);
   log.seen(5); // no gap
-  log.greet('a', 0, 8, 0);
+  log.greet({ boot: 'a', last_event: 0 }, 8, 0);
   const gap = /** @type {import('../../static/js/core/event-log.js').Gap} */ (log.caughtUp());
   assert.doesNotMatch(gapLine(gap), /unseen/);
   const before = log.measured;
@@ -104,7 +104,7 @@ test('a blind time has its metres once the first values after it came', () => {
   assert.ok(log.measured > before, 'a list that is shown is drawn anew');
   log.seen(1);
   assert.match(gapLine(gap), /, ≤ 135 m unseen$/);
-  log.greet('a', 0, 9, 0);
+  log.greet({ boot: 'a', last_event: 0 }, 9, 0);
   const other = /** @type {import('../../static/js/core/event-log.js').Gap} */ (log.caughtUp());
   log.seen(null);
   assert.match(gapLine(other), /, metres unseen not known$/);
