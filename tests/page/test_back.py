@@ -34,6 +34,17 @@ async def back(page: Page) -> None:
     await page.go_back()
 
 
+#: Whether each entry that the page adds from now on is added by a touch: Back passes over the one before it, if not.
+WATCH_PUSHES = """() => {
+  window.pushes = [];
+  const push = history.pushState;
+  history.pushState = function (...given) {
+    window.pushes.push(navigator.userActivation.isActive);
+    return push.apply(this, given);
+  };
+}"""
+
+
 async def is_front(page: Page, tab: str) -> None:
     await expect(page.locator(f"#tab-{tab}")).to_have_attribute("aria-selected", "true")
 
@@ -57,6 +68,27 @@ async def test_back_closes_a_sheet_then_leads_home_and_only_then_leaves(phone: P
     await back(page)
     await is_front(page, "home")
     await page.wait_for_function(PLAIN)
+    await page.go_back()
+    await page.wait_for_url("about:blank")
+
+
+@pytest.mark.gate
+async def test_one_back_after_the_other_needs_no_entry_that_no_touch_added(phone: Phone, canned: Canned) -> None:
+    page = await opened(phone, f"{canned.address}/#home")
+    await ready(page)
+    await page.evaluate(WATCH_PUSHES)
+    await page.locator("#tab-map").tap()
+    await page.wait_for_function(GUARDED)
+    await phone.f("menu").tap()
+    menu = page.locator("#sheet-menu")
+    await expect(menu).to_be_visible()
+    await back(page)
+    await expect(menu).to_be_hidden()
+    await is_front(page, "map")
+    await back(page)
+    await is_front(page, "home")
+    await page.wait_for_function(PLAIN)
+    assert await page.evaluate("window.pushes") == [True]
     await page.go_back()
     await page.wait_for_url("about:blank")
 
@@ -163,6 +195,8 @@ async def test_back_answers_no_alarm(phone: Phone, canned: Canned) -> None:
     sheet = page.locator("#sheet-alarm")
     await expect(sheet).to_be_visible()
     await expect(sheet).not_to_have_attribute("data-moved", "")
+    await page.wait_for_function(GUARDED)
+    await page.evaluate(WATCH_PUSHES)
     for _ in range(2):  # it is guarded again
         await page.wait_for_timeout(1100)  # what came a moment ago takes no answer anyway
         await back(page)
@@ -170,6 +204,7 @@ async def test_back_answers_no_alarm(phone: Phone, canned: Canned) -> None:
         await phone.drawn()
         await expect(sheet).to_be_visible()
     assert "acknowledge" not in [one["kind"] for one in canned.heard]
+    assert await page.evaluate("window.pushes") == []
 
 
 @pytest.mark.gate

@@ -1,5 +1,6 @@
 // Back closes what is open and then leads to the first tab; only where nothing is open does it leave the page. While there is
-// something to close, an entry of the history that shows the same (`over`) is what Back takes away.
+// something to close, an entry of the history that shows the same (`over`) is what Back takes away. Where more is left to close
+// after a Back, the page returns to that entry: browsers pass over entries between which a page added one without a touch.
 
 import { listen, need } from '../core/dom.js';
 import { isAsked } from './sheet.js';
@@ -38,8 +39,12 @@ class Back {
   /** Open dialogs, the last opened last. @type {HTMLDialogElement[]} */
   #open = [];
   #index;
-  /** Why the history goes back, where it is by this module. @type {'tidying' | 'leaving' | null} */
+  /** Why the history moves, where it is by this module. @type {'tidying' | 'leaving' | 'returning' | null} */
   #own = null;
+  /** The newest Back left an entry of this module, to which the page can return. */
+  #canReturn = false;
+  /** The entry that was shown when all was at rest last is one of this module. */
+  #isGuarded = false;
   /** A screen or a board lay over the page, when all was at rest last: a screen hears of Back before this module. */
   #wasCovered = false;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -78,15 +83,24 @@ class Back {
 
   /** Let the history have the entry exactly where it is wanted. */
   #agree() {
-    if (this.#own === 'tidying') return; // it is under way
+    if (this.#own === 'tidying' || this.#own === 'returning') return; // it is under way
     this.#wasCovered = this.#isCovered;
     this.#own = null; // there was nowhere to leave to
     const { state } = history;
     const isThere = state?.over === true;
     const wanted = isWanted({ isOpen: this.#open.length > 0, isFirstTab: this.#isFirstTab, state });
-    if (wanted && !isThere) history.pushState({ ...state, over: true }, '');
+    if (wanted && !isThere) this.#guard(state);
     else if (!wanted && isThere) this.#goBack('tidying');
+    this.#canReturn = false;
+    this.#isGuarded = wanted;
     this.#index = this.#at;
+  }
+
+  /** @param {Record<string, unknown> | null} state of this entry */
+  #guard(state) {
+    if (!this.#canReturn) return history.pushState({ ...state, over: true }, '');
+    this.#own = 'returning';
+    history.forward();
   }
 
   /** @param {'tidying' | 'leaving'} why */
@@ -108,9 +122,11 @@ class Back {
     const left = this.#index;
     const isBack = this.#at < left;
     const why = this.#own;
+    this.#canReturn = why === null && this.#at === left - 1 && this.#isGuarded;
     this.#index = this.#at;
     this.#own = null;
     this.look();
+    if (why === 'returning') return event.stopImmediatePropagation(); // it shows the same
     if (!isBack) return;
     this.#carry(left);
     const top = this.#open.at(-1);
