@@ -18,7 +18,9 @@ from tests.page.test_overlaps import noticed
 from tests.page.test_slow_down import DIALOG, RAIL, Thumb
 
 OTHER = "Margay-the-long-named-car"
-SIZES = [(320, 640), (360, 740), (412, 915), (820, 1180), (1180, 820), (1280, 800), (1440, 900), (1920, 1080)]
+PHONES = [(320, 640), (360, 740), (412, 915), (768, 1024)]
+TABLETS = [(700, 1060), (820, 1106), (820, 1180), (800, 1280), (1000, 600), (1199, 779), (1199, 780), (1180, 820)]
+SIZES = [*PHONES, *TABLETS, (1280, 800), (1440, 900), (1920, 1080)]
 PRESSES = "() => { window.presses = 0; addEventListener('pointerdown', () => { window.presses += 1; }, true); }"
 #: The height of the map's picture, and which of its keys lie over the car, the phone or the scale.
 MAP = """() => {
@@ -92,7 +94,7 @@ async def test_the_map_keeps_180_px_and_its_keys_stay_off_car_and_scale(
     phone: Phone, canned: Canned, width: int, height: int
 ) -> None:
     fleet(canned)
-    await opened(phone, canned, width, height, "home" if width >= 820 else "map")
+    await opened(phone, canned, width, height, "map" if (width, height) in PHONES else "home")
     await map_is_whole(phone, canned, width, height)
 
 
