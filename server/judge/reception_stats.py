@@ -59,8 +59,10 @@ class Reception:
     def note_frame(self, topic: str, message: Any) -> None:
         """Keep the frame that the header of a message names, at most its first 100 characters."""
         header = message.get("header") if has_fields(message) else None
-        frame_id = header.get("frame_id") if has_fields(header) else None
-        if isinstance(frame_id, str) and self.frame_ids.get(topic) != frame_id[:100]:
+        if header is None or not has_fields(header):
+            return
+        frame_id = header.get("frame_id")
+        if frame_id != self.frame_ids.get(topic) and isinstance(frame_id, str):
             self.frame_ids[topic] = frame_id[:100]
 
     def frame_of(self, topic: str) -> str | None:
