@@ -31,7 +31,7 @@ def at(facts: ReachFacts | None, speed_mps: float | None = 4.2, **more: Any) -> 
     [
         (HEARD, 4.2, False, OK, "Alarms audible on 2 of 3 operator pages"),
         (HEARD, None, False, OK, "Alarms audible on 2 of 3 operator pages"),
-        (DEAF, 4.2, False, FAULT, "The car moves at 4.2 m/s and nobody can hear alarms: none of 3 (2 × sound off, not"),
+        (DEAF, 4.2, False, FAULT, "The car moves at 4.2 m/s and nobody can hear alarms: none of 3 (2 × sound off, no"),
         (DEAF, -1.0, False, FAULT, "moves at 1.0 m/s"),  # backwards
         (ALONE, 4.2, False, FAULT, "nobody can hear alarms: no operator's phone is connected"),
         (ALONE, 0.31, False, FAULT, "moves at 0.3 m/s"),

@@ -63,7 +63,7 @@ def test_alarms_are_those_that_were_told(tmp_path: Path) -> None:
     assert (speed.raised_s, speed.cleared_s, speed.trip_text) == (2.0, 9.0, "3.4 m/s, limit 3.0 m/s")
     assert [(said.at_s, said.change) for said in speed.announcements] == [(2.0, "raised"), (7.0, "recaused")]
     assert speed.suppressed == ((5.0, 6.0),)
-    assert (obstacle.cleared_s, obstacle.until_s, str(obstacle.priority)) == (None, 20.0, "advisory")
+    assert (obstacle.cleared_s, obstacle.until_s, str(obstacle.priority)) == (None, 20.0, "critical")
     assert (logged.load.announced, logged.load.most_in_10_min) == (3, 3)
     assert [(e.at_s, e.change, e.by) for e in logged.entries][:3] == [
         (1.0, "connected", ""),

@@ -27,6 +27,7 @@ from server.tls.authority import TlsRefused
 from server.tls.certificate_renewal import OwnCertificate
 from server.tls.names import Names, names_of
 from server.tls.probe import Probe
+from server.version import catgraph_version
 from server.web.middleware import http_protocol
 from tests.http import http_client
 from tests.server.tls.certificates import pair
@@ -83,7 +84,7 @@ async def served(tmp_path: Path) -> AsyncIterator[Field]:
 
 async def test_a_device_that_trusts_the_authority_gets_the_page(served: Field) -> None:
     async with served.client() as client:
-        assert (await client.get("/api/health")).json()["status"] == "ok"
+        assert (await client.get("/api/health")).json()["version"] == catgraph_version()
         assert "catgraph" in (await client.get("/")).text
 
 
@@ -258,7 +259,7 @@ async def test_a_given_certificate_is_served_and_plain_http_is_led_to_it(tmp_pat
         context = ssl.create_default_context(cafile=files.cert)
         async with http_client(verify=context) as client:
             answer = await client.get(f"https://localhost:{one.port}/api/health")
-            assert answer.json()["status"] == "ok"
+            assert answer.json()["version"] == catgraph_version()
             assert "strict-transport-security" not in answer.headers  # localhost is a name of every server here
             named = await client.get(f"https://localhost:{one.port}/api/health", headers={"Host": "car.example.org"})
             assert named.headers["strict-transport-security"] == "max-age=31536000"
