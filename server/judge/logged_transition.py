@@ -84,7 +84,7 @@ def transition_of(event: Mapping[str, Any], moment_s: Clock, shelf_s: Clock) -> 
 
 def _named(kind: type[Named], name: object, otherwise: Named) -> Named:
     try:
-        return kind(name)
+        return kind(str(name))
     except ValueError:
         return otherwise
 
