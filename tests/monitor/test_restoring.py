@@ -195,11 +195,6 @@ def test_the_end_of_monitoring_takes_an_alarm_off_the_shelf_in_the_log_too() -> 
     assert restored([*transitions, *happened], spec).state is AlarmState.NORMAL
 
 
-def test_what_is_told_of_an_alarm_that_is_no_more_is_passed_over() -> None:
-    _, transitions = lived(BAD)
-    assert restore({}, transitions) == {}
-
-
 def test_numbering_on_brings_back_nothing_but_the_numbers() -> None:
     _, transitions = lived(BAD, OK, OK, OK, BAD)
     alarm = numbered_on({"hot": Alarm(id="hot", spec=PATIENT)}, transitions)["hot"]
