@@ -8,7 +8,6 @@ import { soundOf } from './alarms/alarm-layout.js';
 import { Arming } from './boot/arming.js';
 import { deviceName, keptHere } from './control/device-name.js';
 import { breath, field, listen, need, show } from './core/dom.js';
-import { scale } from './core/scale.js';
 import { styled } from './core/style-sheet.js';
 import { gapWords } from './core/event-log.js';
 import { takeEarly } from './boot/early-socket.js';
@@ -122,7 +121,7 @@ async function begin() {
   void unfold(page);
   release();
   // What outlasts this visit, and what nobody presses at once, is loaded when the page is complete.
-  setTimeout(() => mountDesk(page), innerWidth < 700 * scale() ? 2000 : 0); // a phone shows no panes
+  setTimeout(() => mountDesk(page), innerWidth < 700 ? 2000 : 0); // a phone shows no panes
   setTimeout(() => import('./drive/ledge.js').then(({ mount }) => mount(page.monitor, page.store, page.say)).catch(() => page.say('The Mark key could not be loaded from the server. Reload the page.', 'Not complete')), 3000);
   setTimeout(() => import('./boot/service-worker.js').then(({ Shell }) => new Shell(page.store, page.say)).catch(() => {}), 2000);
   setTimeout(() => import('./shell/sheet-head.js').then(({ mount }) => mount(page.monitor, page.store)).catch(() => {}), 2000);
