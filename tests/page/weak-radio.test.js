@@ -27,6 +27,7 @@ class Story {
   #sockets = 0;
   random;
   isCut = false;
+  accepts_ms = 0; // how long the server takes to accept a connection
 
   /** @param {string} radio @param {number} seed */
   constructor(radio, seed) {
@@ -83,12 +84,12 @@ class Story {
       socket.isOffered = false;
       say(newest);
     });
-    up(() => down(() => up(() => { // the connection, then the request on it
+    up(() => down(() => up(() => this.later(this.accepts_ms, () => { // the connection, then the request on it
       down(() => socket.onopen?.());
       say({ kind: 'hello', boot: 'a', run: 'a', time_ms: this.serverTime(), vehicle: 'car', vehicles: ['car'], build: '', last_event: 0 });
       say(newest);
       this.later(50, beat);
-    })));
+    }))));
     return socket;
   }
 
@@ -156,3 +157,11 @@ for (const radio of Object.keys(RADIOS)) {
     }
   });
 }
+
+test('a server that took long to accept makes the first frame look old, and no other', (t) => {
+  const story = new Story('fair', 1);
+  story.accepts_ms = 4200;
+  const { errors_ms, share } = watch(t, story);
+  assert.ok(Math.min(...errors_ms) >= -200);
+  assert.ok(share > 0.6, `${share} of the time live`);
+});
