@@ -13,8 +13,8 @@ from tests.page.conftest import Phone
 
 #: By how much a text of the top bar lies over the next part [px].
 OVER = """bar => {
-  const [text, next] = ['word-age', 'rec'].map((name) => bar.querySelector(`[data-f="${name}"]`).getBoundingClientRect());
-  return text.right - next.left;
+  const boxOf = (name) => bar.querySelector(`[data-f="${name}"]`).getBoundingClientRect();
+  return boxOf('word-age').right - boxOf('rec').left;
 }"""
 
 

@@ -72,19 +72,22 @@ class Story {
     const say = (/** @type {object} */ message) => down(() => socket.onmessage?.({ data: JSON.stringify(message) }));
     const frame = () => ({ ...state(), vehicle: 'car', made_ms: this.now_ms, server: { time_ms: this.serverTime(), boot: 'a' } });
     let newest = frame();
+    let took_ms = 0;
     const beat = () => {
       if (socket.isClosed) return;
       newest = frame();
-      if (!socket.isOffered) say({ kind: 'offer', seq: (socket.made += 1), of: ['state'], time_ms: this.serverTime() });
+      if (!socket.isOffered) say({ kind: 'offer', seq: (socket.made += 1), of: ['state'], took_ms });
       socket.isOffered = true;
       this.later(100, beat);
     };
     socket.send = (/** @type {string} */ text) => up(() => {
       if (JSON.parse(text).kind !== 'take') return;
       socket.isOffered = false;
+      took_ms = this.serverTime();
       say(newest);
     });
     up(() => down(() => up(() => this.later(this.accepts_ms, () => { // the connection, then the request on it
+      took_ms = this.serverTime();
       down(() => socket.onopen?.());
       say({ kind: 'hello', boot: 'a', run: 'a', time_ms: this.serverTime(), vehicle: 'car', vehicles: ['car'], build: '', last_event: 0 });
       say(newest);
