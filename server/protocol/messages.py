@@ -60,7 +60,7 @@ class Offer(TypedDict):
     kind: Literal["offer"]
     seq: int
     of: list[FrameKind]
-    time_ms: Annotated[int, doc("when it was sent, after the page's last take was received")]
+    took_ms: Annotated[int, doc("when the page's last take was received; before the first, when it connected")]
 
 
 class Resumed(TypedDict):

@@ -32,6 +32,7 @@ class FleetWriter:
     ) -> None:
         self._socket = socket
         self._wall_ms = wall_ms
+        self._took_ms = wall_ms()
         self._bus = bus
         self._events = events
         self._wakeup = wakeup
@@ -56,6 +57,7 @@ class FleetWriter:
 
     def take(self) -> None:
         """The page takes what was offered."""
+        self._took_ms = self._wall_ms()
         self._is_offered = False
         self._is_taking = True
         self._wakeup.queue(self._wake)
@@ -96,7 +98,7 @@ class FleetWriter:
         elif not self._is_offered and frame is not None and frame.number > self._sent:
             self._seq += 1
             self._is_offered = True
-            await self._send({"kind": "offer", "seq": self._seq, "of": ["cars"], "time_ms": self._wall_ms()})
+            await self._send({"kind": "offer", "seq": self._seq, "of": ["cars"], "took_ms": self._took_ms})
 
     async def _send_events(self) -> None:
         number, events = self._events.after(self._events.begins_after if self._event is None else self._event)

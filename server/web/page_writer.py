@@ -53,6 +53,7 @@ class PageWriter:
         self._wakeup = wakeup
         self._now = now
         self._wall_ms = wall_ms
+        self._took_ms = wall_ms()
         self._since_s = now()
         self._wake = asyncio.Event()
         self._sent: dict[FrameKind, int] = dict.fromkeys(view.kinds, 0)  # the newest frame of each kind
@@ -140,6 +141,7 @@ class PageWriter:
 
     def take(self) -> None:
         """The page takes what was offered."""
+        self._took_ms = self._wall_ms()
         self._is_offered = False
         self._is_taking = True
         self._wakeup.queue(self._wake)
@@ -254,7 +256,7 @@ class PageWriter:
         self._seq += 1
         self._is_offered = True
         self._offered_s = self._now()
-        await self._send({"kind": "offer", "seq": self._seq, "of": fresh, "time_ms": self._wall_ms()})
+        await self._send({"kind": "offer", "seq": self._seq, "of": fresh, "took_ms": self._took_ms})
 
     def _offer_is_due(self) -> None:
         self._offering = None

@@ -468,6 +468,7 @@ class Canned:
         self.access = "open"
         self.cars_every_s = 0.5
         self.states_every_s = 0.1
+        self.answers_after_s = 0.0  # to a take
         self.floods = False  # each take is answered with another offer, at once
         self.fleet_events: list[Json] = []
         self.cars: list[Json] = []  # summaries of all cars, by their name
@@ -527,6 +528,7 @@ class Canned:
                 if state["control"]["holder"] == "You":
                     state["control"] |= {"page": self._page, "fence": 1}
                 await socket.send_json({"kind": "offer", "seq": number, "of": ["state"]})
+                await asyncio.sleep(self.answers_after_s)
                 await socket.send_json(state | {"vehicle": self.vehicle})
                 if self.cars:
                     await socket.send_json({"kind": "cars", "time_ms": _now_ms(), "cars": self.cars})

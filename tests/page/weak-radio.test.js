@@ -27,6 +27,7 @@ class Story {
   #sockets = 0;
   random;
   isCut = false;
+  accepts_ms = 0; // how long the server takes to accept a connection
 
   /** @param {string} radio @param {number} seed */
   constructor(radio, seed) {
@@ -71,24 +72,27 @@ class Story {
     const say = (/** @type {object} */ message) => down(() => socket.onmessage?.({ data: JSON.stringify(message) }));
     const frame = () => ({ ...state(), vehicle: 'car', made_ms: this.now_ms, server: { time_ms: this.serverTime(), boot: 'a' } });
     let newest = frame();
+    let took_ms = 0;
     const beat = () => {
       if (socket.isClosed) return;
       newest = frame();
-      if (!socket.isOffered) say({ kind: 'offer', seq: (socket.made += 1), of: ['state'], time_ms: this.serverTime() });
+      if (!socket.isOffered) say({ kind: 'offer', seq: (socket.made += 1), of: ['state'], took_ms });
       socket.isOffered = true;
       this.later(100, beat);
     };
     socket.send = (/** @type {string} */ text) => up(() => {
       if (JSON.parse(text).kind !== 'take') return;
       socket.isOffered = false;
+      took_ms = this.serverTime();
       say(newest);
     });
-    up(() => down(() => up(() => { // the connection, then the request on it
+    up(() => down(() => up(() => this.later(this.accepts_ms, () => { // the connection, then the request on it
+      took_ms = this.serverTime();
       down(() => socket.onopen?.());
       say({ kind: 'hello', boot: 'a', run: 'a', time_ms: this.serverTime(), vehicle: 'car', vehicles: ['car'], build: '', last_event: 0 });
       say(newest);
       this.later(50, beat);
-    })));
+    }))));
     return socket;
   }
 
@@ -156,3 +160,11 @@ for (const radio of Object.keys(RADIOS)) {
     }
   });
 }
+
+test('a server that took long to accept makes the first frame look old, and no other', (t) => {
+  const story = new Story('fair', 1);
+  story.accepts_ms = 4200;
+  const { errors_ms, share } = watch(t, story);
+  assert.ok(Math.min(...errors_ms) >= -200);
+  assert.ok(share > 0.6, `${share} of the time live`);
+});

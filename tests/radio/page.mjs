@@ -10,7 +10,7 @@ import { storeAlone } from '../page/alone.mjs';
 const [tree = '.', address = '', key = ''] = process.argv.slice(2);
 console.error = () => {}; // nothing is drawn here
 const Store = await storeAlone(path.resolve(tree, 'static/js'));
-const store = new Store(() => new WebSocket(address, { headers: { Authorization: `Bearer ${key}` } }));
+const store = new Store(() => new WebSocket(address, { headers: { Authorization: `Bearer ${key}` } }).on('error', () => {})); // one that is given up ends the program without
 store.painter.picture = store.painter.look = () => {};
 const age_ms = () => Date.now() - store.frame.server.time_ms; // server and page run on one machine
 store.on('beat', () => {

@@ -1292,8 +1292,8 @@ export interface Offer {
   kind: "offer";
   seq: number;
   of: Array<"state" | "scan" | "timeline" | "cars" | "beside">;
-  /** when it was sent, after the page's last take was received */
-  time_ms: number;
+  /** when the page's last take was received; before the first, when it connected */
+  took_ms: number;
 }
 
 /** Offers control to another page, whose operator reads back what is in force; until then control stays where it is. */

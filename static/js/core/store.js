@@ -202,7 +202,7 @@ export class Store extends Known {
     switch (message.kind) {
       case 'hello': return this.#greeted(message, at_ms);
       case 'offer':
-        this.#clock.note(message.time_ms, at_ms, this.socket.asked_ms);
+        this.#clock.note(message.took_ms, at_ms, this.socket.asked_ms);
         return this.socket.takeInTurn(() => this.scans.offered(message.seq, this.now()));
       case 'state': return this.#state(message, at_ms);
       case 'cars':

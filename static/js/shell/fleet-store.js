@@ -161,7 +161,7 @@ export class FleetStore {
       case 'hello':
         return this.#greeted(message, at_ms);
       case 'offer':
-        this.#clock.note(message.time_ms, at_ms, this.socket.asked_ms);
+        this.#clock.note(message.took_ms, at_ms, this.socket.asked_ms);
         return void this.socket.send({ kind: 'take', seq: message.seq });
       case 'cars':
         return this.#list(message, at_ms);

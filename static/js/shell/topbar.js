@@ -42,11 +42,11 @@ export function mount(root, store, say) {
   function draw() {
     const view = store.chain;
     drawChain(chain, view);
-    const name = view.word === 'Live' && view.isWeak ? 'Weak radio' : view.word;
+    const name = view.word === 'Live' && view.isWeak ? 'Weak' : view.word; // a narrow bar has no place for more
     setText(word, name);
     const since = view.age_s === null ? '' : ` ${age(view.age_s)} s`;
     setWords(wordAge, since.trim());
-    setAttribute(link, 'aria-label', `${name}${since}: the link to the car. ${view.sentence}`); // begins with what is seen
+    setAttribute(link, 'aria-label', `${name}${since}: the link to the car. ${view.sentence}${view.isWeak ? ` ${view.detail}` : ''}`); // begins with what is seen
     setText(clock, timeOfDay(Date.now()));
     const speed_mps = store.signal('speed')?.value?.speed_mps;
     const isKnown = typeof speed_mps === 'number';
