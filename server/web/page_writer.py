@@ -189,10 +189,8 @@ class PageWriter:
             self._is_greeted = True
             self._go_on()
             await self._send(hello())
-            with contextlib.suppress(NotServed):
-                await self._bus.request(
-                    self._vehicle, {"kind": "refresh"}, deadline_s=0.5
-                )  # there may have been no viewer for a while
+            with contextlib.suppress(NotServed):  # there may have been no viewer for a while
+                await self._bus.request(self._vehicle, {"kind": "refresh"}, deadline_s=0.5)
             await self._send_newest("state", unasked=True)
             while True:
                 await self._wake.wait()
