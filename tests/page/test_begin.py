@@ -12,7 +12,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import expect
 
-from tests.page.conftest import Phone
+from tests.page.conftest import LIVE, Phone
 from tests.page.processes import Process, running, server, simulate
 
 # Notes what stands there once the first drawing is done, in the task in which it was.
@@ -42,7 +42,7 @@ async def test_the_first_picture_of_the_car_is_whole_and_what_lies_under_the_fol
     await phone.live()
     await expect(phone.page.locator("[data-part=checks] li").first).to_be_attached()
     first = await phone.page.evaluate("window.first")
-    assert first["word"] == "Live"
+    assert LIVE.fullmatch(first["word"])
     assert re.fullmatch(r"−?[0-9]+\.[0-9]", first["speed"]), first
     assert first["strip"]
     assert first["checks"] == 0

@@ -16,7 +16,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, Locator, expect
 
 from tests.page.barriers import no_barrier
-from tests.page.conftest import PHONE, Phone, phone_in
+from tests.page.conftest import LIVE, PHONE, Phone, phone_in
 from tests.page.processes import Process, free_port, running, server, simulate
 
 SETTINGS = """[limits.link_late]
@@ -183,7 +183,7 @@ async def test_ten_items_are_walked_fixed_and_signed_within_15_taps(
             assert steps[-1] == "signed"
             assert steps.count("item") >= 10 + len(fixed), "each item, and each failure"
         await watch.kill()
-        await expect(phone.f("word")).not_to_have_text("Live", timeout=12_000)
+        await expect(phone.f("word")).not_to_have_text(LIVE, timeout=12_000)
     async with (
         running(*server(tmp_path, car.address, port)) as watch,
         httpx.AsyncClient(base_url=watch.address) as client,

@@ -24,7 +24,7 @@ WATCH = """() => {
     const word = document.querySelector('#monitor [data-f=word]')?.textContent;
     const digits = document.querySelector('.gauge .speed')?.textContent ?? '';
     const isCovered = document.querySelector('.veil')?.dataset.on;
-    if (word === 'Live' && /[0-9]/.test(digits) && !isCovered) window.thereAt = performance.now();
+    if (['Live', 'Weak'].includes(word) && /[0-9]/.test(digits) && !isCovered) window.thereAt = performance.now();
     else requestAnimationFrame(look);
   };
   requestAnimationFrame(look);

@@ -18,7 +18,7 @@ from playwright.async_api import Browser, Error, Page, expect
 
 from tests.page import house
 from tests.page.barriers import no_barrier
-from tests.page.conftest import PHONE
+from tests.page.conftest import LIVE, PHONE
 from tests.page.processes import Process, free_port, running, server, simulate
 
 KEPT = """async () => {
@@ -381,7 +381,7 @@ async def test_without_a_worker_the_page_is_the_same(browser: Browser, project: 
             };"""
         )
         await page.goto(one.address)
-        await expect(page.locator('#monitor [data-f="word"]')).to_have_text("Live", timeout=12_000)
+        await expect(page.locator('#monitor [data-f="word"]')).to_have_text(LIVE, timeout=12_000)
         await asyncio.sleep(5.0)  # by then it would have been registered
         await page.evaluate("document.querySelector('[data-screen=about]').click()")
         await expect(page.locator("#monitor .facts")).to_contain_text("because it does not trust the certificate")
