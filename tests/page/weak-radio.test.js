@@ -28,6 +28,7 @@ class Story {
   random;
   isCut = false;
   accepts_ms = 0; // how long the server takes to accept a connection
+  every_ms = 100; // from one state to the next
 
   /** @param {string} radio @param {number} seed */
   constructor(radio, seed) {
@@ -78,7 +79,7 @@ class Story {
       newest = frame();
       if (!socket.isOffered) say({ kind: 'offer', seq: (socket.made += 1), of: ['state'], took_ms });
       socket.isOffered = true;
-      this.later(100, beat);
+      this.later(this.every_ms, beat);
     };
     socket.send = (/** @type {string} */ text) => up(() => {
       if (JSON.parse(text).kind !== 'take') return;
@@ -160,6 +161,14 @@ for (const radio of Object.keys(RADIOS)) {
     }
   });
 }
+
+test('a page comes live though each connection takes the server long, and its first frames look too old', (t) => {
+  const story = new Story('fair', 2);
+  story.accepts_ms = 2600;
+  story.every_ms = 1100; // a server that is busy
+  const { share } = watch(t, story);
+  assert.ok(share > 0.3, `${share} of the time live`);
+});
 
 test('a server that took long to accept makes the first frame look old, and no other', (t) => {
   const story = new Story('fair', 1);
