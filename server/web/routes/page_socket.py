@@ -35,7 +35,9 @@ async def page_socket(
 
         def hello(name: str) -> Hello:
             found: Hello = {**app.hello(name), "who": {"id": principal.id, "name": principal.name, "role": role}}
-            return found if ticket is None else {**found, "ticket": ticket}
+            if ticket is not None:
+                found["ticket"] = ticket
+            return found
 
         if fleet == "1" or name is None:
             await app.hub.serve_fleet(socket, partial(hello, ""), principal=principal)

@@ -64,10 +64,12 @@ export class PageSocket {
     return this.#asked_ms;
   }
 
-  /** What was asked for came, fresh or not. @param {number} at_ms */
+  /** A frame came, fresh or not: if it was asked for, the connection is alive, whatever is known of the clocks yet. @param {number} at_ms */
   answered(at_ms) {
-    if (this.#isOwed) this.trip = measured(this.trip, at_ms - this.#asked_ms);
+    if (!this.#isOwed) return;
     this.#isOwed = false;
+    this.trip = measured(this.trip, at_ms - this.#asked_ms);
+    this.proof(at_ms);
   }
 
   /**
