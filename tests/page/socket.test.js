@@ -92,6 +92,20 @@ test('a connection of a weak radio gets more time, and what was measured holds f
   assert.equal(sockets.length, 3);
 });
 
+test('what was asked for proves the connection, whatever is known of the clocks yet', () => {
+  const { pageSocket, sockets, at, look } = set();
+  pageSocket.look(0);
+  at(40);
+  sockets[0]?.onopen();
+  at(2400);
+  pageSocket.send({ kind: 'take', seq: 1 });
+  pageSocket.answered(2450);
+  look(2500, 4900);
+  assert.equal(sockets[0]?.isClosed, false);
+  look(5000, 5100);
+  assert.equal(sockets[0]?.isClosed, true);
+});
+
 test('over a good radio that was cut a dial comes every two or three seconds, now and then a longer one', () => {
   const { pageSocket, sockets, at, look } = set();
   pageSocket.look(0);

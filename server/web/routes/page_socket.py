@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import cast
 
 from fastapi import APIRouter, WebSocket
 
@@ -35,9 +34,10 @@ async def page_socket(
     with app.access.next_ticket(principal) as ticket:
 
         def hello(name: str) -> Hello:
-            who = {"id": principal.id, "name": principal.name, "role": role}
-            found = cast(Hello, {**app.hello(name), "who": who})
-            return found if ticket is None else {**found, "ticket": ticket}
+            found: Hello = {**app.hello(name), "who": {"id": principal.id, "name": principal.name, "role": role}}
+            if ticket is not None:
+                found["ticket"] = ticket
+            return found
 
         if fleet == "1" or name is None:
             await app.hub.serve_fleet(socket, partial(hello, ""), principal=principal)
