@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import cast
 
 from fastapi import APIRouter, WebSocket
 
@@ -34,7 +35,8 @@ async def page_socket(
     with app.access.next_ticket(principal) as ticket:
 
         def hello(name: str) -> Hello:
-            found: Hello = {**app.hello(name), "who": {"id": principal.id, "name": principal.name, "role": role}}
+            who = {"id": principal.id, "name": principal.name, "role": role}
+            found = cast(Hello, {**app.hello(name), "who": who})
             if ticket is not None:
                 found["ticket"] = ticket
             return found
