@@ -276,9 +276,9 @@ class Access:
         """A ticket for one socket of `who`, within 5 s."""
         return self._tickets.new(who.id, now_s=self._now())
 
-    def next_ticket(self, who: Principal) -> AbstractContextManager[str | None]:
-        """A ticket for the socket after the one that is served meanwhile; None: none is needed."""
-        return nullcontext() if self.is_open else self._tickets.beside_socket(who.id, now=self._now)
+    def next_ticket(self, who: Principal) -> AbstractContextManager[str]:
+        """A ticket for the socket after the one that is served meanwhile; "": none is needed."""
+        return nullcontext("") if self.is_open else self._tickets.beside_socket(who.id, now=self._now)
 
     def use_ticket(self, ticket: str, who: Principal) -> bool:
         """Whether `who` may open a socket with it; it is used up."""

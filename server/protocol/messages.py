@@ -49,8 +49,8 @@ class ServerHello(TypedDict):
 
 class Hello(ServerHello):
     who: Identity
-    ticket: NotRequired[
-        Annotated[str, doc("for the next socket of this device, until 10 minutes after the end of this one")]
+    ticket: Annotated[
+        str, doc('for the next socket of this device, until 10 minutes after the end of this one; "": none is needed')
     ]
 
 

@@ -17,6 +17,7 @@ from tests.radio.seen import Seen
 
 ROOT = Path(__file__).parents[2]
 IS_POSSIBLE = os.geteuid() == 0 and shutil.which("ip") is not None and Path("/dev/net/tun").exists()
+SETTLES_S = 8.0  # a server that starts answers a dial late
 WHY_NOT = "needs root, iproute2 and /dev/net/tun"
 
 
@@ -71,6 +72,7 @@ async def serving(air: Air, data: Path, *, tree: Path = ROOT, car_end: int = 0) 
         arguments = ("serve", "--host", f"{air.net}.1", "--port", "8000", "--tls", "off", "--data", str(data))
         more = ("--vehicle", f"car={car.address}", "--no-worker")
         async with running(*arguments, *more, folder=tree, within=air.within(0)) as server:
+            await asyncio.sleep(SETTLES_S)
             yield server.shown, key
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import cast
 
 from fastapi import APIRouter, WebSocket
 
 from server.access.identity import principal_of
 from server.protocol import replay_commands
-from server.protocol.messages import Hello, RoleName
+from server.protocol.messages import Hello, Identity, RoleName
 from server.web.services import services
 
 router = APIRouter()
@@ -35,11 +34,8 @@ async def page_socket(
     with app.access.next_ticket(principal) as ticket:
 
         def hello(name: str) -> Hello:
-            who = {"id": principal.id, "name": principal.name, "role": role}
-            found = cast(Hello, {**app.hello(name), "who": who})
-            if ticket is not None:
-                found["ticket"] = ticket
-            return found
+            who: Identity = {"id": principal.id, "name": principal.name, "role": role}
+            return {**app.hello(name), "who": who, "ticket": ticket}
 
         if fleet == "1" or name is None:
             await app.hub.serve_fleet(socket, partial(hello, ""), principal=principal)

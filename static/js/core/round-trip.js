@@ -13,6 +13,8 @@ const UNKNOWN = { dial_ms: 5000, ticket_ms: 5000, quiet_ms: 5000 };
 const REPEATED_MS = 1000;
 const LONGEST_MS = 8000;
 const QUIET_AT_LEAST_MS = 2500;
+/** From one frame to the next offer, with a late one between. */
+const OFFERED_MS = 1000;
 
 /**
  * The estimate with one more measurement (RFC 6298, 2.2 and 2.3).
@@ -33,7 +35,7 @@ export function limitsOf(trip) {
   if (!trip) return UNKNOWN;
   const answer_ms = trip.mean_ms + 4 * trip.spread_ms; // RFC 6298's time-out
   const dial_ms = Math.min(LONGEST_MS, 2 * REPEATED_MS + answer_ms);
-  return { dial_ms, ticket_ms: dial_ms, quiet_ms: Math.min(LONGEST_MS, Math.max(QUIET_AT_LEAST_MS, 2 * answer_ms)) };
+  return { dial_ms, ticket_ms: dial_ms, quiet_ms: Math.min(LONGEST_MS, Math.max(QUIET_AT_LEAST_MS, OFFERED_MS + answer_ms)) };
 }
 
 /** @param {RoundTrip | null} trip */

@@ -23,7 +23,7 @@ export class Admission {
 
   /** The server greeted this page. @param {import('../core/protocol-types.js').Hello} hello */
   greeted({ ticket }) {
-    this.#next = ticket ?? null;
+    this.#next = ticket || null; // a server of before sends none
   }
 
   /**
