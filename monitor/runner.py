@@ -90,9 +90,17 @@ class Monitor:
         if changed is None and len(self.alarms) > len(self._declared) + 1:
             for name in self.alarms.keys() - {check.id for check in self._declared} - {IMPAIRED}:
                 transitions += self._advance(name, NOT_HERE, snapshot.now_s, ())
+                transitions += self._end_foreign(self.alarms[name], snapshot.now_s)
         if self.crashes or (changed is None and (self.failed_parts or not self.alarms[IMPAIRED].is_at_rest)):
             transitions += self._advance(IMPAIRED, self._runner.impaired(self.failed_parts), snapshot.now_s, ())
         return tuple(transitions)
+
+    def _end_foreign(self, alarm: Alarm, now_s: float) -> tuple[Transition, ...]:
+        """End an alarm without a check here that somebody has acknowledged: nothing else would."""
+        if not (alarm.latched and alarm.acknowledged) or alarm.suppressed_by or alarm.shelved_until_s is not None:
+            return ()
+        self.alarms[alarm.id], ended = end(alarm, now_s, NOT_HERE.text)
+        return ended
 
     def has_immediate(self, changed: Collection[str]) -> bool:
         """Whether a step for these signals would judge anything."""

@@ -113,6 +113,7 @@ def _make_tables(database: sqlite3.Connection, path: Path | None) -> None:
 
 def note_run(database: sqlite3.Connection, run: Run) -> None:
     """Stores where a run begins, if it is not stored yet; to be done before its first event is."""
+    database.execute(_RUNS)  # the disk may have refused the table when the log was opened
     database.execute("INSERT OR IGNORE INTO run (id, before) VALUES (?, ?)", (run.id, orjson.dumps(dict(run.before))))
 
 

@@ -57,7 +57,8 @@ class LocalBus:
         self._journal.on_saved = lambda: _call_soon(loop, self._release_saved)
         numbered = self._journal.append(vehicle, events)
         self._held.setdefault(vehicle, numbered[0]["n"])
-        loop.call_later(SLOW_DISK_S, self._release, vehicle, numbered[-1]["n"])
+        wait_s = 0.0 if self._journal.trouble else SLOW_DISK_S
+        loop.call_later(wait_s, self._release, vehicle, numbered[-1]["n"])
         return numbered
 
     def _release_saved(self) -> None:
@@ -159,13 +160,14 @@ class LocalBus:
         handler = self._handlers.get(vehicle)
         if handler is None:
             raise NotServed(f"no vehicle is named {vehicle}")
+        before = self._journal.last(vehicle)
         try:
             async with asyncio.timeout(deadline_s):
                 answer = await handler(command)
         except TimeoutError:
             raise NotServed(f"{vehicle} did not answer within {deadline_s:g} s", outcome="unknown") from None
         last = self._journal.last(vehicle)
-        while self._held.get(vehicle, last + 1) <= last:  # `SLOW_DISK_S` at most
+        while last > before and self._held.get(vehicle, last + 1) <= last:  # `SLOW_DISK_S` at most
             await self._changed.wait()
         return answer
 

@@ -21,7 +21,7 @@ class RemoteLogs:
         self._questions = questions
         self._on_new = on_new
         self._caches: dict[str, EventCache] = {}
-        self._resuming: set[str] = set()  # whose agents answer `resume`
+        self._resuming: dict[str, bool] = {}  # whether their agents answer `resume`, once they said it
         self._fetches: dict[str, asyncio.Task[None]] = {}
         self._changed = asyncio.Event()
 
@@ -58,16 +58,20 @@ class RemoteLogs:
         is_other = cache.run not in ("", run)
         cache.begin(run, last)
         if is_other:
+            self._changed.set()
+            self._changed = asyncio.Event()
             self._on_new(vehicle)  # whoever follows it goes on in this run
         self._fetch_missing(vehicle)
 
     def note_resuming(self, vehicle: str, *, is_able: bool) -> None:
         """Whether the agent is of a version that answers `resume`."""
-        (self._resuming.add if is_able else self._resuming.discard)(vehicle)
+        self._resuming[vehicle] = is_able
 
     async def resume(self, vehicle: str, run: str, n: int) -> Resumed:
         """As `PageBus.resume`."""
-        if vehicle not in self._resuming:  # of an agent of before, only a shorter log is known to be another one
+        if vehicle not in self._resuming:
+            raise NotServed(f"{vehicle} has not said yet what it answers")
+        if not self._resuming[vehicle]:  # of an agent of before, only a shorter log is known to be another one
             common = n if n <= self.last(vehicle) else 0
             return Resumed(common=common, after=common, new_after=common)
         answer = await self._questions.ask(vehicle, wire.Ask(do="resume", run=run, n=n))

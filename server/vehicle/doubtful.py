@@ -135,7 +135,7 @@ class Doubtful:
 
     def _given_up(self, doubt: _Doubt) -> tuple[Held, ...]:
         """What is held without an answer in time. The doubt stays: a late answer must not begin another one."""
-        held, doubt.held = tuple(doubt.held), []
+        held, doubt.held, doubt.answers = tuple(doubt.held), [], 0
         self._bytes -= sum(one.size for one in held)
         return held
 

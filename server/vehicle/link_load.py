@@ -76,7 +76,7 @@ class LinkLoad:
     def level(self) -> Level:
         return LEVELS[self.step]
 
-    def look(self, late_s: float, now_s: float, trip_s: float = 0.0) -> bool:
+    def look(self, late_s: float, now_s: float, trip_s: float) -> bool:
         """`late_s`: of what comes, beyond what the link needs when nothing waits; `trip_s`: the longest of the last
         round trips. True where the step changed."""
         before = self.step

@@ -181,10 +181,10 @@ class SubscriptionTable:
             return True
         return self.load.level.records_others and self.probation.look(self._now())
 
-    def look_at_load(self, late_s: float) -> tuple[bool, list[str]]:
+    def look_at_load(self, late_s: float, trip_s: float) -> tuple[bool, list[str]]:
         """Whether less or more is to be subscribed to now, and the topics that are left because of it."""
         before = self.load.step
-        if not self.load.look(late_s, self._now()):
+        if not self.load.look(late_s, self._now(), trip_s):
             return False, []
         if self.load.step == 0:
             self.probation.opened(self._now())

@@ -151,9 +151,9 @@ class Subscriptions:
             if self._offer is not None:
                 self._subscribe()
 
-    def watch_load(self, late_s: float) -> bool:
+    def watch_load(self, late_s: float, trip_s: float) -> bool:
         """Subscribes to less where the link is late, and to more once it is in time; True where that changed."""
-        changed, left = self.table.look_at_load(late_s)
+        changed, left = self.table.look_at_load(late_s, trip_s)
         self._note_left(left)
         if changed:
             self.map_again()

@@ -142,7 +142,9 @@ class Tick:
     def watch_load(self, now_s: float) -> None:
         """Over a slow link less is subscribed to before what is judged grows old."""
         topics, transport = self._parts.connection.subscriptions, self._parts.judgement.transport
-        if self._parts.connection.phase == "monitoring" and topics.watch_load(transport.queued_s(now_s)):
+        if self._parts.connection.phase != "monitoring":
+            return
+        if topics.watch_load(transport.queued_s(now_s), transport.trip_s):
             late_s = transport.late_s(now_s)
             why = f"The link is slow, {late_s:.1f} s late" if late_s > RESTORE_BELOW_S else "The link is fast enough"
             self._parts.event_log.note(

@@ -26,7 +26,7 @@ from server.web.fair_wakeup import FairWakeup
 
 EVENTS_A_BATCH = 100
 RESTARTED = 1012  # RFC 6455: the page dials again, and is greeted anew
-HELLO_WITHIN_S = 1.0  # until then no event is sent: the page's hello names the newest that it has
+HELLO_WITHIN_S = 10.0  # until then no event is sent: the hello names the newest that the page has; it waits 8 s at most
 OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
 BATCH_EVERY_S = 0.2  # to a page that catches up: with its other messages it sends at most 25 a second
 MAX_REPLIES = 200  # waiting for a page that does not read
@@ -114,8 +114,8 @@ class PageWriter:
         """The page said hello, and which event is the newest that it has, of which run; only the first hello counts.
         `is_former`: it knows the former names of phases."""
         self._is_former = self._is_former or (is_former and not self._has_begun)
-        if not self._has_begun and type(have_event) is int:
-            self._have, self._have_run = have_event, run if isinstance(run, str) else None
+        if not self._has_begun and type(have_event) is int and have_event < 1 << 53:
+            self._have, self._have_run = have_event, run if isinstance(run, str) and len(run) <= 40 else None
             if self._is_greeted:
                 self._go_on()
         self._has_begun = True
@@ -187,6 +187,7 @@ class PageWriter:
             self._since_s = self._now()
             self._event, self._run = self._bus.last_event(self._vehicle), self._bus.run(self._vehicle)
             self._is_greeted = True
+            asyncio.get_running_loop().call_later(HELLO_WITHIN_S, self._wake.set)  # for a client that says no hello
             self._go_on()
             await self._send(hello())
             with contextlib.suppress(NotServed):  # there may have been no viewer for a while

@@ -17,7 +17,7 @@ from tests.server.vehicle.keeping_bridge import KeepingBridge, Topic, monitored
 from tests.server.vehicle.test_compared_cars import fix
 from tests.server.vehicle.test_sources import odometry, of_laser
 
-pytestmark = [pytest.mark.world(n=33), pytest.mark.virtual_time, pytest.mark.slow]
+pytestmark = [pytest.mark.virtual_time, pytest.mark.slow]
 
 TOPICS = {
     "/catvehicle/vel": Topic("geometry_msgs/Twist"),

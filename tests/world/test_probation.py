@@ -97,7 +97,7 @@ def test_one_that_makes_all_others_late_is_found_and_left_and_the_others_are_rec
             recorded_s += 0.1
             delivery.heard("/a", clock[0])
             delivery.heard("/z", clock[0])
-        changed, now_left = table.look_at_load(1.1 if "/cloud" in table.recorded.topics else 0.05)
+        changed, now_left = table.look_at_load(1.1 if "/cloud" in table.recorded.topics else 0.05, 0.0)
         left += now_left
         if changed or table.tries_another():
             subscribe()

@@ -246,14 +246,14 @@ def test_a_slow_link_is_asked_for_less_step_by_step_and_for_more_again_with_pati
     load = LinkLoad()
     steps = [load.step]
     for tick in range(60):
-        if load.look(0.8 + tick * 0.01, tick / 10):
+        if load.look(0.8 + tick * 0.01, tick / 10, 0.0):
             steps.append(load.step)
     assert steps == list(range(len(LEVELS)))
     now_s = 6.0
     restored = []
     while load.step:
         now_s += 0.1
-        if load.look(0.05, now_s):
+        if load.look(0.05, now_s, 0.0):
             restored.append(now_s)
     assert len(restored) == len(LEVELS) - 1
     assert all(after - before >= RESTORE_AFTER_S - 0.11 for before, after in pairwise([6.0, *restored]))
@@ -261,9 +261,9 @@ def test_a_slow_link_is_asked_for_less_step_by_step_and_for_more_again_with_pati
 
 def test_a_very_slow_link_is_asked_for_the_least_at_once_a_hiccup_for_nothing_less() -> None:
     load = LinkLoad()
-    assert not any(load.look(2.0, tick / 10) for tick in range(4))
-    assert not load.look(0.1, 0.4)
-    assert any(load.look(2.0, 1.0 + tick / 10) for tick in range(6))
+    assert not any(load.look(2.0, tick / 10, 0.0) for tick in range(4))
+    assert not load.look(0.1, 0.4, 0.0)
+    assert any(load.look(2.0, 1.0 + tick / 10, 0.0) for tick in range(6))
     assert load.step == len(LEVELS) - 1
 
 

@@ -44,7 +44,7 @@ export class EventLog {
     }
     this.#joining = resumes && boot !== this.#boot ? boot : null;
     if (this.#joining === null) {
-      if (boot !== this.#boot && last_event < this.last) this.last = 0; // a server of before, that lost its log
+      if (boot !== this.#boot && last_event < this.last) this.last = this.#left.new_after = 0; // a server of before, that lost its log
       this.#boot = boot;
     }
     this.#blind = { until: last_event, gap: this.open = { blind_s, raised: 0, cleared: 0, at_ms } };
@@ -65,7 +65,7 @@ export class EventLog {
   /** Whether this page never had the event, by whatever number. @param {AlarmEvent} event */
   #isNew(event) {
     const { events, newest_ms, new_after } = this.#left;
-    return (event.n > new_after || event.at_ms > newest_ms) && !events.has(contentOf(event));
+    return (event.n > new_after || event.at_ms >= newest_ms) && !events.has(contentOf(event));
   }
 
   /** Forget everything: what comes is of another car. */

@@ -41,7 +41,7 @@ function understand(alarm) {
   alarm.priority = priority;
   alarm.title ||= alarm.id;
   if (!STATES.includes(alarm.state)) alarm.state = 'UNACKED';
-  if (isForeign || !SOUNDS.includes(alarm.sound)) alarm.sound = 'high';
+  if (!SOUNDS.includes(alarm.sound) || (isForeign && alarm.sound !== 'none')) alarm.sound = 'high'; // none: it was silenced
   if ('actions' in alarm) alarm.place = !isForeign && PLACES.includes(alarm.place ?? '') ? alarm.place : 'dialog'; // a summary of a car has none
 }
 

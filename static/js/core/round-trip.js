@@ -19,10 +19,11 @@ const OFFERED_MS = 1000;
 /**
  * The estimate with one more measurement (RFC 6298, 2.2 and 2.3).
  * @param {RoundTrip | null} trip null: there was none yet
- * @param {number} sample_ms
+ * @param {number} waited_ms
  * @returns {RoundTrip}
  */
-export function measured(trip, sample_ms) {
+export function measured(trip, waited_ms) {
+  const sample_ms = Math.min(waited_ms, LONGEST_MS); // longer, the page itself stood still
   if (!trip) return { mean_ms: sample_ms, spread_ms: sample_ms / 2 };
   return {
     mean_ms: trip.mean_ms + (sample_ms - trip.mean_ms) / 8,
@@ -30,12 +31,17 @@ export function measured(trip, sample_ms) {
   };
 }
 
+/** Whether a measurement does not fit what was known. @param {RoundTrip | null} trip @param {number} sample_ms */
+export function isSlower(trip, sample_ms) {
+  return trip === null || sample_ms > trip.mean_ms + 4 * trip.spread_ms;
+}
+
 /** @param {RoundTrip | null} trip @returns {Limits} */
 export function limitsOf(trip) {
   if (!trip) return UNKNOWN;
   const answer_ms = trip.mean_ms + 4 * trip.spread_ms; // RFC 6298's time-out
   const dial_ms = Math.min(LONGEST_MS, 2 * REPEATED_MS + answer_ms);
-  return { dial_ms, ticket_ms: dial_ms, quiet_ms: Math.min(LONGEST_MS, Math.max(QUIET_AT_LEAST_MS, OFFERED_MS + answer_ms)) };
+  return { dial_ms, ticket_ms: Math.max(UNKNOWN.ticket_ms, dial_ms), quiet_ms: Math.min(LONGEST_MS, Math.max(QUIET_AT_LEAST_MS, OFFERED_MS + answer_ms)) };
 }
 
 /** @param {RoundTrip | null} trip */

@@ -1,9 +1,9 @@
 // The page's end of the socket: dials for ever, and hangs up on a connection that has gone quiet (a browser may never report
 // that one is dead) and on a dial that does not open (a server may be stopped while its port still accepts).
 
-import { limitsOf, measured } from './round-trip.js';
+import { isSlower, limitsOf, measured } from './round-trip.js';
 
-/** Of so many dials in a row one gets twice the time: the radio may have become slower than it was measured. */
+/** Of so many dials in a row one gets twice the time, and that of an unknown radio at least: it may be another one than was measured. */
 const DIALS_A_LONG_ONE = 3;
 /** Least time from one dial to the next [ms]. */
 const FIRST_WAIT_MS = 300;
@@ -99,7 +99,7 @@ export class PageSocket {
   #limit_ms() {
     const { dial_ms, quiet_ms } = limitsOf(this.trip);
     if (this.#isOpen) return quiet_ms;
-    return this.#failed % DIALS_A_LONG_ONE === DIALS_A_LONG_ONE - 1 ? 2 * dial_ms : dial_ms;
+    return this.#failed % DIALS_A_LONG_ONE === DIALS_A_LONG_ONE - 1 ? Math.max(2 * dial_ms, limitsOf(null).dial_ms) : dial_ms;
   }
 
   /**
@@ -162,7 +162,8 @@ export class PageSocket {
       this.#failed = 0;
       this.#proof_ms = this.now();
       this.#asked_ms = socket.dialled_ms ?? now_ms;
-      this.trip ??= measured(null, ((event?.at_ms ?? this.#proof_ms) - this.#asked_ms) / 2); // to connect, and to become a WebSocket
+      const opened_ms = ((event?.at_ms ?? this.#proof_ms) - this.#asked_ms) / 2; // to connect, and to become a WebSocket
+      if (isSlower(this.trip, opened_ms)) this.trip = measured(null, opened_ms);
       this.ear.opened();
     };
     socket.onmessage = (/** @type {{data: any, at_ms?: number}} */ event) => {

@@ -1,6 +1,6 @@
 // The list of the departure check in Settings: add, change, remove, reorder, and back to the one of the vehicle profile.
 
-import { decimalOf } from '../core/decimal.js';
+import { decimalOf, local } from '../core/decimal.js';
 import { added, isSame, moved, rowOf } from './departure-layout.js';
 import { styled } from '../core/style-sheet.js';
 import { request, sentenceOf } from '../control/request.js';
@@ -86,9 +86,9 @@ class DepartureList {
     kind.value = row.kind;
     const fix = input('What to do if it fails', row.title, row.fix ?? '', 300);
     const ofWhat = about?.of ? input(about.of === 'check' ? 'Id of the check' : 'Name of the topic', row.title, row.of ?? '', 200) : null;
-    const need = about?.need === null || !about ? null : input(`Needed ${about.unit}`, row.title, String(row.need ?? about.need), 10);
+    const need = about?.need === null || !about ? null : input(`Needed ${about.unit}`, row.title, local(String(row.need ?? about.need)), 10);
     const days = input('Days', `how often, ${row.title}`, row.every_days ? String(row.every_days) : '', 5);
-    const way = input('Kilometres', `how often, ${row.title}`, row.every_km ? String(row.every_km) : '', 8);
+    const way = input('Kilometres', `how often, ${row.title}`, row.every_km ? local(String(row.every_km)) : '', 8);
     const change = (/** @type {Partial<ListRow>} */ part) => void this.#send((rows) => rows.map((one) => (one.id === row.id ? { ...one, ...part } : one)));
     for (const [element, act] of /** @type {[HTMLInputElement | HTMLSelectElement | null, () => void][]} */ ([
       [title, () => change({ title: title.value })],
@@ -113,7 +113,7 @@ class DepartureList {
       html('div', { class: 'two' }, html('span', { class: 'field' }, kind), ...(need ? [html('span', { class: 'field' }, need, html('span', { class: 'u' }, about?.unit ?? ''))] : [])),
       ...(ofWhat ? [html('span', { class: 'field wide-field' }, ofWhat)] : []), html('span', { class: 'field wide-field' }, fix),
       html('div', { class: 'two every' }, html('span', { class: 'field' }, html('span', { class: 'u' }, 'every'), days, html('span', { class: 'u' }, 'days')), html('span', { class: 'field' }, html('span', { class: 'u' }, 'or'), way, html('span', { class: 'u' }, 'km'))), ...keys);
-    const fields = /** @type {[HTMLInputElement | HTMLSelectElement | null, (of: ListRow) => string][]} */ ([[title, (of) => of.title], [kind, (of) => of.kind], [fix, (of) => of.fix ?? ''], [ofWhat, ({ of }) => of ?? ''], [need, (of) => String(of.need ?? '')], [days, (of) => String(of.every_days ?? '')], [way, (of) => String(of.every_km ?? '')]]);
+    const fields = /** @type {[HTMLInputElement | HTMLSelectElement | null, (of: ListRow) => string][]} */ ([[title, (of) => of.title], [kind, (of) => of.kind], [fix, (of) => of.fix ?? ''], [ofWhat, ({ of }) => of ?? ''], [need, (of) => local(String(of.need ?? ''))], [days, (of) => String(of.every_days ?? '')], [way, (of) => local(String(of.every_km ?? ''))]]);
     const made = { element, row, fill: (/** @type {ListRow} */ now) => {
       made.row = now;
       for (const [field, valueOf] of fields) if (field && field !== document.activeElement) field.value = valueOf(now); // not what is being typed

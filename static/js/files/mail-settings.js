@@ -1,6 +1,6 @@
 // How this server sends mail: host, login, sender, who may be written to. Saved as a whole, tried with a key; the password goes one way.
 
-import { decimalOf } from '../core/decimal.js';
+import { decimalOf, local } from '../core/decimal.js';
 import { keptAt } from '../core/kept-at.js';
 import { request, sentenceOf } from '../control/request.js';
 import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
@@ -105,7 +105,7 @@ class MailForm {
     this.senderName.value = settings.sender_name;
     this.allowed.value = settings.allowed.join('\n');
     this.reportTo.value = (settings.report_to ?? []).join(', ');
-    this.limit.value = String(settings.limit_mb);
+    this.limit.value = local(String(settings.limit_mb));
     this.linkBase.value = settings.link_base;
     this.ca.value = settings.ca;
     this.password.placeholder = settings.has_password ? 'stored on the server' : 'none';

@@ -2,6 +2,8 @@
 
 import { limitsOf } from '../core/round-trip.js';
 
+const A_DAY_MS = 86_400_000;
+
 /**
  * @typedef {{code?: string, detail?: string}} Refusal as the server words it
  */
@@ -11,6 +13,8 @@ export class Admission {
   #shut = null;
   /** For the next socket, given with the one before. @type {string | null} */
   #next = null;
+  /** When one was fetched last: the answer to it renews the cookie of this device. */
+  #fetched_ms = Date.now();
 
   /**
    * @param {() => string} address of the socket
@@ -23,7 +27,7 @@ export class Admission {
 
   /** The server greeted this page. @param {import('../core/protocol-types.js').Hello} hello */
   greeted({ ticket }) {
-    this.#next = ticket || null; // a server of before sends none
+    this.#next = (Date.now() - this.#fetched_ms < A_DAY_MS ? ticket : null) || null; // a server of before sends none
   }
 
   /**
@@ -52,7 +56,10 @@ export class Admission {
         continue;
       }
       const answer = await fetch('/api/ticket', { method: 'POST', cache: 'no-store', signal: AbortSignal.timeout(within_ms) });
-      if (answer.ok) return (await answer.json()).ticket;
+      if (answer.ok) {
+        this.#fetched_ms = Date.now();
+        return (await answer.json()).ticket;
+      }
       if (answer.status !== 401) return null;
       const why = await answer.json().catch(() => ({}));
       if (!this.#shut) {

@@ -11,6 +11,7 @@ import pytest
 from server.judge import unit_survey
 from server.judge.drive import Drive as JudgedDrive
 from server.judge.offline import OfflineRun
+from server.judge.recorded_events import RecordedEvents
 from server.judge.settings_override import SettingsOverride
 from server.judge.sources.evidence import Evidence
 from server.recording.event_channels import read_recorded_events
@@ -70,7 +71,7 @@ class _Unread:
         return iter(())
 
 
-NOTHING: Any = type("Recorded", (), {"events": (), "settings": None, "notes": (), "has_alarms": False})()
+NOTHING = RecordedEvents()
 CATVEHICLE = {"/catvehicle/vel": TWIST, "/catvehicle/brake": WRENCH, "/catvehicle/accelerator": WRENCH}
 
 
