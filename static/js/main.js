@@ -231,7 +231,7 @@ class Page {
       name: store.name,
       onPaired: () => {
         setShut(false);
-        this.admission?.admit();
+        this.admission?.admit(store.socket);
       },
     })).catch(() => say('The pairing screen could not be loaded from the server. Reload the page.', 'Not paired'));
   }

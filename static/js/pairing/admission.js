@@ -42,8 +42,9 @@ export class Admission {
     return new TicketSocket(this.address(), async () => next, () => { this.#next = null; });
   }
 
-  /** The device was paired: what waits goes on. */
-  admit() {
+  /** The device was paired: what waited so long is dialled anew. @param {{hangUp: () => void}} socket */
+  admit(socket) {
+    socket.hangUp();
     this.#shut?.go();
     this.#shut = null;
   }
