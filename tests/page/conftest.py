@@ -148,7 +148,7 @@ class Phone:
 
     async def live(self) -> None:
         """Waits until the values are live."""
-        await expect(self.f("word")).to_have_text(LIVE, timeout=12_000)
+        await expect(self.f("word")).to_have_text(LIVE, timeout=40_000)
         await expect(self.f("veil")).not_to_have_attribute("data-on", re.compile("."))
 
     async def acknowledge_all(self) -> None:

@@ -54,7 +54,7 @@ async def test_in_a_recording_on_a_desktop(phone: Phone, tmp_path: Path) -> None
     await page.set_viewport_size({"width": 1440, "height": 900})
     data = tmp_path / "data"
     shutil.copytree(pallet_ahead(), data / "recordings" / "car" / "object-ahead")
-    async with running(*server(data)) as watch, httpx.AsyncClient(base_url=watch.address) as client:
+    async with running(*server(data)) as watch, httpx.AsyncClient(base_url=watch.address, timeout=60) as client:
         (one,) = (await client.get("/api/recordings")).json()["recordings"]
         await phone.open(f"{watch.address}/?replay={one['id']}&t=26")
         await page.wait_for_selector('html[data-replay="on"]', state="attached", timeout=OPENS_MS)
