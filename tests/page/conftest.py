@@ -96,6 +96,13 @@ DRAWN = """(states) => new Promise((done) => {
 })"""
 
 
+#: Whether the panel of this tab is where it stays.
+IN_FRONT = """(tab) => {
+    const panel = document.getElementById(`panel-${tab}`);
+    return Math.abs(panel.getBoundingClientRect().left - panel.parentElement.getBoundingClientRect().left) < 1;
+}"""
+
+
 class Phone:
     """A phone with the page open, and what its console said."""
 
@@ -137,6 +144,14 @@ class Phone:
 
     async def open(self, address: str) -> None:
         await self.page.goto(address)
+
+    async def show(self, tab: str) -> None:
+        """Shows a tab by its key, and waits until its panel stands still.
+
+        A tap that meets a panel on its way scrolls on to find what it looks for, and so to another tab.
+        """
+        await self.page.locator(f"#tab-{tab}").tap()
+        await self.page.wait_for_function(IN_FRONT, arg=tab)
 
     def f(self, name: str, root: str = "#monitor") -> Any:
         """A field of the page by its name in the templates."""

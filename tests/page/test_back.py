@@ -212,7 +212,7 @@ async def test_back_answers_no_alarm(phone: Phone, canned: Canned) -> None:
 async def test_a_board_outlives_the_sheet_over_it_and_back_closes_it_alone(phone: Phone, canned: Canned) -> None:
     page = await opened(phone, f"{canned.address}/#home")
     await ready(page)
-    await page.locator("#tab-files").tap()
+    await phone.show("files")
     await page.wait_for_function(GUARDED)
     await page.route("**/api/logbook?*", lambda _: None)  # still loading
     board, menu = page.locator("#monitor .logbook-board"), page.locator("#sheet-menu")

@@ -235,7 +235,7 @@ async def test_two_of_three_operators_can_hear_alarms(browser: Browser, car: Pro
             await one[name].f("sound-off").tap()
         assert reach(await one.until(lambda s: reach(s) == (2, 3))) == (2, 3)
         await expect(line).to_contain_text("Alarms audible on 2 of 3 operator pages")
-        await expect(one["Cem"].page.locator('[data-part="reach"]')).to_contain_text("2 of 3 operators")
+        await expect(one["Cem"].page.locator('[data-part="reach"]')).to_contain_text("2 of 3 operator pages")
 
         await hide(one["Ann"], True)
         await one.until(lambda s: reach(s) == (1, 3) and s["reach"]["why"] == "page in the background, sound off")
@@ -306,7 +306,7 @@ async def test_each_phone_has_its_marker_and_the_one_in_the_car_is_compared(
             assert [(phone["label"], phone["compared"]) for phone in state["phones"]] == [("Ann", True), ("Ben", False)]
             assert state["phone"]["choice"] == "first"
 
-            await one["Ann"].page.locator("#tab-map").tap()
+            await one["Ann"].show("map")
             await one["Ann"].f("phones").tap()
             sheet = one["Ann"].page.locator("#sheet-phones")
             await expect(sheet).to_contain_text("Of 2, the first with a usable position is used")

@@ -16,10 +16,10 @@ from playwright.async_api import Browser, expect
 
 from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
-from tests.page.processes import Process, page_data, running, simulate
+from tests.page.processes import Process, page_data, running, server, simulate
 
 # What a browser itself writes of an answer that was no: a test asks for that.
-REFUSED = re.compile(r"responded with a status of (401|403|429)")
+REFUSED = re.compile(r"responded with a status of (401|403|429)|WebSocket handshake: Unexpected response code: 403")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,8 +50,7 @@ async def car() -> AsyncIterator[Process]:
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def site(car: Process, tmp_path: Path) -> AsyncIterator[Site]:
-    options = ("--host", "0.0.0.0", "--tls", "off", "--port", "0", "--data", str(tmp_path))
-    async with running("serve", *options, "--vehicle", f"car={car.address}") as process:
+    async with running(*server(tmp_path, car.address), "--host", "0.0.0.0", "--tls", "off") as process:
         address = re.sub(r"//[^:]+:", "//127.0.0.1:", process.address)
         yield Site(address=address, data=page_data(tmp_path))
 
@@ -167,7 +166,7 @@ async def test_an_operator_pairs_another_changes_its_role_and_removes_it(browser
     async with another_phone(browser) as boss, another_phone(browser) as guest:
         pin, _ = await site.invitation()
         await pair_by_pin(boss, site, pin)
-        await boss.page.locator("#tab-settings").tap()
+        await boss.show("settings")
         group = boss.page.locator('[data-part="devices"]')
         await group.locator("summary").scroll_into_view_if_needed(timeout=12_000)
         await group.locator("summary").tap()

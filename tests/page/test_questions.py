@@ -154,7 +154,7 @@ async def test_what_is_not_chosen_says_so_on_home_scan_and_signals(phone: Phone,
     await home(phone, canned)
     await expect(phone.page.locator(".gauge .note")).to_have_text("not chosen")
     await expect(phone.page.locator(".near [data-f=none]")).to_have_text("not chosen")
-    await phone.page.locator("#tab-scan").tap()
+    await phone.show("scan")
     await expect(phone.f("none-words", "#panel-scan")).to_have_text("not chosen")
     await phone.f("none-words", "#panel-scan").tap()  # what stands behind it
     row = phone.page.locator('.sigs .sig[aria-expanded="true"]')

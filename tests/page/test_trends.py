@@ -236,6 +236,7 @@ async def test_signals_are_chosen_and_what_is_seen_is_saved(phone: Phone, canned
         await sheet.locator("button", has_text="Picture").tap()
     assert (await (await picture.value).path()).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     await sheet.locator("[data-f=no]").tap()
+    await phone.page.wait_for_function("() => history.state?.over !== true")  # its way back would end the reload
     await phone.page.reload()
     await lower(phone)
     await phone.page.locator("[data-trend=brake]").tap()  # first among those that were chosen

@@ -21,7 +21,7 @@ async def test_a_viewer_may_take_the_file_and_orders_no_other_form_of_it(browser
         try:
             await phone.open(server.address)
             await phone.live()
-            await phone.page.locator("#tab-files").tap()
+            await phone.show("files")
             await phone.page.locator("#panel-files [data-id] button, #panel-files li button").first.tap()
             sheet = phone.page.locator("dialog.file-sheet[open]")
             await expect(sheet.get_by_role("button", name="Delete")).to_have_attribute("aria-disabled", "true")
