@@ -311,8 +311,8 @@ class TransportDelay:
 
     @property
     def trip_s(self) -> float:
-        """The longest of the last round trips."""
-        return self._longest_trip_s
+        """The least of the last round trips: what the link takes where nothing waits and nothing was lost."""
+        return self._least_trip_s
 
     def waiting_s(self, now_s: float) -> float:
         """Since the oldest ping was sent that is not answered yet."""

@@ -8,6 +8,7 @@ import sqlite3
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import orjson
 
@@ -44,6 +45,9 @@ _WHY = {
     sqlite3.SQLITE_CANTOPEN: "the file cannot be opened",
 }
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+_FILES = ("", "-wal", "-shm", "-journal")  # of a database
+_NO_ROOM = (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_FULL, sqlite3.SQLITE_CANTOPEN)
+_OPEN_WITHIN_S = 5.0  # so long a program that holds the file is waited for at the start; afterwards not at all
 _RUNS_KNOWN = 1000  # the newest; who names an older one is sent the newest events anew
 
 
@@ -62,22 +66,39 @@ def why(error: Exception) -> str:
     """In few words, for the operator."""
     if isinstance(error, orjson.JSONDecodeError):
         return "the file is damaged"
+    return _WHY.get(_code(error), str(error)[:80])
+
+
+def _code(error: Exception) -> int:
+    """SQLite's primary result code; 0: it is no error of SQLite."""
     code = getattr(error, "sqlite_errorcode", None)
-    return _WHY.get(code & 0xFF, str(error)[:80]) if isinstance(code, int) else str(error)[:80]
+    return code & 0xFF if isinstance(code, int) else 0
 
 
 def open_at(path: Path | None, run: str) -> Opened:
     """The log at `path`, in memory where it is None, for a run that no log has had."""
     try:
-        return _open(path, run)
-    except sqlite3.Error as error:
-        if path is None or (getattr(error, "sqlite_errorcode", 0) or 0) & 0xFF not in _DAMAGED:
+        if path is not None and not path.exists() and _copy_of(path).exists():
+            _put_in_place(path, free_name(path, "damaged"))  # a kill left it there: it is whole once the log is aside
+        return _open_either_way(path, run)
+    except (OSError, sqlite3.Error) as error:
+        if path is None or _code(error) not in _DAMAGED:
             return Opened(database=None, runs=LogRuns((), Run(id=run)), why=why(error))
     return _begin_anew(path, run)
 
 
-def _open(path: Path | None, run: str) -> Opened:
-    database = _connect(path)
+def _open_either_way(path: Path | None, run: str) -> Opened:
+    """On a full disk SQLite cannot make the file that processes share (-shm); alone it does without."""
+    try:
+        return _open(path, run)
+    except sqlite3.OperationalError as error:
+        if _code(error) not in _NO_ROOM:
+            raise
+        return _open(path, run, is_alone=True)
+
+
+def _open(path: Path | None, run: str, *, is_alone: bool = False) -> Opened:
+    database = _connect(path, is_alone=is_alone)
     refused: str | None = None
     try:
         try:
@@ -91,15 +112,19 @@ def _open(path: Path | None, run: str) -> Opened:
                 note_run(database, runs.present)
             except sqlite3.OperationalError as error:
                 refused = why(error)
+        database.execute("PRAGMA busy_timeout=0")
         return Opened(database=database, runs=runs, last=last, why=refused)
     except sqlite3.Error:
         database.close()
         raise
 
 
-def _connect(path: Path | None) -> sqlite3.Connection:
-    database = str(path) if path else ":memory:"
-    return sqlite3.connect(database, isolation_level=None, timeout=0, check_same_thread=False)
+def _connect(path: Path | None, *, is_alone: bool = False) -> sqlite3.Connection:
+    file = str(path) if path else ":memory:"
+    database = sqlite3.connect(file, isolation_level=None, timeout=_OPEN_WITHIN_S, check_same_thread=False)
+    if is_alone:
+        database.execute("PRAGMA locking_mode=EXCLUSIVE")
+    return database
 
 
 def _make_tables(database: sqlite3.Connection, path: Path | None) -> None:
@@ -121,9 +146,17 @@ def _earlier_runs(database: sqlite3.Connection) -> list[Run]:
     """The newest, oldest first; none where the log is of a version that kept none, or one of them cannot be read."""
     try:
         rows = database.execute("SELECT id, before FROM run ORDER BY number DESC LIMIT ?", (_RUNS_KNOWN,)).fetchall()
-        return [Run(id=id, before=orjson.loads(before)) for id, before in reversed(rows)]
-    except (sqlite3.OperationalError, orjson.JSONDecodeError):
+        return [Run(id=id, before=_numbers_of(before)) for id, before in reversed(rows)]
+    except (sqlite3.OperationalError, ValueError):
         return []
+
+
+def _numbers_of(before: bytes) -> dict[str, int]:
+    """Raises ValueError."""
+    found = orjson.loads(before)
+    if not isinstance(found, dict) or not all(type(n) is int for n in found.values()):
+        raise ValueError("no numbers of vehicles")
+    return found
 
 
 def _numbers(database: sqlite3.Connection) -> Iterator[tuple[str, int]]:
@@ -139,46 +172,64 @@ def _numbers(database: sqlite3.Connection) -> Iterator[tuple[str, int]]:
 
 
 def _begin_anew(path: Path, run: str) -> Opened:
-    aside = free_name(path, "damaged")
+    """What can be read is copied first. Until the copy is on the disk the damaged log keeps its name: where there is no
+    room for the copy, the next start tries again."""
+    aside, made = free_name(path, "damaged"), _copy_of(path)
     try:
-        for suffix in ("", "-wal", "-shm"):
-            old = path.with_name(path.name + suffix)
-            if old.exists():
-                old.rename(aside.with_name(aside.name + suffix))
-        with contextlib.closing(_connect(path)) as new:
-            _make_tables(new, path)
-            saved = _take_over(aside, new)
-        opened = _open(path, run)
+        _remove(made)
+        with contextlib.closing(_connect(made)) as new:
+            new.execute("PRAGMA synchronous=FULL")  # not WAL: what is committed is in the file that is renamed
+            for statement in (_SCHEMA, _INDEX, _RUNS):
+                new.execute(statement)
+            saved = _take_over(path, new)
+        _put_in_place(path, aside)
+        opened = _open_either_way(path, run)
     except (OSError, sqlite3.Error) as error:
         log.error("damaged log not set aside: path=%s error=%s", path, error)
+        with contextlib.suppress(OSError):
+            _remove(made)
         return Opened(database=None, runs=LogRuns((), Run(id=run)), why="the file is damaged")
     said = f"The alarm log was damaged: it is set aside as {aside.name}; {saved} of its events could be read."
     return replace(opened, complaint=said)
 
 
+def _copy_of(path: Path) -> Path:
+    return path.with_name(f"{path.name}.anew")
+
+
+def _put_in_place(path: Path, aside: Path) -> None:
+    """The copy takes the name of the log, whose files are set aside: with them SQLite would change the copy."""
+    for suffix in _FILES:
+        old = path.with_name(path.name + suffix)
+        if old.exists():
+            old.rename(aside.with_name(aside.name + suffix))
+    _copy_of(path).rename(path)
+    durable_file.sync_folder(path.parent)
+
+
+def _remove(path: Path) -> None:
+    for suffix in _FILES:
+        path.with_name(path.name + suffix).unlink(missing_ok=True)
+
+
 def _take_over(old: Path, new: sqlite3.Connection) -> int:
-    """Copies what can be read of a damaged log, from both ends towards the damage; how many events that were."""
-    try:
-        source = sqlite3.connect(f"{old.absolute().as_uri()}?mode=ro", uri=True, timeout=0)
-    except sqlite3.Error:
-        return 0
-    new.execute("BEGIN")
-    try:
-        with contextlib.suppress(sqlite3.Error):
-            new.executemany("INSERT INTO run VALUES (?, ?, ?)", source.execute("SELECT number, id, before FROM run"))
+    """Copies what can be read of a damaged log, from both ends towards the damage; how many events that were. Raises
+    sqlite3.Error where the new one cannot be written."""
+    with contextlib.closing(_connect(old, is_alone=True)) as source:
+        new.execute("BEGIN")
+        new.executemany("INSERT INTO run VALUES (?, ?, ?)", _readable(source, "SELECT number, id, before FROM run"))
         for order in ("ASC", "DESC"):
-            try:
-                rows = source.execute(
-                    f"SELECT vehicle, n, at_ms, alarm, change, body FROM event ORDER BY vehicle {order}, n {order}"
-                )
-                while (row := rows.fetchone()) is not None:
-                    new.execute("INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?)", row)
-            except sqlite3.Error as error:
-                log.warning("damaged log read stopped: path=%s error=%s", old.name, error)
-            else:
-                break
-    finally:
+            events = f"SELECT vehicle, n, at_ms, alarm, change, body FROM event ORDER BY vehicle {order}, n {order}"
+            new.executemany("INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?)", _readable(source, events))
         new.execute("COMMIT")
-        source.close()
     (count,) = new.execute("SELECT COUNT(*) FROM event").fetchone()
     return int(count)
+
+
+def _readable(source: sqlite3.Connection, query: str) -> Iterator[tuple[Any, ...]]:
+    """The rows up to a damage."""
+    with contextlib.closing(source.cursor()) as rows:  # an open one would keep the file locked
+        try:
+            yield from rows.execute(query)
+        except sqlite3.Error as error:
+            log.warning("damaged log read stopped: error=%s", error)

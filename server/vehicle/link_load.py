@@ -77,7 +77,7 @@ class LinkLoad:
         return LEVELS[self.step]
 
     def look(self, late_s: float, now_s: float, trip_s: float) -> bool:
-        """`late_s`: of what comes, beyond what the link needs when nothing waits; `trip_s`: the longest of the last
+        """`late_s`: of what comes, beyond what the link needs when nothing waits; `trip_s`: the least of the last
         round trips. True where the step changed."""
         before = self.step
         is_tried = self._restored_s is not None and now_s - self._restored_s <= TRIED_S

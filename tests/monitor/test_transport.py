@@ -48,6 +48,15 @@ def test_a_message_is_no_older_than_the_mark_before_it() -> None:
     assert link.receive("/vel", 2.10) == pytest.approx(0.10)
 
 
+def test_a_round_trip_with_a_loss_is_not_the_one_of_the_link() -> None:
+    """What was thrown away for a slow link is tried again sooner once the link is another one: a loss is none."""
+    link = opened()
+    ping(link, 0.0, 0.1)
+    ping(link, 1.0, 1.5)
+    ping(link, 2.0, 2.12)
+    assert link.trip_s == pytest.approx(0.1)
+
+
 def test_a_long_way_that_is_always_as_long_is_no_queue() -> None:
     link = opened()
     link.subscribe("/scan", 1)

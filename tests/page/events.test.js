@@ -37,6 +37,17 @@ test('after a gap the page says what happened meanwhile, once', () => {
   assert.equal(log.rows.find((row) => row.gap)?.gap?.raised, 2);
 });
 
+test('a blind time goes on over a connection that broke before its events came', () => {
+  const log = new EventLog();
+  log.greet(hello('a', 1), 0, 0);
+  log.take([event(1)]);
+  log.greet(hello('a', 3), 60, 70);
+  assert.equal(log.caughtUp(), null);
+  log.greet(hello('a', 4), 0.5, 71); // one state came meanwhile, and no event
+  log.take([event(2), event(3), event(4, 'cleared')]);
+  assert.deepEqual(log.caughtUp(), { blind_s: 60, raised: 2, cleared: 1, at_ms: 70 });
+});
+
 test('a short flicker is no gap, and a quiet gap says so', () => {
   const log = new EventLog();
   log.greet(hello('a', 3), 0, 0);

@@ -33,7 +33,7 @@ class HeadAsGet:
             nonlocal is_over
             if message["type"] == "http.response.start":
                 await send(message)
-            elif not is_over:
+            elif message["type"] == "http.response.body" and not is_over:
                 is_over = True
                 await send({"type": "http.response.body", "body": b"", "more_body": False})
 

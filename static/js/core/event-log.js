@@ -47,7 +47,10 @@ export class EventLog {
       if (boot !== this.#boot && last_event < this.last) this.last = this.#left.new_after = 0; // a server of before, that lost its log
       this.#boot = boot;
     }
-    this.#blind = { until: last_event, gap: this.open = { blind_s, raised: 0, cleared: 0, at_ms } };
+    const gap = this.#blind?.gap ?? { blind_s, raised: 0, cleared: 0, at_ms }; // one whose events were still to come goes on
+    gap.blind_s = Math.max(gap.blind_s, blind_s);
+    this.open = gap;
+    this.#blind = { until: last_event, gap };
     return this.last;
   }
 

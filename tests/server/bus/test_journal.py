@@ -7,6 +7,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -205,6 +206,36 @@ def test_a_damaged_log_is_set_aside_and_what_can_be_read_goes_on(tmp_path: Path,
             "The alarm log was damaged: it is set aside as events.damaged.sqlite; 0 of its events could be read."
         )
         assert (tmp_path / "events.damaged.sqlite").read_bytes() == bytes(body)
+    journal.close()
+
+
+@pytest.mark.parametrize("before", [b"no json", b"[]", b"null", b'{"car": "x"}'])
+def test_a_run_that_cannot_be_read_stops_no_start(tmp_path: Path, before: bytes) -> None:
+    path = tmp_path / "events.sqlite"
+    journal = Journal(path)
+    journal.append("car", [event(1)])
+    former = journal.runs.present.id
+    journal._database.execute("UPDATE run SET before = ?", (before,))  # type: ignore[union-attr]
+    journal.close()
+    journal = Journal(path)
+    assert (journal.trouble, journal.last("car")) == (None, 1)
+    assert journal.runs.resume("car", former, 1, 1).new_after == 1  # as a run that the log does not know
+    journal.close()
+
+
+def test_a_program_that_holds_the_file_for_a_moment_at_the_start_is_waited_for(tmp_path: Path) -> None:
+    path = tmp_path / "events.sqlite"
+    journal = Journal(path)
+    journal.append("car", [event(1)])
+    journal.close()
+    other = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+    other.execute("PRAGMA locking_mode=EXCLUSIVE")
+    other.execute("BEGIN EXCLUSIVE")
+    threading.Timer(0.1, other.close).start()
+    journal = Journal(path)
+    assert (journal.trouble, journal.last("car")) == (None, 1)
+    assert journal._database is not None
+    assert journal._database.execute("PRAGMA busy_timeout").fetchone() == (0,)  # later it delays no alarm
     journal.close()
 
 

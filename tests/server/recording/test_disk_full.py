@@ -22,40 +22,20 @@ from tests.server.cars import driving
 from tests.server.recording.mcap.test_write import written
 from tests.server.recording.test_controller import watched
 from tests.server.recording.test_recorder import RecorderUser
+from tests.server.small_disk import fill, small_disk
 
 SIZE = 2_000_000
 
 
 @pytest.fixture
 def disk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Path]:
-    """A disk of 2 MB, or as the test wants; a skip where this user may not mount one."""
-    root = tmp_path / "recordings"
-    root.mkdir()
-    size = getattr(request, "param", SIZE)
-    done = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(root)], capture_output=True, text=True
-    )
-    if done.returncode:
-        pytest.skip(f"this user may not mount a disk: {done.stderr.strip()}")
-    yield root
-    subprocess.run(["umount", "--lazy", str(root)], check=True)
+    """A disk of 2 MB, or as the test wants."""
+    with small_disk(tmp_path / "recordings", getattr(request, "param", SIZE)) as root:
+        yield root
 
 
 def remount(disk: Path, how: str) -> None:
     subprocess.run(["mount", "-o", f"remount,{how}", str(disk)], check=True)
-
-
-def fill(disk: Path, *, leave: int = 0) -> Path:
-    """Another program takes the rest of the disk."""
-    other = disk / "other"
-    with other.open("ab", buffering=0) as file:
-        try:
-            while True:
-                file.write(bytes(4096))
-        except OSError:
-            pass
-        file.truncate(max(0, file.seek(0, 2) - leave))
-    return other
 
 
 async def test_a_disk_that_fills_up_ends_the_recording_and_it_is_completed_when_there_is_room_again(

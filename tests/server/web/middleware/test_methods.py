@@ -9,10 +9,12 @@ from typing import Any
 
 import httpx
 import pytest_asyncio
+from starlette.types import Message, Receive, Scope, Send
 
 from server.app.app import create_app
 from server.app.config import Config
 from server.web.interface import PROBLEM_TYPE, ProblemDocument
+from server.web.middleware.methods import HeadAsGet
 from tests.http import http_client
 from tests.server.conftest import serving
 from tests.server.recording.made import record
@@ -57,6 +59,29 @@ async def test_head_is_get_without_the_body(client: httpx.AsyncClient) -> None:
         for name in head.headers.keys() - changing:
             assert head.headers[name] == whole.headers[name], (path, name)
     assert found >= {200, 404}
+
+
+async def test_only_a_body_becomes_the_end_of_an_answer_to_head() -> None:
+    """A test client is sent more than an answer, before it."""
+    passed: list[Message] = []
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        await send({"type": "http.response.debug", "info": {}})
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b"one", "more_body": True})
+        await send({"type": "http.response.body", "body": b"two"})
+
+    async def receive() -> Message:
+        raise AssertionError
+
+    async def send(message: Message) -> None:
+        passed.append(message)
+
+    await HeadAsGet(app)({"type": "http", "method": "HEAD"}, receive, send)
+    assert [(one["type"], one.get("body")) for one in passed] == [
+        ("http.response.start", None),
+        ("http.response.body", b""),
+    ]
 
 
 async def test_head_of_a_file_names_its_whole_length_and_asks_for_no_range(client: httpx.AsyncClient) -> None:
