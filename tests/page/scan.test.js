@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { INVALID, NO_RETURN, NOTHING_IN_RANGE, TOO_CLOSE, readScan } from '../../static/js/scan/scan-frame.js';
-import { NOT_IN_VIEW, beamWords, behind, clearOf, coversAny, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
+import { NOT_IN_VIEW, beamWords, behind, clearOf, coversAny, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringWords, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
 import { edgesOf, endOf } from '../../static/js/scan/scan-corridor.js';
 import { beside, follow, nearestShown, nearestTo } from '../../static/js/scan/scan-pick.js';
 import { ScanMark } from '../../static/js/scan/scan-mark.js';
@@ -261,4 +261,11 @@ test('words that would cover a return are found', () => {
   assert.ok(coversAny(box, [0, 0, 10, 3.9], scale)); // its square of 5 px reaches into the box
   assert.ok(!coversAny(box, [10, -7, 12.5, 7, 10, 3], scale));
   assert.ok(!coversAny(box, [], scale));
+});
+
+test('the distance beside the ring of the nearest object stands whole on the plot, above or below the ring where neither side has room', () => {
+  assert.deepEqual(ringWords(100, 80, 400), { way: 1, at: [144, 79, 'left'] });
+  assert.deepEqual(ringWords(300, 80, 400), { way: -1, at: [256, 79, 'right'] });
+  assert.deepEqual(ringWords(101, 125, 185), { way: 0, at: [101, 91, 'center'] });
+  assert.deepEqual(ringWords(20, 30, 130), { way: 0, at: [44, 64, 'center'] });
 });

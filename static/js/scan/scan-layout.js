@@ -262,6 +262,22 @@ export function clearOf(taken, box) {
   return by === undefined ? null : { ...box, top: box.top + by * box.height };
 }
 
+/** What the distance beside the ring of the nearest object takes, and half of its width [px]. */
+const RING_WORDS_PX = { beside: 120, half: 44 };
+
+/**
+ * Where the distance of the nearest object stands: right of its ring, left of it, or on a narrow plot above or below it.
+ * @param {number} x @param {number} y of the ring [px]
+ * @param {number} width of the plot [px]
+ * @returns {{way: number, at: [number, number, CanvasTextAlign]}} `way` 0: neither side has room
+ */
+export function ringWords(x, y, width) {
+  const { beside, half } = RING_WORDS_PX;
+  if (x + beside <= width) return { way: 1, at: [x + 44, y - 1, 'left'] };
+  if (x >= beside) return { way: -1, at: [x - 44, y - 1, 'right'] };
+  return { way: 0, at: [Math.max(half, Math.min(width - half, x)), y < 48 ? y + 34 : y - 34, 'center'] };
+}
+
 /** Half the side of a drawn return [px]. */
 const DOT_PX = 2.5;
 

@@ -2,7 +2,7 @@
 
 import { edgesOf, endOf } from './scan-corridor.js';
 import { bearingOf, rangeOf } from './scan-frame.js';
-import { clearOf, codeWords, coversAny, namedSectors, plotScale, pointsOf, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
+import { clearOf, codeWords, coversAny, namedSectors, plotScale, pointsOf, ringWords, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
 import { Hatching, ScanGrid, fit, penOf } from './scan-grid.js';
 import { fixed } from '../core/format.js';
 
@@ -191,9 +191,9 @@ export class ScanPlot {
     if (beam === null || range_m === null || range_m > reach_m) return null;
     const bearing_rad = bearingOf(scan, beam);
     const [x, y] = at(range_m * Math.cos(bearing_rad) + (scan.x_m ?? 0), range_m * Math.sin(bearing_rad) + (scan.y_m ?? 0));
-    const way = x + 120 > this.#width ? -1 : 1;
+    const { way, at: place } = ringWords(x, y, this.#width);
     const text = `${fixed(gap_m)} m`;
-    const where = /** @type {Where} */ ([x + 44 * way, y - 1, way > 0 ? 'left' : 'right', 22, 700]);
+    const where = /** @type {Where} */ ([...place, 22, 700]);
     this.#taken.push(this.#plate(g, text, ...where));
     return { x, y, way, text, where };
   }
