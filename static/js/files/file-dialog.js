@@ -12,7 +12,7 @@ export class FileDialog {
     this.dock = dock;
     const nth = document.querySelectorAll('.file-sheet').length || ''; // another one may lie beneath the connect screen
     this.title = html('h2', { id: `file-title${nth}`, tabindex: -1, dir: 'auto' });
-    this.about = html('div', { class: 'bd', id: `file-about${nth}` });
+    this.about = html('div', { class: 'bd', id: `file-about${nth}`, tabindex: 0, role: 'group', 'aria-labelledby': `file-title${nth}` });
     this.what = html('div', { class: 'what' });
     this.keys = html('div', { class: 'keys' });
     this.closing = html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close');
