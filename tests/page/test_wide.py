@@ -331,7 +331,7 @@ async def test_files_of_a_desktop_show_the_chosen_recording_beside_the_list(phon
     await page.set_viewport_size({"width": 412, "height": 915})
     await expect(dock).to_be_hidden()
     await rows.nth(0).click()
-    await expect(page.locator(".file-sheet:modal")).to_contain_text("1.8 km")
+    await expect(page.locator(".file-sheet[open]")).to_contain_text("1.8 km")
 
 
 @pytest.mark.gate
