@@ -268,6 +268,7 @@ def changing(project: Path, tmp_path: Path) -> Path:
     return copied
 
 
+@pytest.mark.timeout(240)  # the page is joined twice and served twice
 async def test_a_new_version_comes_at_the_next_load_and_never_mixed(
     browser: Browser, changing: Path, tmp_path: Path
 ) -> None:
