@@ -133,12 +133,14 @@ async def test_a_signal_that_fell_silent_leaves_a_hatched_hole_that_no_line_brid
     """The distance was unknown for 5 s of the minute before the page came, the speed never."""
     await phone.open(f"{canned.address}/#home")
     await lower(phone)
-    speed, distance = await columns(phone, "speed"), await columns(phone, "distance")
+    async with asyncio.timeout(20):  # a busy machine is late for some seconds, and what the page missed comes then
+        while "/" in (await columns(phone, "speed")).strip("/."):
+            await asyncio.sleep(0.3)
+    distance = await columns(phone, "distance")
     hole = re.search(r"I([/.]{3,})I", distance)
     assert hole is not None, distance
     assert "/" in hole[1]
     assert len(hole[1]) / len(distance) == pytest.approx(5 / 60, abs=0.025)
-    assert "/" not in speed.strip("/."), speed
 
 
 async def test_a_tap_opens_the_chart_of_the_drive_which_is_moved_read_and_left(phone: Phone, canned: Canned) -> None:

@@ -17,10 +17,8 @@
     }
     if (one.left < -1 || one.right > innerWidth + 1 || one.top < -1 || one.bottom > innerHeight + 1) wrong.push(`${a} outside`);
   });
-  // The frame of an active critical alarm insets the page.
-  const { paddingLeft, paddingRight } = getComputedStyle(document.querySelector('#monitor'));
-  const whole = innerWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
-  for (const one of all('#monitor .under > :not(.unseen)')) if (box(one).width < whole - 1) wrong.push(`${one.className} of ${Math.round(box(one).width)}`);
+  const inner = box(document.querySelector('#monitor > .strip')).width; // within the frame of an active critical alarm
+  for (const one of all('#monitor .under > :not(.unseen)')) if (box(one).width < inner - 1) wrong.push(`${one.className} of ${Math.round(box(one).width)}`);
   const isFloor = all('#monitor .alarms-pane').length > 0;
   if (isFloor) {
     for (const pane of panes) {
