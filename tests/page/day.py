@@ -125,7 +125,7 @@ async def a_day(browser: Browser, folder: Path) -> AsyncIterator[Day]:
         day = Day(data, await stack.enter_async_context(running(*simulate())), post)
         await day.serve()
         stack.push_async_callback(lambda: day.watch.kill())
-        async with httpx.AsyncClient(base_url=day.watch.address) as client:
+        async with httpx.AsyncClient(base_url=day.watch.address, timeout=60.0) as client:
             for name, role in (("A. K.", "operator"), ("M. R.", "safety_driver")):
                 (await client.post("/api/people", json={"name": name, "role": role})).raise_for_status()
             mail = {"host": "127.0.0.1", "port": post.port, "security": "none", "sender": "car@test.example"}

@@ -66,10 +66,10 @@ test('the limit at a moment', () => {
   assert.equal(limitAt([], 60), null);
 });
 
-test('marks that would cover each other are one, the most urgent; advisories have none', () => {
+test('marks that would cover each other are one, with the shape and the place of the most urgent; advisories have none', () => {
   const mark = (/** @type {number} */ at_s, /** @type {any} */ priority) => ({ at_s, priority, title: `${priority} ${at_s}`, alarm: 'x' });
   const placed = placedMarks([mark(5, 'critical'), mark(20, 'warning'), mark(21, 'critical'), mark(50, 'advisory'), mark(80, 'warning')], [10, 110], 300);
-  assert.deepEqual(placed.map(({ x, count, priority }) => [x, count, priority]), [[30, 2, 'critical'], [210, 1, 'warning']]);
+  assert.deepEqual(placed.map(({ x, at_s, count, priority }) => [x, at_s, count, priority]), [[33, 21, 2, 'critical'], [210, 80, 1, 'warning']]);
 });
 
 test('ticks have seconds where they are less than a minute apart', () => {

@@ -31,7 +31,7 @@ def build(house: Path) -> None:
 
 def change(house: Path, word: str) -> None:
     """Another version of the page: the script that begins it and one that is fetched later both say `word`."""
-    for name, word_of in (("main.js", "app"), ("alarms/log.js", "log")):
+    for name, word_of in (("main.js", "app"), ("shell/about.js", "about")):
         path = house / "static" / "js" / name
         text = path.read_text(encoding="utf-8").split("\n// --- another version ---\n")[0]
         path.write_text(

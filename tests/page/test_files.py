@@ -298,6 +298,9 @@ async def test_what_is_recorded_now_stands_on_top_counts_and_is_ended_by_hand(op
     first = await live.inner_text()
     await expect(live).not_to_have_text(first)
     await live.get_by_role("button", name="End the recording").tap()
+    asked = opened.page.locator("#sheet-record")
+    await expect(asked).to_contain_text("The car moves at")
+    await asked.get_by_role("button", name="End the recording").tap()
     await expect(live).to_contain_text("Not recording", timeout=15_000)
     newest = opened.page.locator("#panel-files [data-f=recordings] .file").first
     await expect(newest).to_contain_text("Today", timeout=15_000)

@@ -67,7 +67,7 @@ async def test_a_node_answers_for_the_cars_of_agents(tmp_path: Path) -> None:
         await until(phase)
         assert (await room.get("/api/state", params={"vehicle": "ocelot"})).json()["vehicle"] == "ocelot"
         refused = await room.get("/api/state", params={"vehicle": "margay"})
-        assert (refused.status_code, refused.json()["detail"]) == (503, "Nothing was heard from margay yet.")
+        assert (refused.status_code, refused.json()["detail"]) == (503, "Nothing was received from margay yet.")
         assert (await room.get("/api/state", params={"vehicle": "nobody"})).status_code == 404
 
         for log in ("/api/log", "/api/log.csv", "/api/log.json"):

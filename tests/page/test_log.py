@@ -68,7 +68,7 @@ async def test_older_events_come_page_by_page_to_the_beginning(phone: Phone, wat
     await expect(phone.page.locator("#sheet-alarm")).to_be_hidden()
     await opened(phone, watch)
     rows = phone.page.locator("[data-f=happened] li:not(.day)")
-    await expect(rows.filter(has_text="Speed above limit acknowledged")).to_contain_text(re.compile(r"in \d+\.\d s"))
+    await expect(rows.filter(has_text="Speed above limit acknowledged")).to_contain_text(re.compile(r"after \d+\.\d s"))
     older = phone.page.locator("[data-f=older]")
     while await older.is_visible():
         before = await rows.count()

@@ -197,7 +197,7 @@ async def test_a_check_opens_with_the_minute_and_the_alarms_of_the_recording(pho
     await expect(phone.f("check-tag")).to_have_text("FAULT")
     await expect(page.locator("canvas.minute")).to_have_attribute("aria-label", re.compile(r"highest 12\.4 m/s"))
     history = phone.f("check-history").locator("li")
-    await expect(history).to_have_count(1)
+    await expect(history).to_have_count(1, timeout=OPENS_MS)  # the whole recording is read for it
     await expect(history).to_contain_text("active, highest 12.4 m/s")
     await expect(phone.f("check-change")).to_be_hidden()
     await no_barrier(page, "a check of a replay")

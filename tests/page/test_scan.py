@@ -374,11 +374,11 @@ ODD = {
     "narrow": lambda t: drives.laser(t, 7.0 + 0.1 * np.sin(np.arange(61) + t), -np.pi / 6, np.pi / 180),
 }
 SAYS = {
-    "one beam": ("none", "1 of 1 beams", "not in view"),
-    "no beams": ("none", "0 of 0 beams", "not in view"),
+    "one beam": ("blind", "1 of 1 beams", "not in view"),
+    "no beams": ("blind", "0 of 0 beams", "not in view"),
     "10 000 beams": ("12.0", "of 10000 beams", "invalid"),
     "clockwise": ("6.", "181 of 181 beams", ""),
-    "backwards": ("none", "91 behind, not drawn", "not in view"),
+    "backwards": ("blind", "91 behind, not drawn", "not in view"),
     "blind": ("blind", "0 of 181 beams", "invalid"),
     "narrow": ("6.", "61 of 61 beams", "not in view from 90° left to 30° left"),
 }

@@ -268,13 +268,14 @@ def changing(project: Path, tmp_path: Path) -> Path:
     return copied
 
 
+@pytest.mark.timeout(240)  # the page is joined twice and served twice
 async def test_a_new_version_comes_at_the_next_load_and_never_mixed(
     browser: Browser, changing: Path, tmp_path: Path
 ) -> None:
     house.change(changing, "first")
     port = free_port()
-    said = "() => [document.documentElement.dataset.app, document.documentElement.dataset.log ?? null]"
-    later = "document.querySelector('[data-screen=log]').click()"
+    said = "() => [document.documentElement.dataset.app, document.documentElement.dataset.about ?? null]"
+    later = "document.querySelector('[data-screen=about]').click()"
     async with opened(browser) as page, opened_beside(page) as other:
         one = await Process(*server(tmp_path / "data", port=port), folder=changing).start()
         (before,) = await kept_by(page, one.address)
@@ -287,16 +288,16 @@ async def test_a_new_version_comes_at_the_next_load_and_never_mixed(
             note = page.locator(".snack.note").filter(has_text="A new version is available.")
             await expect(note).to_be_visible(timeout=20_000)
             await page.evaluate(later)
-            await page.wait_for_function("() => document.documentElement.dataset.log === 'first'")
+            await page.wait_for_function("() => document.documentElement.dataset.about === 'first'")
             await page.evaluate("history.back()")
             # Whoever loads it has the new one, whole, while the old one is still open elsewhere.
             await note.get_by_role("button", name="Reload").tap()
             await page.wait_for_function("() => document.documentElement.dataset.app === 'second'")
             await page.evaluate(later)
-            await page.wait_for_function("() => document.documentElement.dataset.log === 'second'")
+            await page.wait_for_function("() => document.documentElement.dataset.about === 'second'")
             assert before in await page.evaluate("caches.keys()"), "another page may still ask for its files"
             await other.evaluate(later)
-            await other.wait_for_function("() => document.documentElement.dataset.log === 'first'")
+            await other.wait_for_function("() => document.documentElement.dataset.about === 'first'")
             await other.close()
             await page.bring_to_front()  # behind another page nothing is drawn, and the page does not begin
             await page.goto(one.address)

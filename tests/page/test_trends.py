@@ -97,7 +97,10 @@ async def test_a_page_that_opens_late_shows_what_it_missed_and_hatches_what_nobo
             await asyncio.sleep(0.3)
             speed = await columns(phone, "speed")
     assert set(await columns(phone, "brake")) == {"."}
-    await expect(phone.page.locator("[data-trend=brake] .row .n")).to_have_text("not published")
+    await expect(phone.page.locator("[data-trend=brake] .row .n")).to_have_text("–")  # for more there is no room
+    await expect(phone.page.locator("[data-trend=brake]")).to_have_attribute(
+        "aria-label", re.compile("Brake: not published")
+    )
     await expect(phone.page.locator("[data-trend=speed] .row .n")).to_have_text(re.compile(r"[45]\.\d"))
     await expect(phone.page.locator("[data-trend=speed]")).to_have_attribute(
         "aria-label", re.compile(r"Speed: [45]\.\d m/s; open the chart of the drive")
@@ -130,12 +133,14 @@ async def test_a_signal_that_fell_silent_leaves_a_hatched_hole_that_no_line_brid
     """The distance was unknown for 5 s of the minute before the page came, the speed never."""
     await phone.open(f"{canned.address}/#home")
     await lower(phone)
-    speed, distance = await columns(phone, "speed"), await columns(phone, "distance")
+    async with asyncio.timeout(20):  # a busy machine is late for some seconds, and what the page missed comes then
+        while "/" in (await columns(phone, "speed")).strip("/."):
+            await asyncio.sleep(0.3)
+    distance = await columns(phone, "distance")
     hole = re.search(r"I([/.]{3,})I", distance)
     assert hole is not None, distance
     assert "/" in hole[1]
     assert len(hole[1]) / len(distance) == pytest.approx(5 / 60, abs=0.025)
-    assert "/" not in speed.strip("/."), speed
 
 
 async def test_a_tap_opens_the_chart_of_the_drive_which_is_moved_read_and_left(phone: Phone, canned: Canned) -> None:

@@ -14,6 +14,7 @@ from tests.page.canned import Canned
 from tests.page.canned_drive import LOST_S, SILENT_S
 from tests.page.conftest import Phone
 from tests.page.test_trends import chart
+from tests.page.touch import DRAWN
 
 #: The pixels of each colour of the theme: their places in CSS pixels, by name.
 READ = """async ({ png, ratio }) => {
@@ -70,6 +71,8 @@ async def test_the_picture_holds_what_is_seen(phone: Phone, canned: Canned) -> N
     await phone.page.touchscreen.tap(box["x"] + box["width"] * 0.1, box["y"] + 20)
     await expect(phone.page.locator(".tag-text")).to_have_text(re.compile(r"\d\d:\d\d:\d\d"))
     await phone.page.locator(".trends-tools .key").tap()
+    await expect(phone.page.locator(".trends-pick button", has_text="Picture")).to_be_visible()
+    await phone.page.evaluate(DRAWN)  # what the list covers has another height beneath it
     places = await phone.page.evaluate(PANES)
     length_s = float(await stage.get_attribute("aria-valuemax") or "nan")
     async with phone.page.expect_download() as waiting:

@@ -135,7 +135,7 @@ export function limitAt(limits, at_s) {
 }
 
 /**
- * The marks in view; those that would cover each other are one, with the most urgent's shape. Advisories have none.
+ * The marks in view; those that would cover each other are one, with the most urgent's shape and place. Advisories have none.
  * @param {Mark[]} marks in the order of time
  * @param {View} view
  * @param {number} width [px]
@@ -150,7 +150,7 @@ export function placedMarks(marks, [from_s, to_s], width) {
     if (!last || x - last.x >= MARK_PX) found.push({ x, at_s, count: 1, title, priority });
     else {
       last.count += 1;
-      if (RANK[priority] > RANK[last.priority]) Object.assign(last, { at_s, title, priority });
+      if (RANK[priority] > RANK[last.priority]) Object.assign(last, { x, at_s, title, priority });
     }
   }
   return found;

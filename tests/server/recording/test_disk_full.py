@@ -125,7 +125,8 @@ async def test_a_disk_that_can_only_be_read_is_said_and_monitoring_goes_on(disk:
             assert refused["reason"] == "Recording cannot begin: the folder for recordings is read-only."
             state = await one.state(lambda s: any(a["id"] == "recording_stopped" for a in s["alarms"]))
             assert state["session"]["phase"] == "monitoring"
-            assert state["signals"]["speed"]["freshness"] == "fresh"
+            # A busy machine may be late with one state; a car that is no longer heard is never fresh again.
+            state = await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
             count = state["signals"]["speed"]["count"]
             await one.state(lambda s: s["signals"]["speed"]["count"] > count + 10)
         finally:
