@@ -103,6 +103,7 @@ class _Replay:
         for topic, name in self._names.items():
             info = self._recording.topics[topic]
             self._bridge.advertise(name, info.type, info.definition, latch=info.is_latched)
+        self._bridge.advertise_rosout()
         self._bridge.on_subscribe.append(lambda _: self._subscribed.set())
         port = await self._bridge.start(self._args.host, self._args.port)
         self._report.open(self._args, self._names, port)

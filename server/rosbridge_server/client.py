@@ -10,7 +10,7 @@ from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 
-from server.judge.ros_names import BadName
+from server.judge.ros_names import BadName, canonical_name, canonical_type
 from server.rosbridge.message_bytes import Unencodable
 from server.rosbridge_server import fields
 from server.rosbridge_server.calls import Calls
@@ -22,6 +22,7 @@ from server.rosbridge_server.fragments import Fragments
 from server.rosbridge_server.graph import Topic
 from server.rosbridge_server.interface import ClientHost
 from server.rosbridge_server.outbox import Outbox
+from server.rosbridge_server.provider import Providers
 from server.rosbridge_server.subscription import Subscription, SubscriptionRequest
 
 _log = logging.getLogger("catgraph.bridge")
@@ -30,13 +31,13 @@ LEVELS = ("info", "warning", "error", "none")
 MOST_SUBSCRIPTIONS = 1_000
 MOST_WISHES = 100  # subscribe operations for one topic under different ids
 MOST_ADVERTISED = 1_000
+MOST_OFFERED = 100  # services
 BACKLOG_BYTES = 16_000_000  # messages that may wait for one client
 REPLY_BYTES = 1_000_000  # answers that may wait before we stop listening to the client
 TURN_S = 0.005  # one client's flood holds the loop no longer than this
 NOT_OURS = {
-    "advertise_service", "unadvertise_service", "service_response",
     "advertise_action", "unadvertise_action", "send_action_goal", "cancel_action_goal",
-    "action_feedback", "action_result", "auth", "png",
+    "action_feedback", "action_result", "auth",
 }  # fmt: skip
 
 
@@ -52,6 +53,7 @@ class Client:
         self._subscriptions: dict[str, Subscription] = {}
         self._advertised: dict[str, set[object]] = {}  # topic → ids under which it was advertised
         self._calls = Calls(bridge.services, self._outbox.reply)
+        self._providers = Providers(bridge.services, lambda request: self._outbox.reply(json_frame(request)))
         self._may_listen = asyncio.Event()
         self._may_listen.set()
         self._operations: dict[str, Callable[[dict[str, Any], object], None]] = {
@@ -61,6 +63,9 @@ class Client:
             "unadvertise": self._unadvertise,
             "publish": self._publish,
             "call_service": self._calls.call,
+            "advertise_service": self._advertise_service,
+            "unadvertise_service": self._unadvertise_service,
+            "service_response": self._service_response,
             "set_level": self._set_level,
             "status_level": self._set_level,
             "fragment": self._fragment,
@@ -74,7 +79,7 @@ class Client:
         turn_ends = time.monotonic() + TURN_S
         try:
             while True:
-                raw = await self._connection.recv(decode=False)
+                raw = await self._connection.recv()  # text that is not UTF-8 ends the connection with 1007
                 await self._connection.awake.wait()
                 self.handle(raw)
                 if self._outbox.reply_bytes > REPLY_BYTES:
@@ -93,7 +98,7 @@ class Client:
         """All that was meant for this client has left us."""
         return self._outbox.is_empty and self._connection.is_drained
 
-    def handle(self, raw: bytes, *, whole: bool = False) -> None:
+    def handle(self, raw: str | bytes, *, whole: bool = False) -> None:
         """Execute one frame, or send the reason why not. No input of a client can raise."""
         id: object = None
         op = ""
@@ -138,7 +143,13 @@ class Client:
         if known is not None and known.type is not None and requested.type not in (None, known.type):
             raise Refused(f"{known.name} has the type {known.type}, not {requested.type}")
         if subscription is None:
-            subscription = Subscription(spelling, self._outbox, self._bridge.counters, asyncio.get_running_loop())
+            subscription = Subscription(
+                spelling,
+                self._outbox,
+                self._bridge.counters,
+                asyncio.get_running_loop(),
+                on_lost=lambda why: self.say("error", f"subscribe: {why}"),
+            )
             self._subscriptions[spelling] = subscription
         elif id not in subscription.requested_by_id and len(subscription.requested_by_id) >= MOST_WISHES:
             raise Refused(f"a client may subscribe {MOST_WISHES} times to one topic")
@@ -211,10 +222,36 @@ class Client:
                 raise Refused(f"a client may publish to {MOST_ADVERTISED} topics")
             self._advertised[topic.name] = {None}  # publishing makes a publisher, as in rosbridge
             topic.publishers.add(self)
-        message = self._bridge.types.complete(topic.type, message, self._bridge.now())
-        topic.distribute(Outgoing(message))
+        notes: list[str] = []
+        message = self._bridge.types.complete(topic.type, message, self._bridge.now(), notes)
+        for note in notes:
+            self.say("error", f"publish: {note}", id)
+        topic.distribute(Outgoing(self._bridge, topic.type, message))
         for callback in self._bridge.on_publish:
             callback(topic.name, topic.type, message)
+
+    def _advertise_service(self, operation: dict[str, Any], id: object) -> None:
+        name, type = fields.text(operation, "service"), fields.text(operation, "type")
+        name, type = canonical_name(name), canonical_type(type, self._bridge.ros_version, "srv")
+        if name not in self._providers.names:
+            if self._bridge.services.find(name) is not None:
+                raise Refused(f"another node offers {name}")
+            if len(self._providers.names) >= MOST_OFFERED:
+                raise Refused(f"a client may offer {MOST_OFFERED} services")
+        self._providers.advertise({"service": name, "type": type}, id)
+        self.say("info", f"advertised {name}", id)
+
+    def _unadvertise_service(self, operation: dict[str, Any], id: object) -> None:
+        name = canonical_name(fields.text(operation, "service"))
+        if name not in self._providers.names:
+            self.say("warning", f"unadvertise_service: {name} is not offered by this client", id)
+            return
+        self._providers.unadvertise({"service": name}, id)
+
+    def _service_response(self, operation: dict[str, Any], id: object) -> None:
+        fields.text(operation, "id")
+        if not self._providers.respond({"values": {}, **operation}, id):
+            raise Refused("no call with this id waits for an answer")
 
     def _set_level(self, operation: dict[str, Any], id: object) -> None:
         level = fields.text(operation, "level")
@@ -245,6 +282,7 @@ class Client:
     def _leave(self) -> None:
         self._connection.on_ready = self._connection.on_lost = None
         self._calls.close()
+        self._providers.close()
         self._outbox.close()
         for spelling in list(self._subscriptions):
             self._end(spelling)
@@ -259,10 +297,10 @@ def _encoding(compression: str) -> Encoding:
     match compression:
         case "none":
             return "json"
-        case "cbor":
-            return "cbor"
+        case "cbor" | "cbor-raw" | "png":
+            return compression
         case _:
-            raise Refused(f"compression {compression[:40]!r} is not offered here: none or cbor")
+            raise Refused(f"compression {compression[:40]!r} is not offered here: none, cbor, cbor-raw or png")
 
 
 def _unknown(op: str, known: dict[str, Any]) -> str:

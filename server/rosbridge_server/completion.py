@@ -36,12 +36,15 @@ class TypeMismatch(ValueError):
     """A message that is not of its type. The text is one sentence for the client."""
 
 
-def complete(type: str, definitions: dict[str, Any], version: RosVersion, message: Json, now_s: float) -> Json:
+def complete(
+    type: str, definitions: dict[str, Any], version: RosVersion, message: Json, now_s: float, notes: list[str]
+) -> Json:
     """The message with all fields of its type: zeros where nothing was given, header stamps `now_s`.
 
-    Numeric arrays become numpy, byte arrays bytes. Raises TypeMismatch.
+    Numeric arrays become numpy, byte arrays bytes. Times are read as rosbridge reads them: ROS 2 takes the names of
+    ROS 1 too, ROS 1 leaves those of ROS 2 out, with a sentence in `notes`. Raises TypeMismatch.
     """
-    return cast("Json", _Completion(definitions, version, type, now_s).message(type, message, "", 0))
+    return cast("Json", _Completion(definitions, version, type, now_s, notes).message(type, message, "", 0))
 
 
 def zero(primitive: str) -> Any:
@@ -50,15 +53,20 @@ def zero(primitive: str) -> Any:
 
 
 class _Completion:
-    def __init__(self, definitions: dict[str, Any], version: RosVersion, type: str, now_s: float) -> None:
+    def __init__(
+        self, definitions: dict[str, Any], version: RosVersion, type: str, now_s: float, notes: list[str]
+    ) -> None:
         self._definitions = definitions
         self._version = version
         self._type = type.replace("/msg/", "/")
         self._now_s = now_s
+        self._notes = notes
 
     def message(self, type: str, given: Any, where: str, depth: int) -> Any:
-        if self._version == 1 and type in TIMES:
-            return self._time(given, where)
+        if type in TIMES:
+            given = self._respelled(type, given, where)
+            if self._version == 1:
+                return self._time(given, where)
         if type not in self._definitions or depth > DEEPEST:
             return given
         if not isinstance(given, dict):
@@ -69,6 +77,9 @@ class _Completion:
                 raise TypeMismatch(f"{self._type} has no field {where}{name}"[:200])
         if type == HEADER:
             given = {"stamp": self._now(), **given}
+            if self._is_left_out(given["stamp"]):
+                self._note(f"{where}stamp", "the time of the bridge")
+                given["stamp"] = self._now()
         return {
             name: self._value(field, given.get(name), f"{where}{name}", depth, is_given=name in given)
             for name, field in fields.items()
@@ -126,9 +137,26 @@ class _Completion:
         except (binascii.Error, ValueError):
             raise self._misfit(where, "base64 or a list of numbers", given) from None
 
-    def _time(self, given: Any, where: str) -> Json:
-        if given == "now":
+    def _respelled(self, type: str, given: Any, where: str) -> Any:
+        """A time with the names of this version."""
+        if given == "now" and TIMES[type] == "time":
             return self._now()
+        if self._is_left_out(given):
+            self._note(where.rstrip("."), "zero")
+        if self._version == 2 and isinstance(given, dict):
+            names = {"secs": "sec", "nsecs": "nanosec"}
+            return {names[name]: value for name, value in given.items() if name in names} | {
+                name: value for name, value in given.items() if name not in names
+            }
+        return given
+
+    def _is_left_out(self, given: Any) -> bool:
+        return self._version == 1 and isinstance(given, dict) and bool(given) and not given.keys() & {"secs", "nsecs"}
+
+    def _note(self, where: str, instead: str) -> None:
+        self._notes.append(f"{where[:80]} has no secs and nsecs, as times of ROS 1 have: it is {instead}")
+
+    def _time(self, given: Any, where: str) -> Json:
         if not isinstance(given, dict):
             raise self._misfit(where, "a time", given)
         return {name: self._primitive("int64", given.get(name, 0), f"{where}{name}") for name in ("secs", "nsecs")}

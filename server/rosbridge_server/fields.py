@@ -17,7 +17,7 @@ class Refused(Exception):
         super().__init__(text if len(text) <= 400 else text[:400] + "…")
 
 
-def parse(raw: bytes) -> dict[str, Any]:
+def parse(raw: str | bytes) -> dict[str, Any]:
     """The JSON object of one frame or of reassembled fragments."""
     try:
         value = _loads(raw)
@@ -28,12 +28,13 @@ def parse(raw: bytes) -> dict[str, Any]:
     return value
 
 
-def _loads(raw: bytes) -> Any:
+def _loads(raw: str | bytes) -> Any:
     try:
         return orjson.loads(raw)
     except orjson.JSONDecodeError:
         # Python clients write NaN and Infinity as bare words, and rosbridge, which reads with Python, takes them.
-        if b"NaN" not in raw and b"Infinity" not in raw:
+        text = raw if isinstance(raw, str) else raw.decode("utf-8", "replace")
+        if "NaN" not in text and "Infinity" not in text:
             raise
         return json.loads(raw)
 

@@ -5,22 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal, Protocol
 
-from server.judge.message import Json, RosVersion
+from server.judge.message import Json
 from server.rosbridge_server.graph import Graph, Topic
 from server.rosbridge_server.outbox import Counters
 from server.rosbridge_server.real.options import RealOptions
 from server.rosbridge_server.services import Handler, Services
-from server.rosbridge_server.types import MessageTypes
+from server.rosbridge_server.types import RosContext
 
 Like = Literal["helpful", "real"]
-
-
-class RosContext(Protocol):
-    """The version of ROS, its time and its message types."""
-
-    ros_version: RosVersion
-    now: Callable[[], float]
-    types: MessageTypes
 
 
 class TypeSource(RosContext, Protocol):

@@ -15,6 +15,7 @@ from server.rosbridge_server.completion import stamp
 from server.rosbridge_server.graph import SOURCE, Topic
 from server.rosbridge_server.interface import RosapiHost
 from server.rosbridge_server.real.loader import Malformed, Unknown, load
+from server.rosbridge_server.rosapi_answers import answer_text
 from server.rosbridge_server.typedefs import TIME_TYPEDEF, describe
 
 BRIDGE_NODE = "/rosbridge_websocket"
@@ -65,6 +66,7 @@ def add_rosapi(bridge: RosapiHost) -> None:
             handler,
             arguments,
             request="".join(f"string {argument}\n" for argument in arguments),
+            response=answer_text(name, bridge.ros_version),
             node=ROSAPI_NODE,
         )
 

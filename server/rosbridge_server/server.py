@@ -28,6 +28,8 @@ from server.rosbridge_server.types import MessageTypes
 __all__ = ["CannotListen", "Like", "RealOptions", "RosBridge", "ServiceFailed"]
 
 _CLOSE_ANSWERS: dict[int, Callable[[bytes], bytes]] = {1: lambda _: b"\x03\xe8", 2: lambda data: data[:2]}
+ROSOUT = "/rosout"
+_LOG_TYPES = {1: "rosgraph_msgs/Log", 2: "rcl_interfaces/Log"}
 _SERVERS = {1: "AutobahnPython/22.7.1", 2: "TornadoServer/6.6.1"}
 
 
@@ -159,6 +161,11 @@ class RosBridge:
         for subscription, client in list(found.subscribers.items()):
             client.type_became(found, subscription)
 
+    def advertise_rosout(self) -> None:
+        """Makes /rosout exist where the source has none: every node has it, and players tell ROS 2 by its type."""
+        if self.graph.find(ROSOUT) is None:
+            self.advertise(ROSOUT, _LOG_TYPES[self.ros_version])
+
     def unadvertise(self, topic: str) -> None:
         """The topic's source is gone; those who listen go on listening."""
         found = self.graph.find(topic)
@@ -244,7 +251,7 @@ class RosBridge:
         return dict(self._types_seen)
 
     def _outgoing(self, type: str, message: Json) -> Outgoing:
-        return RealOutgoing(self, type, message) if self.like == "real" else Outgoing(message)
+        return RealOutgoing(self, type, message) if self.like == "real" else Outgoing(self, type, message)
 
     def subscribed(self, topic: str) -> None:
         """Called by a client when it has subscribed."""

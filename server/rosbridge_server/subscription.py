@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from server.rosbridge_server.encoding import Encoding, Outgoing
 from server.rosbridge_server.outbox import Counters, Lane, Outbox
+from server.rosbridge_server.real.shape import Lost
+
+STRONGEST: tuple[Encoding, ...] = ("cbor-raw", "cbor", "png", "json")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,12 +26,22 @@ class SubscriptionRequest:
 
 class Subscription:
     """A client can subscribe to a topic several times under several ids, and gets each message once, as from rosbridge:
-    with the highest requested rate and the shortest queue, in CBOR if any request is for CBOR."""
+    with the highest requested rate and the shortest queue, in the first of STRONGEST that any request is for."""
 
-    def __init__(self, spelling: str, outbox: Outbox, counters: Counters, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self,
+        spelling: str,
+        outbox: Outbox,
+        counters: Counters,
+        loop: asyncio.AbstractEventLoop,
+        on_lost: Callable[[str], None],
+    ) -> None:
+        """`on_lost` receives why messages cannot be sent in the requested encoding, once for each encoding."""
         self.spelling = spelling  # the topic's name as this client writes it
         self.requested_by_id: dict[object, SubscriptionRequest] = {}
         self._is_muted = False  # the topic has another type than the requested one
+        self._on_lost = on_lost
+        self._lost_as: set[Encoding] = set()
         self._outbox = outbox
         self._counters = counters
         self._loop = loop
@@ -44,7 +58,8 @@ class Subscription:
         self._is_muted = type is not None and all(requested.type not in (None, type) for requested in requested_by_id)
         self._throttle_s = min((requested.throttle_s for requested in requested_by_id), default=0.0)
         self._lane.limit = min((requested.queue_length for requested in requested_by_id), default=0)
-        self._encoding = "cbor" if any(requested.encoding == "cbor" for requested in requested_by_id) else "json"
+        wanted = {requested.encoding for requested in requested_by_id}
+        self._encoding = next((encoding for encoding in STRONGEST if encoding in wanted), "json")
         if not self._throttle_s or not self._lane.limit:
             self._release_all()
 
@@ -52,6 +67,14 @@ class Subscription:
         """Sends, holds or leaves out one message."""
         if self._is_muted:
             return
+        try:
+            self._offer(message)
+        except Lost as why:
+            if self._encoding not in self._lost_as:
+                self._lost_as.add(self._encoding)
+                self._on_lost(f"{self.spelling} cannot be sent as {self._encoding}: {why}")
+
+    def _offer(self, message: Outgoing) -> None:
         if not self._throttle_s:
             self._outbox.send(self._lane, message.frame(self.spelling, self._encoding))
             return

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
 
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
@@ -41,13 +42,16 @@ class MessageTypes:
         except (TypesysError, KeyError):
             return ""
 
-    def complete(self, type: str, message: Json, now_s: float) -> Json:
+    def complete(self, type: str, message: Json, now_s: float, notes: list[str] | None = None) -> Json:
         """The message with every field that was left out, header stamps being now. Unknown types pass as they are.
 
-        Raises TypeMismatch where a field does not exist or has a value of the wrong kind.
+        `notes` receives a sentence for each part that is left out as rosbridge leaves it out. Raises TypeMismatch
+        where a field does not exist or has a value of the wrong kind.
         """
         definitions = self.definitions(type)
-        return message if definitions is None else complete(_long(type), definitions, self._version, message, now_s)
+        if definitions is None:
+            return message
+        return complete(_long(type), definitions, self._version, message, now_s, [] if notes is None else notes)
 
     def describe(self, type: str) -> list[Json]:
         """The type and all it contains, as rosapi describes them. Raises LookupError where it is not known."""
@@ -82,6 +86,14 @@ class MessageTypes:
             except Exception:  # the parser raises many exception types; the standard messages may still know it
                 self._parsed[type] = {}
         return self._parsed[type]
+
+
+class RosContext(Protocol):
+    """The version of ROS, its time and its message types."""
+
+    ros_version: RosVersion
+    now: Callable[[], float]
+    types: MessageTypes
 
 
 @cache

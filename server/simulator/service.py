@@ -65,6 +65,7 @@ class CarService:
         self.bridge = RosBridge(ros_version=ros_version, now=lambda: self.car.now_s, node="/simulated_car", like=like)
         for published in self.car.published:
             self.bridge.advertise(published.topic, published.type)
+        self.bridge.advertise_rosout()
         self.bridge.on_publish.append(self._on_publish)
         self.bridge.add_service(SCENARIO_SERVICE, "catgraph/Scenario", self._scenario_called, ("name", "stop"))
         self.bridge.add_service(STATE_SERVICE, "catgraph/SimulatorState", lambda _: self.state())

@@ -14,6 +14,7 @@ from server.rosbridge_server.connection import Connection
 from server.rosbridge_server.encoding import binary_frame, text_frame
 from server.rosbridge_server.interface import ServiceHost, TopicHost
 from server.rosbridge_server.outbox import Counters, Lane, Outbox
+from server.rosbridge_server.provider import Providers
 from server.rosbridge_server.real import client_topics
 from server.rosbridge_server.real import text as writing
 from server.rosbridge_server.real.calls import Failure, NoAnswer, call
@@ -21,7 +22,6 @@ from server.rosbridge_server.real.client_topics import ClientTopics
 from server.rosbridge_server.real.fragments import RealFragments
 from server.rosbridge_server.real.operation_fields import CALL, check
 from server.rosbridge_server.real.options import is_open
-from server.rosbridge_server.real.provider import Providers
 from server.rosbridge_server.real.shape import Lost
 
 BACKLOG_BYTES = 64_000_000
@@ -48,11 +48,11 @@ class RealClient:
             DEFAULT_BYTES if bridge.ros_version == 2 else None
         )
         self._topics = ClientTopics(bridge, self.send)
-        self._providers = Providers(bridge, self.send)
+        self._providers = Providers(bridge.services, self.send)
         self._calls: set[asyncio.Task[None]] = set()
         self._blocking: asyncio.Task[None] | None = None  # ROS 2: the call that all else waits for
         self._waiting: list[str] = []  # frames that came meanwhile
-        self._operations: dict[str, Callable[[dict[str, Any], Any], None]] = {
+        self._operations: dict[str, Callable[[dict[str, Any], Any], object]] = {
             "subscribe": self._topics.subscribe,
             "unsubscribe": self._topics.unsubscribe,
             "advertise": self._topics.advertise,
@@ -134,8 +134,7 @@ class RealClient:
         self._outbox.close()
         for task in self._calls:
             task.cancel()
-        self._topics.close()
-        self._providers.close()
+        self._topics.close()  # what it offers stays and never answers, as do the calls that wait
 
     def _write(self, text: str) -> None:
         self._outbox.send(self._lane, text_frame(text.encode("utf-8", "surrogatepass")))

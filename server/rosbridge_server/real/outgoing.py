@@ -9,22 +9,19 @@ from typing import Any
 from server.judge.message import Json
 from server.rosbridge.message_bytes import json_bytes
 from server.rosbridge_server.encoding import Outgoing
-from server.rosbridge_server.interface import RosContext
 from server.rosbridge_server.real import cbor, text
-from server.rosbridge_server.real.raw import raw_bytes
 from server.rosbridge_server.real.shape import Lost
 from server.rosbridge_server.real.values import Values
+from server.rosbridge_server.types import RosContext
 
 
 class RealOutgoing(Outgoing):
-    """`type` is the publisher's; an undefined type is written unchanged."""
+    """A message of a type that is not known is written unchanged."""
 
-    __slots__ = ("_bridge", "_forms", "type")
+    __slots__ = ("_forms",)
 
     def __init__(self, bridge: RosContext, type: str, message: Json) -> None:
-        super().__init__(message)
-        self._bridge = bridge
-        self.type = type
+        super().__init__(bridge, type, message)
         self._forms: dict[str, Any] = {}
 
     def json_values(self) -> Any:
@@ -49,7 +46,7 @@ class RealOutgoing(Outgoing):
         """The picture of the JSON frame. Raises Lost."""
         version = self._bridge.ros_version
         frame = text.dumps({"op": "publish", "topic": topic, "msg": self.json_values()}, version)
-        return text.png(frame)
+        return text.png(frame.encode())
 
     def _form(self, name: str) -> Any:
         if name not in self._forms:
@@ -63,13 +60,13 @@ class RealOutgoing(Outgoing):
         return found
 
     def _written(self, name: str) -> Any:
+        if name == "raw":
+            return self.raw()
         definitions = self._bridge.types.definitions(self.type)
         if definitions is None and name == "json":
             return json.loads(json_bytes(self._message))
         if definitions is None:
             raise Lost(f"the type {self.type} is not known")
         long, version = self._bridge.types.long_name(self.type), self._bridge.ros_version
-        if name == "raw":
-            return raw_bytes(long, definitions, version, self._message)
         values = Values(version, definitions)
         return values.json(long, self._message) if name == "json" else values.cbor(long, self._message)

@@ -27,9 +27,8 @@ def dumps(value: Any, version: RosVersion) -> str:
     return _DELETE.sub("\\1\x7f", text.replace("/", "\\/"))
 
 
-def png(text: str) -> str:
-    """The text as pixels of a nearly square RGB picture, padded with line ends, in base64."""
-    data = text.encode()
+def png(data: bytes) -> str:
+    """A JSON text as pixels of a nearly square RGB picture, padded with line ends, in base64."""
     width = math.floor(math.sqrt(len(data) / 3.0))
     height = math.ceil((len(data) / 3.0) / width)
     data = data.ljust(width * height * 3, b"\n")

@@ -16,8 +16,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from server.judge.message import Json
+from server.judge.message import Json, RosVersion
 from server.rosbridge_server.server import RosBridge
+from tests.server.rosbridge_server.conftest import bridging
+from tests.server.rosbridge_server.probe import probing, until
 
 HERE = Path(__file__).parent
 PROJECT = HERE.parents[2]
@@ -106,3 +108,22 @@ async def test_roslibjs(car: RosBridge, port: int) -> None:
     assert found["details"]["linear"] == {"x": "float64", "y": "float64", "z": "float64"}
     assert "does not exist" in found["failure"]
     assert found["statuses"] == ["subscribe: /vel has the type geometry_msgs/Twist, not std_msgs/Float64"]
+
+
+@pytest.mark.parametrize("version", [1, 2])
+async def test_roslibpy_offers_a_service_and_stamps_its_messages(version: RosVersion) -> None:
+    async with bridging(ros_version=version) as (bridge, port), probing(port) as probe:
+        await probe.subscribe("/point", type="geometry_msgs/PointStamped")
+        command = (sys.executable, str(HERE / "roslibpy_provider.py"), str(port), str(version))
+        process = await asyncio.create_subprocess_exec(*command, cwd=PROJECT, stderr=asyncio.subprocess.DEVNULL)
+        try:
+            stamped = (await probe.hear(40))["msg"]
+            await until(lambda: bridge.services.find("/lamp") is not None)
+            answer = await probe.call("/lamp", {"data": True})
+        finally:
+            process.kill()
+            await process.wait()
+        names = ("secs", "nsecs") if version == 1 else ("sec", "nanosec")
+        assert stamped["header"]["stamp"] == dict(zip(names, (3, 4), strict=True))
+        assert (answer["result"], answer["values"]) == (True, {"success": True, "message": "lamp"})
+        await until(lambda: bridge.services.find("/lamp") is None)

@@ -28,6 +28,31 @@ def test_a_given_stamp_stays() -> None:
     assert ROS1.complete("std_msgs/Time", {"data": "now"}, 2.0) == {"data": {"secs": 2, "nsecs": 0}}
 
 
+def test_ros_2_takes_the_names_of_ros_1_and_now() -> None:
+    """roslibpy writes the header of ROS 1 in both versions."""
+    notes: list[str] = []
+    given = {"stamp": {"secs": 3, "nsecs": 4}, "frame_id": "a", "seq": 1}
+    with pytest.raises(TypeMismatch, match="no field seq"):
+        ROS2.complete("std_msgs/msg/Header", given, 12.5, notes)
+    del given["seq"]
+    assert ROS2.complete("std_msgs/msg/Header", given, 12.5, notes)["stamp"] == {"sec": 3, "nanosec": 4}
+    assert ROS2.complete("std_msgs/msg/Header", {"stamp": "now"}, 12.5)["stamp"] == {"sec": 12, "nanosec": 500_000_000}
+    assert notes == []
+
+
+def test_ros_1_leaves_out_the_names_of_ros_2_and_says_so() -> None:
+    """As rosbridge does, which says nothing."""
+    notes: list[str] = []
+    point = {"header": {"stamp": {"sec": 3, "nanosec": 4}}}
+    made = ROS1.complete("geometry_msgs/PointStamped", point, 12.5, notes)
+    assert made["header"]["stamp"] == {"secs": 12, "nsecs": 500_000_000}
+    assert ROS1.complete("std_msgs/Time", {"data": {"sec": 3}}, 12.5, notes)["data"] == {"secs": 0, "nsecs": 0}
+    assert notes == [
+        "header.stamp has no secs and nsecs, as times of ROS 1 have: it is the time of the bridge",
+        "data has no secs and nsecs, as times of ROS 1 have: it is zero",
+    ]
+
+
 def test_arrays_become_typed_and_bytes_come_as_base64_or_numbers() -> None:
     scan = ROS1.complete("sensor_msgs/LaserScan", {"ranges": [1, 2.5, math.nan]}, 0.0)
     assert scan["ranges"].dtype == np.float32

@@ -13,6 +13,7 @@ from websockets.frames import Frame, Opcode
 
 from server.rosbridge.message_bytes import Unencodable, cbor_bytes, json_bytes
 from server.rosbridge_server.encoding import Encoding, Outgoing, frame
+from server.rosbridge_server.server import RosBridge
 
 NOT_NUMBERS = np.array([1.5, math.nan, math.inf, -math.inf], dtype=np.float32)
 
@@ -81,10 +82,10 @@ def test_cbor_keeps_what_is_no_number_and_bytes() -> None:
     assert (found["x"], found["data"], found["u"]) == (-math.inf, b"\x00\xff", b"\x00\x01")
 
 
-@pytest.mark.parametrize("encoding", ["json", "cbor"])
+@pytest.mark.parametrize("encoding", ["json", "cbor", "cbor-raw"])
 def test_a_message_is_encoded_once_for_all_who_want_it(encoding: Encoding) -> None:
     content = {"x": 1.0}
-    message = Outgoing(content)
+    message = Outgoing(RosBridge(), "geometry_msgs/Vector3", content)
     first = message.frame("/t", encoding)
     content["x"] = 2.0  # a second encoding would show this
     assert message.frame("/t", encoding) is first
@@ -93,7 +94,7 @@ def test_a_message_is_encoded_once_for_all_who_want_it(encoding: Encoding) -> No
 
 
 def test_a_frame_names_the_topic_as_the_client_does() -> None:
-    message = Outgoing({"x": 1.0})
+    message = Outgoing(RosBridge(), "geometry_msgs/Vector3", {"x": 1.0})
     text = message.frame('odd "topic"', "json")
     assert json.loads(text[2:]) == {"op": "publish", "topic": 'odd "topic"', "msg": {"x": 1.0}}
     binary = message.frame("ünusual", "cbor")

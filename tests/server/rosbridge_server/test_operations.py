@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from websockets.exceptions import ConnectionClosed
 
 from server.judge.message import Json
 from server.rosbridge_server.server import RosBridge
@@ -306,14 +307,15 @@ async def test_a_slow_service_holds_up_nobody(bridge: RosBridge, probe: Probe) -
         ({"op": "subscribe", "topic": "/a", "queue_length": -1}, "queue_length must be a number, 0 or more"),
         ({"op": "subscribe", "topic": "/a", "type": 7}, "type must be text"),
         ({"op": "subscribe", "topic": "/a", "type": "nonsense"}, "not a valid type string"),
-        ({"op": "subscribe", "topic": "/a", "compression": "png"}, "compression 'png' is not offered"),
-        ({"op": "subscribe", "topic": "/a", "compression": "cbor-raw"}, "compression 'cbor-raw' is not offered"),
+        ({"op": "subscribe", "topic": "/a", "compression": "zip"}, "compression 'zip' is not offered"),
         ({"op": "advertise", "topic": "/a"}, "expected a field type"),
         ({"op": "publish", "msg": {}}, "expected a field topic"),
         ({"op": "call_service"}, "expected a field service"),
         ({"op": "set_level", "level": "loud"}, "the level must be one of info, warning, error, none"),
-        ({"op": "service_response", "service": "/a"}, "this bridge does not do that"),
-        ({"op": "advertise_service", "service": "/a", "type": "a/B"}, "this bridge does not do that"),
+        ({"op": "service_response", "service": "/a"}, "no call with this id waits"),
+        ({"op": "advertise_service", "service": "/a"}, "expected a field type"),
+        ({"op": "advertise_service", "service": "/rosapi/topics", "type": "a/B"}, "another node offers /rosapi/topics"),
+        ({"op": "send_action_goal", "action": "/a"}, "this bridge does not do that"),
         ({"op": "fly"}, "unknown operation"),
         ({"op": 7}, "op must be text"),
         ({}, "expected a field op"),
@@ -324,6 +326,14 @@ async def test_wrong_operations_are_answered_with_their_id(probe: Probe, operati
     status = await probe.hear()
     assert (status["op"], status["level"], status["id"]) == ("status", "error", "the id")
     assert why in status["msg"]
+
+
+async def test_text_that_is_not_utf_8_ends_the_connection(bridge: RosBridge, port: int) -> None:
+    async with probing(port) as probe:
+        await probe.send_text(b'{"op":"\xff"}')
+        with pytest.raises(ConnectionClosed):
+            await probe.hear()
+    assert probe.socket.close_code == 1007  # RFC 6455, 8.1
 
 
 @pytest.mark.parametrize("frame", ["", "{", "[1]", '{"op":"subscribe"', b"\x00\xff"])

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from server.judge.message import RosVersion
 from server.rosbridge_server.server import RosBridge
 from tests.server.rosbridge_server.conftest import bridging
 from tests.server.rosbridge_server.probe import Probe, probing
@@ -111,6 +112,21 @@ async def test_message_details_of_arrays_and_constants(car: tuple[RosBridge, Pro
     assert dict(zip(fix["constnames"], fix["constvalues"], strict=True))["COVARIANCE_TYPE_KNOWN"] == "3"
     scan = (await values(car, "/rosapi/message_details", type="sensor_msgs/LaserScan"))["typedefs"][0]
     assert dict(zip(scan["fieldnames"], scan["fieldarraylen"], strict=True))["ranges"] == 0
+
+
+@pytest.mark.parametrize("version", [1, 2])
+async def test_its_own_services_are_described(version: RosVersion) -> None:
+    """What each answers is what it says of its answers."""
+    args = {"type": "std_msgs/String", "service": "/rosapi/topics", "topic": "/vel", "node": "/car", "name": "/a:b"}
+    async with bridging(ros_version=version) as (bridge, port), probing(port) as probe:
+        bridge.advertise("/vel", "geometry_msgs/Twist")
+        for service in bridge.services.all():
+            details = await probe.call("/rosapi/service_response_details", {"type": service.type})
+            assert details["result"], service.name
+            named = [name.removeprefix("_") for name in details["values"]["typedefs"][0]["fieldnames"]]
+            args["type"] = service.type if "service_re" in service.name else "std_msgs/String"
+            wanted = {name: args.get(name, "0") for name in service.arguments}
+            assert sorted((await probe.call(service.name, wanted))["values"]) == sorted(named), service.name
 
 
 @pytest.mark.parametrize(

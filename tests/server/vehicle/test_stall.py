@@ -31,6 +31,9 @@ async def test_a_server_that_stood_still_says_so_and_does_not_accuse_the_car(tmp
             watch.freeze()
             await asyncio.sleep(3.0)
             watch.thaw()
+            async with asyncio.timeout(20):
+                while not any(event["change"] == "stalled" for event in (await log())[before:]):
+                    await asyncio.sleep(0.1)
             await asyncio.sleep(1.5)
             after = (await log())[before:]
         said = [event["text"] for event in after if event["change"] == "stalled"]
