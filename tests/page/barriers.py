@@ -43,8 +43,9 @@ async def fits(page: Page, where: str) -> None:
     """Nothing hangs over an edge of the screen, and what is pressed is large enough."""
     width = await page.evaluate("innerWidth")
     assert await page.evaluate("document.documentElement.scrollWidth") <= width, f"{where}, {width}"
-    assert await page.evaluate(HANGS_OVER) == [], f"{where}, {width}"
-    assert await page.evaluate(TOO_SMALL) == [], f"{where}, {width}"
+    for fault in (HANGS_OVER, TOO_SMALL):
+        found = await page.evaluate(fault)
+        assert found == [], f"{where}, {width}: {found}"
 
 
 async def fits_all(page: Page, where: str) -> None:
