@@ -18,6 +18,11 @@ async def offer(probe: Probe, name: str = "/lamp") -> None:
     await probe.settle()
 
 
+def failed(why: str) -> str:
+    """As rosbridge passes the failure of a node on."""
+    return f"service [/lamp] responded with an error: b'error processing request: {why}'"
+
+
 async def request(probe: Probe) -> dict[str, Any]:
     """The next call that reaches the client that offers the service."""
     return await probe.hear_op("call_service")
@@ -51,7 +56,7 @@ async def test_a_failure_is_passed_on(port: int, probe: Probe) -> None:
         asked = await request(probe)
         await probe.send(op="service_response", id=asked["id"], service="/lamp", values="no bulb", result=False)
         answer = await caller.hear()
-        assert (answer["result"], answer["values"]) == (False, "no bulb")
+        assert (answer["result"], answer["values"]) == (False, failed("no bulb"))
 
 
 async def test_a_provider_that_goes_leaves_no_caller_waiting(bridge: RosBridge, port: int, probe: Probe) -> None:
@@ -61,7 +66,7 @@ async def test_a_provider_that_goes_leaves_no_caller_waiting(bridge: RosBridge, 
         await request(other)
     answer = await probe.hear()
     assert (answer["result"], answer["id"]) == (False, "c1")
-    assert answer["values"] == "the client that offers the service has gone"
+    assert answer["values"] == failed("the client that offers the service has gone")
     assert bridge.services.find("/lamp") is None
 
 
@@ -82,6 +87,34 @@ async def test_what_is_offered_is_withdrawn(port: int, probe: Probe) -> None:
         await probe.settle()
         answer = await caller.call("/lamp")
         assert (answer["result"], answer["values"]) == (False, "Service /lamp does not exist")
+
+
+async def test_a_withdrawn_service_answers_its_waiting_calls_at_once(port: int, probe: Probe) -> None:
+    async with probing(port) as caller:
+        await offer(probe)
+        await caller.send(op="call_service", service="/lamp", id="c1")
+        await request(probe)
+        await probe.send(op="unadvertise_service", service="/lamp")
+        answer = await caller.hear()
+        assert (answer["id"], answer["result"]) == ("c1", False)
+        assert answer["values"] == failed("the service /lamp was withdrawn")
+
+
+async def test_a_late_answer_fits_no_call_of_the_service_when_it_is_offered_anew(port: int, probe: Probe) -> None:
+    async with probing(port) as caller:
+        await offer(probe)
+        await caller.send(op="call_service", service="/lamp", id="c1")
+        first = await request(probe)
+        await probe.send(op="unadvertise_service", service="/lamp")
+        assert (await caller.hear())["id"] == "c1"
+        await offer(probe)
+        await caller.send(op="call_service", service="/lamp", id="c2")
+        second = await request(probe)
+        assert second["id"] != first["id"]
+        for asked, success in ((first, False), (second, True)):
+            await probe.send(op="service_response", id=asked["id"], values={"success": success}, result=True)
+        answer = await caller.hear()
+        assert (answer["id"], answer["values"]) == ("c2", {"success": True})
 
 
 async def test_nobody_takes_the_service_of_another(port: int, probe: Probe) -> None:
