@@ -157,20 +157,24 @@ class NatsAgent:
             frame = await looked.after(pull.have if pull.run == self._run else 0, wire.PULL_WAITS_S)
         finally:
             self._pulls -= 1
-        now_s = self._now()
-        head = wire.FrameHead(run=self._run, number=0, now_s=now_s, waited_s=now_s - came_s)
-        if frame is None:
-            return await self._respond(message, wire.encode_frame(head))
-        head = head.model_copy(
-            update={"number": frame.number, "age_s": now_s - frame.put_s, "is_text": isinstance(frame.payload, str)}
-        )
-        data = wire.encode_frame(head, frame.payload)
+        data = self._framed(came_s, frame)
         if len(data) > wire.LARGEST:
             self.refused += 1
             self._log_too_large(f"frame {kind}", vehicle, len(data))
-            data = wire.encode_frame(head.model_copy(update={"number": 0}))
             await asyncio.sleep(wire.PULL_WAITS_S)  # it would be asked for again at once
+            data = self._framed(came_s, None)
         await self._respond(message, data)
+
+    def _framed(self, came_s: float, frame: Frame | None) -> bytes:
+        """A frame as it is sent now; None: that there is no newer one."""
+        now_s = self._now()
+        head = wire.FrameHead(run=self._run, number=0, now_s=now_s, waited_s=now_s - came_s)
+        if frame is None:
+            return wire.encode_frame(head)
+        head = head.model_copy(
+            update={"number": frame.number, "age_s": now_s - frame.put_s, "is_text": isinstance(frame.payload, str)}
+        )
+        return wire.encode_frame(head, frame.payload)
 
     # -- events --------------------------------------------------------------------------------------------------------
 
@@ -238,10 +242,10 @@ class NatsAgent:
         data = wire.encode(body)
         if len(data) > wire.LARGEST:
             self._log_too_large(f"answer to {asked.do}", vehicle, len(data))
-            why = f"the answer of {vehicle} is too large for the broker ({len(data) // 1000} kB)"
+            refusal = f"the answer of {vehicle} is too large for the broker ({len(data) // 1000} kB)"
             data = wire.encode(
                 wire.Answer(
-                    run=body.run, now_s=body.now_s, last=body.last, refused=why, is_unknown=asked.do == "command"
+                    run=body.run, now_s=body.now_s, last=body.last, refused=refusal, is_unknown=asked.do == "command"
                 )
             )
         await self._respond(message, data)

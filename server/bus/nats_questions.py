@@ -64,7 +64,9 @@ class Questions:
             raise NotServed("the broker is not connected", cut="server-broker")
         data = wire.encode(asked)
         if len(data) > wire.LARGEST:  # the broker would end the connection, with every car of this node
-            raise NotServed(f"the command is too large for the broker ({len(data) // 1000} kB)", outcome="not_delivered")
+            raise NotServed(
+                f"the request is too large for the broker ({len(data) // 1000} kB)", outcome="not_delivered"
+            )
         try:
             message = await client.request(wire.subject(vehicle, "ask"), data, timeout=within_s, headers=wire.headers())
             answer = wire.decode(wire.Answer, message.data)

@@ -16,6 +16,7 @@ times are of the agent's monotonic clock, in seconds.
 
 from __future__ import annotations
 
+import logging
 from typing import Annotated, Any, Literal, TypeVar
 
 import orjson
@@ -31,6 +32,9 @@ TRACE = "Catgraph-Trace"
 LARGEST = 900_000  # bytes of a body; the broker takes 1 MiB, with the headers
 HEAD = 10_000  # bytes of a body besides its events
 KINDS = frozenset({"state", "scan", SUMMARY})
+
+
+log = logging.getLogger("catgraph.bus")
 
 
 class Malformed(ValueError):
@@ -133,13 +137,19 @@ def decode(kind: type[B], data: bytes) -> B:
 
 
 def fitting(events: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """As many of the first events as fit into one body, at least one."""
-    size = HEAD
-    for count, event in enumerate(events):
-        size += len(orjson.dumps(event)) + 1
-        if size > LARGEST and count:
-            return events[:count]
-    return events
+    """As many of the first events as fit into one body. One that alone does not fit is cut to its number and time, so
+    that those behind it arrive."""
+    size, found = HEAD, []
+    for event in events:
+        length = len(orjson.dumps(event)) + 1
+        if HEAD + length > LARGEST:
+            log.error("event_too_large_for_the_broker n=%s bytes=%d", event.get("n"), length)
+            event = {name: event[name] for name in ("n", "at_ms", "alarm", "change") if name in event}
+            length = len(orjson.dumps(event)) + 1
+        if (size := size + length) > LARGEST:
+            break
+        found.append(event)
+    return found
 
 
 def encode_frame(head: FrameHead, payload: str | bytes = b"") -> bytes:

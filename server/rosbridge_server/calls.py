@@ -37,9 +37,9 @@ class Calls:
         name, _, tail = spelling.partition("#")  # an old way to give the id
         if id is None and tail:
             id = tail[: fields.LONGEST_ID]
-        if len(self._waiting) >= MOST_CALLS:
-            raise Refused(f"{MOST_CALLS} service calls have no answer yet")
         try:
+            if len(self._waiting) >= MOST_CALLS:
+                raise Refused(f"{MOST_CALLS} service calls have no answer yet")
             service = self._find(name)
             request = self._request(service, operation.get("args"))
         except Refused as why:

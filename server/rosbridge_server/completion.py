@@ -203,21 +203,24 @@ class Completion:
                 raise Unfit("argument out of range")
         return result
 
-    def _zero(self, field: Field, depth: int = 0) -> Any:
+    def _zero(self, field: Field, within: tuple[str, ...] = ()) -> Any:
+        """`within`: the types that hold it; what holds itself is left empty."""
         if field.is_bytes:
             return bytes(field.length if field.array == "fixed" else 0)
         if field.array:
             values = items(field, None)
             if field.is_message:
-                return [self._zero(field.item(), depth) for _ in values]
+                return [self._zero(field.item(), within) for _ in values]
             return _array(field, values) if field.is_number and field.type != "byte" else values
         if field.type in TIMES:
             return time_of(None, self._version)
         if field.is_message:
-            if field.type not in self._definitions or depth > DEEPEST:
+            if field.type not in self._definitions or field.type in within:
                 return {}
             return {
-                inner.name: DEFAULTS[self._version].get((field.type, inner.name), self._zero(inner, depth + 1))
+                inner.name: DEFAULTS[self._version].get(
+                    (field.type, inner.name), self._zero(inner, (*within, field.type))
+                )
                 for inner in fields(field.type, self._definitions)
             }
         return zero(field.type)

@@ -27,7 +27,7 @@ _LOG_TYPES = {1: "rosgraph_msgs/Log", 2: "rcl_interfaces/Log"}
 class RosBridge:
     """Behaves as the rosbridge of `ros_version`; `now` is the ROS time of rosapi [s since 1970].
 
-    It answers as rosbridge_suite does. What that only writes to its log is told in a `status`, and what it cannot
+    It answers as rosbridge_suite does. What that only writes to its log is sent as a `status`, and what it cannot
     encode is sent.
 
     Everything but start, stop, kill and revive is synchronous and belongs on the loop on which the bridge was started.

@@ -355,7 +355,7 @@ async def test_a_car_is_not_called_silent_while_its_other_topics_come(tmp_path: 
 
 # -- any sequence ----------------------------------------------------------------------------------------------------
 
-PROVEN_S = 3.0  # until it is known that a sample is kept: three answers, two silences
+PROVEN_S = 12.0  # longer than until a kept sample is known, and 5 s in which nothing new comes
 STEPS = ("publish", "publish", "renew", "renew twice", "outage", "wait", "wait long")
 
 

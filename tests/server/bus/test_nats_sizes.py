@@ -23,14 +23,15 @@ async def through_broker() -> AsyncIterator[tuple[str, Buses]]:
         yield broker.address, both
 
 
-def test_as_many_events_as_fit_into_a_message_and_at_least_one() -> None:
+def test_as_many_events_as_fit_into_a_message() -> None:
     events = [event(LONG, n=n) for n in range(1, wire.PORTION + 1)]
     first = wire.fitting(events)
     assert 0 < len(first) < len(events)
     size = len(wire.encode(wire.Events(run="r" * 40, events=first)))
     assert wire.LARGEST - wire.HEAD - len(LONG) * 2 < size <= wire.LARGEST
     assert wire.fitting(events[:3]) == events[:3]
-    assert wire.fitting([event(LARGE)]) == [event(LARGE)]
+    short = {"n": 1, "at_ms": 1, "alarm": "hot", "change": "raised"}
+    assert wire.fitting([event(LARGE, n=1), event(n=2)]) == [short, event(n=2)], "those behind it arrive"
     assert wire.fitting([]) == []
 
 
@@ -60,7 +61,7 @@ async def test_events_of_many_bytes_are_read_from_an_agent_to_the_last() -> None
 
 async def test_a_command_that_is_too_large_is_not_sent_and_the_node_stays_connected() -> None:
     async with through_broker() as (_, both):
-        with pytest.raises(NotServed, match="the command is too large for the broker") as why:
+        with pytest.raises(NotServed, match="the request is too large for the broker") as why:
             await both.page.request("ocelot", {"what": "x" * (wire.LARGEST + 1)})
         assert why.value.outcome == "not_delivered"
         assert await both.page.request("margay", {"what": 1}) == {"ok": True, "got": 1}

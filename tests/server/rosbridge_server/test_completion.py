@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.typesys import get_types_from_msg
 
-from server.rosbridge_server.completion import Unfit
+from server.rosbridge_server.completion import Completion, Unfit
 from server.rosbridge_server.types import MessageTypes
 from server.rosbridge_server.values import stamp
 
@@ -119,3 +120,10 @@ def test_a_bad_definition_does_no_harm(definition: str) -> None:
 def test_stamps_are_exact_and_carry(at_s: float, expected: tuple[int, int]) -> None:
     assert stamp(at_s, 1) == {"secs": expected[0], "nsecs": expected[1]}
     assert stamp(at_s, 2) == {"sec": expected[0], "nanosec": expected[1]}
+
+
+def test_a_type_that_holds_itself_ends() -> None:
+    definitions = dict(get_types_from_msg("Tree left\nTree right\nint8 leaf", "yard_msgs/msg/Tree"))
+    tree = Completion("yard_msgs/msg/Tree", definitions, 2, 1.0)
+    empty = {"left": {}, "right": {}, "leaf": 0}
+    assert tree.message({"leaf": 1}) == {"left": empty, "right": empty, "leaf": 1}

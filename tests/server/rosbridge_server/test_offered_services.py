@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from server.rosbridge_server.calls import MOST_CALLS
 from server.rosbridge_server.client import MOST_OFFERED
 from server.rosbridge_server.server import RosBridge
 from tests.server.rosbridge_server.probe import Probe, probing, until
@@ -131,3 +132,13 @@ async def test_the_number_of_services_of_a_client_is_bounded(probe: Probe) -> No
         await offer(probe, f"/s{number}")
     await probe.send(op="advertise_service", service="/more", type="std_srvs/SetBool", id="x")
     assert f"a client may offer {MOST_OFFERED} services" in (await probe.hear())["msg"]
+
+
+async def test_one_call_more_than_may_wait_is_answered_at_once(port: int, probe: Probe) -> None:
+    async with probing(port) as caller:
+        await offer(probe)
+        for number in range(MOST_CALLS + 1):
+            await caller.send(op="call_service", service="/lamp", id=f"c{number}")
+        answer = await caller.hear_op("service_response")
+        assert (answer["id"], answer["result"]) == (f"c{MOST_CALLS}", False)
+        assert "100 service calls have no answer yet" in answer["values"]
