@@ -129,7 +129,7 @@ class Logbook {
       figure('Distance', fixed(distance_m / 1000, distance_m < 1e5 ? 1 : 0), 'km', `${hours(driven_s)} h`),
       figure('Autonomous', share(autonomous), '%', `of the distance, ${hours(modes_s['autonomous'])} h`),
       figure('Not known', share(unknown), '%', `mode of the car, ${hours(modes_s['unknown'])} h`),
-      figure('Interventions', totals.interventions === null ? null : numberOf(totals.interventions), 'per 100 km', 'driven autonomously'),
+      figure('Interventions', totals.interventions === null ? null : numberOf(totals.interventions), 'per 100 km', 'autonomous'),
       figure('Alarms', totals.alarms === null ? null : numberOf(totals.alarms), 'per 100 km', ''),
       overdueFigure(mine) ?? figure('Checks missing', totals.checks_known ? String(totals.checks_missing) : null, '', totals.checks_known ? `of ${counted(totals.checks_known, 'drive')}` : '', totals.checks_missing > 0));
     this.#drawPlots();
