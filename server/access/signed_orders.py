@@ -123,7 +123,8 @@ class SignedOrders:
         given = display_name.clean(message.get("by")) or display_name.NAMELESS
         by = f"{given[: display_name.MAX_LETTERS - len(mark)]}{mark}" if known is None else known.name
         sender = {"by": by, "who": who if is_key and not mark else f"web:{who}", "console": False}
-        return {**message, **sender}
+        # A node's clock is another one; that what is not signed came in time is in the time given with the request.
+        return {**{name: value for name, value in message.items() if name != "heard_ms"}, **sender}
 
     async def _proved(self, vehicle: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
         try:

@@ -135,8 +135,13 @@ class PageBus(Protocol):
     async def resume(self, vehicle: str, run: str, n: int) -> Resumed:
         """Where a reader goes on who has read up to `n` in another `run`. Raises NotServed."""
 
-    async def request(self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0) -> Mapping[str, Any]:
-        """The answer to a command, once the events that it caused may be shown. Raises NotServed."""
+    async def request(
+        self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0, comes_within_s: float | None = None
+    ) -> Mapping[str, Any]:
+        """The answer to a command, once the events that it caused may be shown. Raises NotServed.
+
+        `comes_within_s`: where it takes longer to reach the session, it is not carried out; None: `deadline_s`.
+        """
 
     def watch(self, vehicle: str, watcher: Watcher) -> Callable[[], None]:
         """Calls `watcher(kind)` whenever something new is there; answers how to end that."""

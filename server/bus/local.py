@@ -155,8 +155,11 @@ class LocalBus:
         """Where a reader goes on who has read up to `n` in `run`."""
         return self._journal.runs.resume(vehicle, run, n, self.last_event(vehicle))
 
-    async def request(self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0) -> Mapping[str, Any]:
-        """The answer to a command, once the events that it caused may be shown. Raises NotServed."""
+    async def request(
+        self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0, comes_within_s: float | None = None
+    ) -> Mapping[str, Any]:
+        """The answer to a command, once the events that it caused may be shown; here nothing is under way. Raises
+        NotServed."""
         handler = self._handlers.get(vehicle)
         if handler is None:
             raise NotServed(f"no vehicle is named {vehicle}")

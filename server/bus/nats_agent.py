@@ -260,19 +260,20 @@ class NatsAgent:
         """Raises NotServed, also for a command that came too late or was meant for an earlier run."""
         if asked.run != self._run:
             raise NotServed(f"{vehicle} has started again since the command was given")
-        self._left_s(vehicle, asked)
+        self._check_time(vehicle, asked)
         try:
             command = await self._admit(vehicle, asked.command)
         except NotAdmitted as why:
             log.warning("command_not_admitted vehicle=%s why=%s", vehicle, why)
             return {"ok": False, "reason": str(why)}
-        return await self._bus.request(vehicle, command, deadline_s=self._left_s(vehicle, asked))
+        self._check_time(vehicle, asked)
+        until_s = asked.not_after_s if asked.answered_by_s is None else asked.answered_by_s
+        return await self._bus.request(vehicle, command, deadline_s=until_s - self._now())
 
-    def _left_s(self, vehicle: str, asked: wire.Ask) -> float:
-        """Until the command may not be carried out any more. Raises NotServed."""
-        if (left_s := asked.not_after_s - self._now()) <= 0:
+    def _check_time(self, vehicle: str, asked: wire.Ask) -> None:
+        """Raises NotServed: the command may not be carried out any more."""
+        if self._now() >= asked.not_after_s:
             raise NotServed(f"the command reached {vehicle} too late and was not carried out")
-        return left_s
 
     async def _publish(self, vehicle: str, what: str, body: wire.Body) -> None:
         with contextlib.suppress(NatsError):

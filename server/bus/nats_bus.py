@@ -229,9 +229,13 @@ class NatsBus:
             self._meet(vehicle, news.run, first - 1)
         return self._logs.take(vehicle, news.events)
 
-    async def request(self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0) -> Mapping[str, Any]:
-        """The agent carries it out within `deadline_s` or not at all: the deadline is a time of its own clock."""
-        ends_s = self._now() + deadline_s
+    async def request(
+        self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0, comes_within_s: float | None = None
+    ) -> Mapping[str, Any]:
+        """The agent carries out what comes in time, and nothing later: the time is of its own clock."""
+        began_s = self._now()
+        ends_s = began_s + deadline_s
+        due_s = ends_s if comes_within_s is None else began_s + min(deadline_s, comes_within_s)
         self._heard.check(vehicle)
         clock = self._questions.clocks.get(vehicle)
         if clock is None or clock.run != self._logs.run(vehicle) or self._now() - clock.heard_s > GONE_AFTER_S:
@@ -240,10 +244,16 @@ class NatsBus:
             except NotServed as why:  # the command itself was not sent
                 raise NotServed(str(why), cut=why.cut) from None
             clock = self._questions.clocks[vehicle]
-        left_s = ends_s - self._now()
-        not_after_s = clock.earliest(self._now()) + left_s
-        asked = wire.Ask(do="command", command=dict(command), not_after_s=not_after_s, run=clock.run)
-        answer = await self._questions.ask(vehicle, asked, within_s=left_s)
+        now_s = self._now()
+        ahead_s = clock.earliest(now_s) - now_s
+        asked = wire.Ask(
+            do="command",
+            command=dict(command),
+            not_after_s=due_s + ahead_s,
+            answered_by_s=ends_s + ahead_s,
+            run=clock.run,
+        )
+        answer = await self._questions.ask(vehicle, asked, within_s=ends_s - now_s)
         # What the command caused may be shown before it is answered; the answer does not wait longer than it may.
         await self._logs.caught_up(vehicle, answer.last, ends_s - self._now())
         return answer.answer

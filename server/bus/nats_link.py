@@ -21,6 +21,8 @@ RETRY_S = 1
 CONNECTS_WITHIN_S = 3
 PING_EVERY_S = 2  # a broker that has not answered two of them is gone: after 4 to 6 s
 SAID_AGAIN_S = 60.0  # the same complaint is logged no more often
+MOST_REFUSED = 20  # subjects that are named
+NO_RIGHT = "permissions violation"  # as a broker says it; the connection stays
 
 
 class Part(Protocol):
@@ -58,6 +60,18 @@ class BrokerLink:
         self._is_started = False
         self._why = "it was not reached yet"
         self._said: tuple[str, float] = ("", 0.0)
+        self._refused: dict[str, None] = {}  # what the broker refused by this connection, in its order
+
+    @property
+    def refused(self) -> str | None:
+        """What the broker does not allow this program, as a sentence; None: it refused nothing by this connection.
+
+        Nothing else says so: what is subscribed to does not come, and what is published does not arrive.
+        """
+        if not self._refused:
+            return None
+        what = "; ".join(self._refused)
+        return f"The broker {self._broker.address} refuses a part of what this program needs: {what}."
 
     @property
     def complaint(self) -> str | None:
@@ -96,6 +110,7 @@ class BrokerLink:
                 await self._on_error(why)
             finally:
                 self._is_started = False
+                self._refused.clear()
                 for part in self._parts:
                     await part.stop()
                 with contextlib.suppress(Exception):  # a client that never connected cannot be closed
@@ -106,11 +121,15 @@ class BrokerLink:
         async def on_ended() -> None:
             ended.set()
 
+        async def on_again() -> None:
+            self._refused.clear()  # its rights may be others now
+
         await client.connect(
             self._broker.address,
             name=self._name,
             error_cb=self._on_error,
             closed_cb=on_ended,
+            disconnected_cb=on_again,
             nkeys_seed_str=self._seed,
             tls=self._context,
             inbox_prefix=f"_INBOX.{secrets.token_hex(8)}",
@@ -124,6 +143,8 @@ class BrokerLink:
 
     async def _on_error(self, why: Exception) -> None:
         self._why = _words(why)
+        if NO_RIGHT in self._why.lower() and len(self._refused) < MOST_REFUSED:
+            self._refused[self._why] = None
         now_s = asyncio.get_running_loop().time()
         said, at_s = self._said
         if self._why != said or now_s - at_s > SAID_AGAIN_S:

@@ -84,12 +84,13 @@ class Events(Body):
 
 
 class Ask(Body):
-    """`command`: only until `not_after_s` of the agent's run `run`; `after` and `find`: events; `clock`: only that;
-    `resume`: where to go on after number `n` of `run`."""
+    """`command`: only where it comes until `not_after_s` of the agent's run `run`, answered until `answered_by_s`;
+    `after` and `find`: events; `clock`: only that; `resume`: where to go on after number `n` of `run`."""
 
     do: Literal["command", "after", "find", "clock", "resume"]
     command: dict[str, Any] = {}
     not_after_s: float = 0.0
+    answered_by_s: float | None = None  # None: `not_after_s`
     run: Run = ""
     n: Number = 0
     limit: Annotated[int, Field(ge=1, le=PORTION)] = PORTION

@@ -31,6 +31,35 @@ class BaseCommand(BaseModel):
     id: Annotated[str, Field(max_length=80)] | None = None
 
 
+class Prompt(BaseCommand):
+    """Is for the moment at which it was pressed: refused where it took longer than `acts_within_s` to come.
+
+    The page gives no time of day. `heard_ms` is the server's own time in the newest state that the page had, `held_s`
+    how old that state was then, by the bounds that the page has of the server's clock.
+    """
+
+    acts_within_s: ClassVar[float] = 0.5
+    pressed_ago_s: Annotated[
+        float, Field(ge=0, le=86_400, allow_inf_nan=False, description="since the finger let go, when it was sent")
+    ] = 0.0
+    heard_ms: Annotated[float, Field(ge=0, le=2**53, allow_inf_nan=False)] | None = None
+    held_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)] = 0.0
+
+    def late_s(self, wall_ms: float) -> float:
+        """How long ago it was pressed. Over a quiet link the error is less than its shortest round trip."""
+        way_s = 0.0 if self.heard_ms is None else max(0.0, (wall_ms - self.heard_ms) / 1000 - self.held_s)
+        return self.pressed_ago_s + way_s
+
+    def too_late(self, wall_ms: float) -> str | None:
+        """Why it is refused, as a sentence; None: it came in time."""
+        if (late_s := self.late_s(wall_ms)) <= self.acts_within_s:
+            return None
+        return f"This was pressed {late_s:.1f} s ago: press again if still needed."
+
+
+OF_PAGE = frozenset(Prompt.model_fields) - frozenset(BaseCommand.model_fields)  # what only a page can say
+
+
 class OfCar(BaseCommand):
     """Acts on the car itself: refused where it was meant for another one."""
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from server.protocol.command_base import BaseCommand, Name, Needs, Number, PageName
+from server.protocol.command_base import BaseCommand, Name, Needs, Number, PageName, Prompt
 from server.protocol.departure_commands import DepartureCommand
 from server.protocol.doc import doc
 from server.protocol.handover_commands import HandoverCommand
@@ -23,7 +23,7 @@ from server.protocol.slowing_commands import SlowingCommand
 MAX_COMMAND_BYTES = 16 * 1024
 
 
-class Connect(BaseCommand):
+class Connect(Prompt):
     """Dials a car; it is tried until disconnected."""
 
     http: ClassVar[str] = "Dial a car's rosbridge; it is tried until disconnected"
@@ -44,14 +44,14 @@ class Retry(BaseCommand):
     kind: Literal["retry"]
 
 
-class Disconnect(BaseCommand):
+class Disconnect(Prompt):
     """Ends monitoring: the session is idle."""
 
     http: ClassVar[str] = "End monitoring"
     kind: Literal["disconnect"]
 
 
-class Pause(BaseCommand):
+class Pause(Prompt):
     """Pauses monitoring: values go on, no alarm comes."""
 
     http: ClassVar[str] = "Pause monitoring: values continue, no alarm is raised"
@@ -85,7 +85,7 @@ class Acknowledge(BaseCommand):
     occurrence: Annotated[Number, doc("which occurrence was seen; an older one is refused")]
 
 
-class Silence(BaseCommand):
+class Silence(Prompt):
     """No sound of this occurrence for 30 s; it still waits for its acknowledgement."""
 
     needs: ClassVar[Needs] = "operator"
@@ -96,7 +96,7 @@ class Silence(BaseCommand):
     occurrence: Annotated[Number, doc("which occurrence is silenced; an older one is refused")]
 
 
-class Shelve(BaseCommand):
+class Shelve(Prompt):
     """Hides an alarm for a time."""
 
     needs: ClassVar[Needs] = "operator"
@@ -185,7 +185,7 @@ class Ride(BaseCommand):
     phone: Annotated[PageName | None, doc("null: none is chosen, one is found")]
 
 
-class TakeControl(BaseCommand):
+class TakeControl(Prompt):
     """Takes, gives or requests control; server/control/lease.py says who may do what."""
 
     needs: ClassVar[Needs] = "operator"
@@ -271,12 +271,32 @@ def kind_of(command: type[Command]) -> str:
 BY_KIND: Mapping[str, type[Command]] = {kind_of(one): one for one in get_args(Command)}
 KINDS = frozenset(BY_KIND)
 SLOW_DOWN = frozenset(kind for kind, one in BY_KIND.items() if one in get_args(SlowingCommand))
+COMES_WITHIN_S = {kind: one.acts_within_s for kind, one in BY_KIND.items() if issubclass(one, Prompt)}
 NO_SUCH = "Unknown command."
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])
 
 
 class NotUnderstood(ValueError):
     """The command does not fit its model; `str()` is one sentence."""
+
+
+def comes_within_s(message: Mapping[str, Any]) -> float | None:
+    """In what time a command must reach the session of its car [s]; None: it may take as long as its answer.
+
+    What a device signed with the time of its newest state says itself how old it is.
+    """
+    says_itself = message.get("signed") is not None and message.get("heard_ms") is not None
+    kind = message.get("kind")
+    return COMES_WITHIN_S.get(kind) if isinstance(kind, str) and not says_itself else None
+
+
+def too_late(message: Mapping[str, Any], wall_ms: float) -> str | None:
+    """Why a command is refused that took too long to come here, as a sentence; None: it did not, or cannot be read."""
+    try:
+        command = read(message)
+    except NotUnderstood:
+        return None  # the session says so
+    return command.too_late(wall_ms) if isinstance(command, Prompt) else None
 
 
 def read(command: Any) -> Command:

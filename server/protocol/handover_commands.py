@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from server.protocol.command_base import Needs, OfCar, PageName
+from server.protocol.command_base import Needs, OfCar, PageName, Prompt
 from server.protocol.doc import doc
 
 LineKey = Annotated[str, Field(min_length=1, max_length=200)]
@@ -36,7 +36,7 @@ class ReadBack(OfHandover):
     is_read: Annotated[bool, doc("false: taken back")] = True
 
 
-class AcceptControl(OfHandover):
+class AcceptControl(OfHandover, Prompt):
     """Takes control over. Refused while a line is not confirmed, or where the list is another one by now."""
 
     kind: Literal["accept_control"]

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field
-
-from server.protocol.command_base import Name, Needs, Number, OfCar
+from server.protocol.command_base import Name, Needs, Number, OfCar, Prompt
 from server.protocol.doc import doc
 
 
-class OfSlowing(OfCar):
+class OfSlowing(OfCar, Prompt):
     """Part of a slow-down."""
 
 
@@ -33,23 +31,14 @@ class Disarm(OfSlowing):
 
 
 class Decelerate(OfSlowing):
-    """Slows the car, once armed; refused where it took longer than 300 ms on its way."""
+    """Slows the car, once armed."""
 
     needs: ClassVar[Needs] = "operator"
     http: ClassVar[str] = "Slow the car, and hold it until it is released; no emergency stop"
     path: ClassVar[str] = "/api/slow-down/order"
     has_body: ClassVar[bool] = False
+    acts_within_s: ClassVar[float] = 0.3
     kind: Literal["slow_down"]
-    pressed_ago_s: Annotated[
-        float, Field(ge=0, le=86_400, allow_inf_nan=False, description="since the finger let go, when it was sent")
-    ] = 0.0
-    heard_ms: Annotated[float, Field(ge=0, le=2**53, allow_inf_nan=False)] | None = None
-    held_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)] = 0.0
-
-    def late_s(self, wall_ms: float) -> float:
-        """How long ago it was pressed, at least: half of the way there and back belongs to this direction."""
-        way_s = 0.0 if self.heard_ms is None else max(0.0, (wall_ms - self.heard_ms) / 1000 - self.held_s)
-        return self.pressed_ago_s + way_s / 2
 
 
 class Release(OfSlowing):

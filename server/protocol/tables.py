@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, get_args
 
 from monitor.signals import SIGNALS
+from server.protocol.command_base import OF_PAGE, Prompt
 from server.protocol.commands import BY_KIND
 from server.protocol.replay_commands import ReplayOrder
 from server.protocol.shapes import command_name, definitions
@@ -62,15 +63,16 @@ def _signals(_: list[str]) -> Iterator[str]:
 
 
 def _commands(_: list[str]) -> Iterator[str]:
-    """What may be ordered, by whom, and where over HTTP."""
+    """What may be ordered, by whom, where over HTTP, and how long it may have been on its way."""
     yield ""
-    yield "| kind | fields | who may | over HTTP | |"
-    yield "|---|---|---|---|---|"
+    yield "| kind | fields | who may | over HTTP | in time | |"
+    yield "|---|---|---|---|---|---|"
     for kind, command in BY_KIND.items():
         schema = definitions()[command_name(command)]
         who = "who is in control" if command.needs == "control" else "any operator"
         http = f"`POST {command.path or f'/api/{kind}'}`" if command.http else ""
-        yield f"| {kind} | {_fields(schema)} | {who} | {http} | {_line(schema['description'])} |"
+        in_s = f"{command.acts_within_s:g} s" if issubclass(command, Prompt) else ""
+        yield f"| {kind} | {_fields(schema)} | {who} | {http} | {in_s} | {_line(schema['description'])} |"
 
 
 def _replay(_: list[str]) -> Iterator[str]:
@@ -84,10 +86,10 @@ def _replay(_: list[str]) -> Iterator[str]:
 
 
 def _fields(schema: Mapping[str, Any]) -> str:
-    """The fields of an order, those that every order has left out."""
+    """The fields of an order, but for those of every order and of every one that must come in time."""
     fields = []
     for name, of in schema["properties"].items():
-        if name in ("id", "kind", "do") and not (name == "do" and "enum" in of):
+        if name in (*OF_PAGE, "id", "kind", "do") and not (name == "do" and "enum" in of):
             continue
         most = f" ≤ {of['maximum']:g}" if of.get("maximum", math.inf) < 1000 else ""
         left_out = "" if name in schema.get("required", ()) else ", may be left out"

@@ -22,7 +22,7 @@ from server.slowdown.frame import facts, slow_down_frame
 from server.slowdown.guard_client import GuardClient
 from server.slowdown.measured_car import MeasuredCar
 from server.slowdown.note import never_raising, recording_safely
-from server.slowdown.order import BY_HAND, DESERTED_S, LATE_S, SlowDown
+from server.slowdown.order import BY_HAND, DESERTED_S, SlowDown
 from server.slowdown.order_log import OrderLog, commanded
 from server.slowdown.response import Response
 from server.slowdown.sender import Sender
@@ -223,8 +223,6 @@ class SlowDownController:
         now_s = self._now()
         late_s = command.late_s(self._wall_ms())
         try:
-            if late_s > LATE_S:
-                raise Refused(f"This was pressed {late_s:.1f} s ago: press again if still needed.")
             if self._life.order is None and not self.sender.is_linked:
                 raise Refused("Not ordered: there is no link to the car. Use the physical stop.")
             self._begin(by, BY_HAND, now_s, pressed_s=now_s - late_s)

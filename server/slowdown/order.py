@@ -14,7 +14,6 @@ from server.protocol.slow_down_state import SlowDownPhase
 from server.slowdown.command_target import CommandTarget
 from server.slowdown.ramp import Ramp
 
-LATE_S = 0.3  # what was pressed longer ago is not obeyed any more
 DESERTED_S = 10.0  # after the last operator's page has gone, slow-down is not armed any more
 BY_HAND = "by hand"
 Ended = Literal["released", "longest", "disconnected"]

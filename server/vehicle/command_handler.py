@@ -23,7 +23,7 @@ from server.protocol import (
     serialize,
     slowing_commands,
 )
-from server.protocol.command_base import OfCar
+from server.protocol.command_base import OfCar, Prompt
 from server.protocol.messages import Answer
 from server.protocol.state import LiveState
 from server.rosbridge.address import BadAddress
@@ -89,7 +89,7 @@ class CommandHandler:
                 return self._present(command, caller)
             if isinstance(command, commands.AskOutcome):
                 return self._outcomes.ask(caller.page, command.of, command.ago_s, self._now())
-            self._check_car(command, by)
+            self._check_meant(command, by)
             parts.authorization.admit(command, caller, self._now())
             was = await self._apply(command, caller)
         except NotReadBack as why:
@@ -113,15 +113,23 @@ class CommandHandler:
             answer["fence"] = fence
         return answer
 
-    def _check_car(self, command: commands.LoggedCommand, by: str) -> None:
-        """A command that acts on a car must be for this one. Raises Refused; a slow-down that is refused is logged."""
-        meant = command.vehicle if isinstance(command, OfCar) else None
-        if meant is None or meant == self._vehicle:
+    def _check_meant(self, command: commands.LoggedCommand, by: str) -> None:
+        """It must be for this car and for now. Raises Refused; a slow-down that is refused is logged."""
+        why = self._of_other_car(command)
+        if why is None and isinstance(command, Prompt):
+            why = command.too_late(self._wall_ms())
+        if why is None:
             return
-        why = OTHER_CAR.format(meant=display_name.clean(meant), this=self._vehicle)
         if isinstance(command, slowing_commands.Decelerate):
             self._parts.event_log.note("slow_down", f"Slow-down refused: {why}", by=by, step="refused")
         raise Refused(why)
+
+    def _of_other_car(self, command: commands.LoggedCommand) -> str | None:
+        """Why a command that acts on a car is not for this one; None: it is."""
+        meant = command.vehicle if isinstance(command, OfCar) else None
+        if meant is None or meant == self._vehicle:
+            return None
+        return OTHER_CAR.format(meant=display_name.clean(meant), this=self._vehicle)
 
     def _query(self, message: Mapping[str, Any]) -> Mapping[str, Any] | None:
         """The answer to a query; None: it is a command."""

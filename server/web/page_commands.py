@@ -32,7 +32,7 @@ async def passed_on(
     """The answer of the vehicle's session to a command of a page, under the command's id in all logs."""
     with log_context.tracing(message.get("id")):
         try:
-            answer = await bus.request(vehicle, message)
+            answer = await bus.request(vehicle, message, comes_within_s=commands.comes_within_s(message))
         except NotServed as why:
             answer = messages.not_served(why, bus.trouble(vehicle) if fleet else None)
         if bus.grows:  # else the session has logged it
@@ -53,6 +53,7 @@ class PageCommands:
         limits: Limits,
         *,
         now: Callable[[], float],
+        wall_ms: Callable[[], int],
         send: Callable[[messages.ToPage], None],
         complain: Callable[[str], None],
         people: People = NOBODY,
@@ -62,6 +63,7 @@ class PageCommands:
         self._view = view
         self._sender = PageSender(principal, people, signs=bus.grows)
         self._now = now
+        self._wall_ms = wall_ms
         self._send = send
         self._complain = complain
         self._orders = Allowance(limits.commands, now())
@@ -89,6 +91,8 @@ class PageCommands:
             return
         kind = message.get("kind")
         reason = self._refusal(kind)
+        if reason is None and self._bus.grows and "signed" not in message:  # else the session looks at it
+            reason = commands.too_late(message, self._wall_ms())
         if reason is not None:
             self._send(messages.refusal(id, reason))
             return

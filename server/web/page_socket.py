@@ -72,6 +72,7 @@ class Page:
             principal,
             limits,
             now=now,
+            wall_ms=wall_ms,
             send=self._writer.queue,
             complain=self._inbox.complain,
             people=people,

@@ -43,6 +43,10 @@ class Link(Protocol):
     def complaint(self) -> str | None:
         """Why there is none, as a sentence; None: there is one."""
 
+    @property
+    def refused(self) -> str | None:
+        """What it does not allow, as a sentence; None: nothing."""
+
     def start(self) -> None:
         """Begin to connect, in the background."""
 
@@ -140,8 +144,8 @@ class Services:
     def problems(self) -> list[str]:
         """What is wrong with the server, a sentence each; those of a vehicle begin with its name."""
         found = [f"{name}: {what}" for name, session in self.sessions.items() for what in problems(session.vitals())]
-        if self.link is not None and (complaint := self.link.complaint) is not None:
-            found.append(complaint)
+        if self.link is not None:
+            found += [one for one in (self.link.complaint, self.link.refused) if one is not None]
         if self.people.complaint is not None:
             found.append(self.people.complaint)
         if self.recordings is not None:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body, Path, Request
 from pydantic import BaseModel, ConfigDict, create_model
 
-from server.protocol.command_base import OfCar
+from server.protocol.command_base import OF_PAGE, OfCar
 from server.protocol.commands import BY_KIND, SLOW_DOWN, Command
 from server.web.routes.session_request import OF_VEHICLE, Done, MeantVehicle, VehicleName, ask, meant_vehicle
 
@@ -24,7 +24,7 @@ def body_of(command: type[Command], without: tuple[str, ...] = (), *, is_strict:
     fields: dict[str, Any] = {
         name: (field.annotation, field)
         for name, field in command.model_fields.items()
-        if name not in ("kind", "id", *without)
+        if name not in ("kind", "id", *without) and name not in OF_PAGE
     }
     config = ConfigDict(extra="forbid", strict=is_strict)
     return create_model(f"{command.__name__}Request", __config__=config, **fields)

@@ -16,7 +16,7 @@ from server.access.identity import principal_of
 from server.access.people import device_key
 from server.bus.bus import NotServed
 from server.control import display_name
-from server.protocol import messages
+from server.protocol import commands, messages
 from server.protocol.command_base import PAGE
 from server.replay.manager import NoReplay
 from server.system import log_context
@@ -77,7 +77,7 @@ async def ask(request: Request, vehicle: str | None, message: dict[str, Any]) ->
     is_order = request.method not in ("GET", "HEAD")
     try:
         with log_context.tracing(request.headers.get(TRACE_HEADER)):
-            answer = await app.bus.request(vehicle_of(app, vehicle), sent)
+            answer = await app.bus.request(vehicle_of(app, vehicle), sent, comes_within_s=commands.comes_within_s(sent))
             if is_order and app.bus.grows:  # else the session has logged it
                 log.info("command_passed_on kind=%s by=%s ok=%s", message.get("kind"), by, answer.get("ok", True))
     except NotServed as why:

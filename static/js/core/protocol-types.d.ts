@@ -9,6 +9,10 @@ export interface AccelerationValue {
 /** Takes control over. Refused while a line is not confirmed, or where the list is another one by now. */
 export interface AcceptControlCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   /** the car that the page named to its operator; refused by any other */
   vehicle?: string | null;
   kind: "accept_control";
@@ -54,6 +58,10 @@ export type Answers = SettingsAnswer | SignalsAnswer | CheckAnswer | TrackPoints
 /** Slow-down may be ordered from now on. */
 export interface ArmCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   /** the car that the page named to its operator; refused by any other */
   vehicle?: string | null;
   kind: "arm";
@@ -282,6 +290,10 @@ export interface ComponentState {
 /** Dials a car; it is tried until disconnected. */
 export interface ConnectCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   kind: "connect";
   /** host, host:port, ws:// or wss://; empty: the car that was configured */
   address?: string;
@@ -373,16 +385,16 @@ export interface CoursePoints {
   lon: Array<number | null>;
 }
 
-/** Slows the car, once armed; refused where it took longer than 300 ms on its way. */
+/** Slows the car, once armed. */
 export interface DecelerateCommand {
   id?: string | null;
-  /** the car that the page named to its operator; refused by any other */
-  vehicle?: string | null;
-  kind: "slow_down";
   /** since the finger let go, when it was sent */
   pressed_ago_s?: number;
   heard_ms?: number | null;
   held_s?: number;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "slow_down";
 }
 
 /** `GET /api/departure`. */
@@ -536,6 +548,10 @@ export interface DiagnosticsValue {
 /** Slow-down may not be ordered any more. */
 export interface DisarmCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   /** the car that the page named to its operator; refused by any other */
   vehicle?: string | null;
   kind: "disarm";
@@ -544,6 +560,10 @@ export interface DisarmCommand {
 /** Ends monitoring: the session is idle. */
 export interface DisconnectCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   kind: "disconnect";
 }
 
@@ -1405,6 +1425,10 @@ export interface PagePresence {
 /** Pauses monitoring: values go on, no alarm comes. */
 export interface PauseCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   kind: "pause";
 }
 
@@ -1850,6 +1874,10 @@ export interface RefusedAddress {
 /** Ends the order, or the guard's hold, of this number: whoever drives may drive on. */
 export interface ReleaseCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   /** the car that the page named to its operator; refused by any other */
   vehicle?: string | null;
   kind: "release";
@@ -2165,6 +2193,10 @@ export interface SettingsAnswer {
 /** Hides an alarm for a time. */
 export interface ShelveCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   kind: "shelve";
   alarm: string;
   occurrence: number;
@@ -2255,6 +2287,10 @@ export interface SignalsAnswer {
 /** No sound of this occurrence for 30 s; it still waits for its acknowledgement. */
 export interface SilenceCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   kind: "silence";
   alarm: string;
   /** which occurrence is silenced; an older one is refused */
@@ -2493,6 +2529,10 @@ export interface Take {
 /** Takes, gives or requests control; server/control/lease.py says who may do what. */
 export interface TakeControlCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   kind: "control";
   do: "take" | "take_over" | "release" | "request" | "withdraw" | "hand_over" | "keep";
   /** of hand_over: the page that gets it; of keep: whose request is refused */
@@ -2681,6 +2721,10 @@ export interface VerificationBreak {
 /** Stops a count-down: the car is not slowed by itself this time. */
 export interface VetoCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   /** the car that the page named to its operator; refused by any other */
   vehicle?: string | null;
   kind: "veto";

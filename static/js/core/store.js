@@ -191,7 +191,7 @@ export class Store extends Known {
    */
   ask(kind, fields, within_ms) {
     const { fence } = this;
-    return this.#requests.ask(kind, /** @type {any} */ ({ ...fields, ...(fence === null ? {} : { fence }) }), within_ms);
+    return this.#requests.ask(kind, /** @type {any} */ ({ ...momentOf(kind, this), ...fields, ...(fence === null ? {} : { fence }) }), within_ms);
   }
 
   /** @param {string} text @param {number} [at_ms] when it came */
@@ -283,4 +283,9 @@ export class Store extends Known {
 /** Which build this page is of; '' for single modules: the server then uses the present names. */
 function ownBuild() {
   return globalThis.document?.documentElement.dataset['build'] ?? '';
+}
+
+/** By which the server sees how long an order was on its way: the newest state that this page had, and how old it was. @param {string} kind @param {Store} store */
+function momentOf(kind, { frame, lag_s }) {
+  return kind === 'replay' || !frame || frame.replay ? {} : { heard_ms: frame.server.time_ms, held_s: lag_s };
 }

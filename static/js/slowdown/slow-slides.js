@@ -59,14 +59,12 @@ export class SlowSlides {
   /** @param {number} at_ms when the slide was released @param {string} vehicle the car whose name stood on it @param {Explain} explain */
   async #order(at_ms, vehicle, explain) {
     const { store } = this;
-    const { frame } = store;
-    if (!frame) return;
+    if (!store.frame) return;
     const ago_s = (performance.now() - at_ms) / 1000;
     this.#sending_ms = store.now() + ANSWER_MS;
     const asked = store.ask('slow_down', {
       vehicle: vehicle || null,
       pressed_ago_s: ago_s >= 0 && ago_s < 60 ? ago_s : 0, // old browsers count the time of events from another moment
-      heard_ms: frame.server.time_ms, held_s: (store.now() - store.deadMan.heard_ms) / 1000,
     }, ANSWER_MS);
     this.redraw();
     const answer = await asked;

@@ -207,6 +207,47 @@ async def test_a_link_outlives_its_broker(tmp_path: Path) -> None:
                 await until(lambda: node.trouble("ocelot"))
 
 
+async def test_what_the_broker_refuses_is_said_while_the_connection_stands(tmp_path: Path) -> None:
+    """An agent with the key of another car: it is connected, and its own car is never heard."""
+    async with fleet(tmp_path) as (broker, seeds), local_buses() as both:
+        agent = NatsAgent(both.session, run="run-1", now=both.clock)  # of ocelot and margay
+        async with linked(agent, broker, key_file(tmp_path, "ocelot", seeds["ocelot"])) as link:
+            await until(lambda: "veh.margay.here" in (link.refused or ""))
+            assert link.refused is not None
+            assert link.refused.startswith(f"The broker {broker.address} refuses a part of what this program needs: ")
+            assert "veh.margay.ask" in link.refused
+            assert "veh.ocelot" not in link.refused
+            assert link.complaint is None
+            broker_users.write(tmp_path, [])
+            broker.reload()
+            await until(lambda: link.complaint)
+            assert link.refused is None, "by a connection that is gone"
+
+
+async def test_a_car_that_a_wildcard_silently_leaves_out_is_shown_as_missing(tmp_path: Path) -> None:
+    """A node may hear all cars but one: its subscription is accepted, and nothing ever says that one is left out."""
+    async with fleet(tmp_path) as (broker, seeds), local_buses() as both:
+        conf = tmp_path / broker_users.CONF
+        allowed = '["veh.*.events","veh.*.here","_INBOX.>"]'
+        assert allowed in conf.read_text()
+        denied = f'{{"allow": {allowed}, "deny": ["veh.margay.>"]}}'
+        conf.write_text(conf.read_text().replace(allowed, denied))
+        broker.reload()
+        node = NatsBus(now=both.clock, expected=("ocelot", "margay"))
+        node.watch("margay", lambda _: None)
+        room = key_file(tmp_path, "room", seeds["room"])
+        async with linked(node, broker, room) as link, contextlib.AsyncExitStack() as agents:
+            for name in ("ocelot", "margay"):  # each offers both, and has the right to one
+                agent = NatsAgent(both.session, run="run-1", now=both.clock)
+                await agents.enter_async_context(linked(agent, broker, key_file(tmp_path, name, seeds[name])))
+            await until(lambda: node.knows("ocelot") and node.trouble("ocelot") is None)
+            both.clock.ahead_s += 10.0
+            await until(lambda: node.trouble("ocelot") is None)
+            assert node.trouble("margay") == "The agent of margay has sent nothing since the server started."
+            assert set(node.vehicles) == {"ocelot", "margay"}
+            assert (link.complaint, link.refused) == (None, None), "the broker says nothing of it"
+
+
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # as above
 async def test_over_tls_the_broker_proves_who_it_is(tmp_path: Path) -> None:
     authority_pem, server_pem = certificates(tmp_path)

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from tests.page.radio import Radio
 from tests.server.slowdown.conftest import Field, field
 from tests.server.viewer import Viewer, viewer
 
@@ -28,16 +29,21 @@ class Phone:
         """The answer to a command."""
         return await self._page.ask(kind=kind, **fields)
 
-    async def slow(self, **late: float) -> dict[str, Any]:
-        """Slow down, with what proves that it is new."""
+    async def press(self, kind: str, **fields: Any) -> dict[str, Any]:
+        """The answer to a command that says when it was pressed."""
         newest = self._page.states[-1]["server"]["time_ms"]
         held_s = time.time() - self._page.got_s[-1]
-        return await self.order("slow_down", **{"pressed_ago_s": 0.01, "heard_ms": newest, "held_s": held_s} | late)
+        return await self.order(kind, **{"pressed_ago_s": 0.01, "heard_ms": newest, "held_s": held_s} | fields)
+
+    async def slow(self, **late: float) -> dict[str, Any]:
+        """Slow down, with what proves that it is new."""
+        return await self.press("slow_down", **late)
 
 
 @contextlib.asynccontextmanager
-async def phone(car: Field, name: str) -> AsyncIterator[Phone]:
-    async with viewer(str(car.client.base_url).rstrip("/")) as page:
+async def phone(car: Field, name: str, at: str | None = None) -> AsyncIterator[Phone]:
+    """`at`: where the server is heard; None: its own address."""
+    async with viewer(at or str(car.client.base_url).rstrip("/")) as page:
         await page.send({"kind": "hello", "name": name, "page": f"page-of-{name.lower()}", "have_event": 0})
         await page.send(SEEN)
         await page.state()
@@ -90,6 +96,30 @@ async def test_what_was_pressed_too_long_ago_is_refused(late: dict[str, float], 
             assert "pressed" in answer["reason"]
             assert await car.steps() == ["refused"]
             assert car.speeds == []
+
+
+async def test_orders_that_hung_in_the_radio_are_refused_and_their_sender_is_told() -> None:
+    """Each of the five, held from just above what it may take to 10 s."""
+    number = 999
+    orders: dict[str, dict[str, Any]] = {
+        "slow_down": {}, "release": {"number": number}, "veto": {"trigger": "link"}, "arm": {}, "disarm": {},
+    }  # fmt: skip
+    async with field() as car:
+        radio = Radio(car.client.base_url.port or 0)
+        async with radio.on_air() as at, phone(car, "Ann", at) as ann:
+            await car.armed(1.0)
+            assert (await ann.press("control", do="take_over"))["ok"]
+            for hold_s in (0.51, 1.0, 4.0, 9.9):
+                radio.cut()
+                under_way = [asyncio.create_task(ann.press(kind, **more)) for kind, more in orders.items()]
+                await asyncio.sleep(hold_s)
+                radio.mend()
+                for answer in await asyncio.gather(*under_way):
+                    assert "ago: press again if still needed" in answer["reason"], answer
+                assert (await car.slow())["state"] == "armed"
+            assert set(await car.steps()) == {"refused"}
+            assert car.speeds == []
+            assert (await ann.slow())["ok"]
 
 
 async def test_an_order_outlives_the_phone_that_gave_it() -> None:

@@ -12,7 +12,8 @@ from server.app.app import create_app
 from server.app.config import Config
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
-from server.protocol.commands import BY_KIND
+from server.protocol.command_base import OF_PAGE
+from server.protocol.commands import BY_KIND, COMES_WITHIN_S
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
 
@@ -70,6 +71,39 @@ def test_a_command_is_served_over_http_where_it_says_so() -> None:
     assert len(set(served.values())) == len(served) >= 11
     for kind, path in served.items():
         request = paths[path]["post"]
-        named = {name for name in BY_KIND[kind].model_fields if name not in ("kind", "id", "vehicle")}  # in the query
+        named = set(BY_KIND[kind].model_fields) - OF_PAGE - {"kind", "id", "vehicle"}  # the car is in the query
         in_path = {one["name"] for one in request.get("parameters", ()) if one["in"] == "path"}
-        assert ("requestBody" in request) is (bool(named - in_path) and kind != "slow_down"), kind
+        assert ("requestBody" in request) is bool(named - in_path), kind
+
+
+# What would slow or release the car, hide alarms, or move control, long after somebody pressed it.
+OF_MOMENT = {
+    "connect", "disconnect", "pause", "silence", "shelve", "control", "accept_control", "arm", "disarm", "slow_down",
+    "release", "veto",
+}  # fmt: skip
+
+
+def test_what_is_for_the_moment_has_a_time() -> None:
+    assert set(COMES_WITHIN_S) == OF_MOMENT
+    assert {kind for kind, within_s in COMES_WITHIN_S.items() if within_s != 0.5} == {"slow_down"}
+
+
+@pytest.mark.parametrize("kind", sorted(OF_MOMENT))
+async def test_what_was_long_on_its_way_is_refused_and_the_same_pressed_now_is_not(bus: LocalBus, kind: str) -> None:
+    within_s, wall_ms = COMES_WITHIN_S[kind], time.time_ns() // 1_000_000
+    for way_s in (within_s + 0.1, 20.0):
+        late = {"heard_ms": wall_ms - 1000 * (way_s + 3600), "held_s": 3600.0}
+        answer = await bus.request("car", example(kind) | late | PHONE_A)
+        assert "ago: press again if still needed" in answer["reason"], answer
+    answer = await bus.request("car", example(kind) | {"pressed_ago_s": within_s + 0.1} | PHONE_A)
+    assert "ago: press again if still needed" in answer["reason"], answer
+    now = {"heard_ms": float(time.time_ns() // 1_000_000), "held_s": 0.0}
+    answer = await bus.request("car", example(kind) | now | PHONE_A)
+    assert "press again" not in answer.get("reason", "")
+
+
+async def test_what_is_not_for_the_moment_may_come_late(bus: LocalBus) -> None:
+    """A position, a mark or an acknowledgement says itself what it is of."""
+    late = {"heard_ms": 1.7e12, "held_s": 0.0, "pressed_ago_s": 20.0}
+    answer = await bus.request("car", {"kind": "record", "on": True, **late, **PHONE_A})
+    assert "press again" not in answer.get("reason", "")

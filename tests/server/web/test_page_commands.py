@@ -34,7 +34,9 @@ async def test_another_car_that_is_lost_does_not_hold_up_the_page() -> None:
     bus.serve("ocelot", own)
     bus.serve("serval", lost)
     view = cast(ViewSource, SimpleNamespace(is_replaying=False))
-    page = PageCommands(bus, "ocelot", view, LOCAL, Limits(), now=lambda: 0.0, send=lambda _: None, complain=print)
+    page = PageCommands(
+        bus, "ocelot", view, LOCAL, Limits(), now=lambda: 0.0, wall_ms=lambda: 0, send=lambda _: None, complain=print
+    )
     async with asyncio.timeout(0.5):
         for _ in range(3):
             await page.present(
@@ -56,7 +58,15 @@ async def test_other_cars_are_announced_while_the_own_one_is_not_served() -> Non
     complaints: list[str] = []
     view = cast(ViewSource, SimpleNamespace(is_replaying=False))
     page = PageCommands(
-        bus, "ocelot", view, LOCAL, Limits(), now=lambda: 0.0, send=lambda _: None, complain=complaints.append
+        bus,
+        "ocelot",
+        view,
+        LOCAL,
+        Limits(),
+        now=lambda: 0.0,
+        wall_ms=lambda: 0,
+        send=lambda _: None,
+        complain=complaints.append,
     )
     await page.present(
         {"kind": "present", "visible": True, "sound": "ready", "awake": "ready", "announces": ["serval"]}
