@@ -56,8 +56,10 @@ def _after(alarm: Alarm, transition: Transition) -> Alarm:
         case "cleared":
             acknowledged = alarm.acknowledged or not alarm.spec.needs_ack
             return replace(alarm, active=False, acknowledged=acknowledged, cleared_s=transition.at_s)
-        case "acknowledged":
+        case "acknowledged" | "handed_over":
             return replace(alarm, acknowledged=True, acknowledged_by=transition.by)
+        case "unacknowledged":
+            return _announced(alarm, transition)
         case "shelved":
             return replace(alarm, shelved_by=transition.by)
         case "unshelved" if alarm.active:  # its end announces the alarm again
