@@ -34,9 +34,7 @@ def hand_over(alarm: Alarm, by: str, now_s: float, *, is_read_back: bool) -> tup
     if is_read_back:
         after = replace(alarm, acknowledged_by=by)
         return after, (_transition(after, "handed_over", by, now_s),)
-    after = replace(
-        alarm, occurrence=alarm.occurrence + 1, acknowledged=False, acknowledged_by=None, announced_s=now_s
-    )
+    after = replace(alarm, occurrence=alarm.occurrence + 1, acknowledged=False, acknowledged_by=None, announced_s=now_s)
     is_announced = after.state is AlarmState.UNACKED
     return after, (_transition(after, "unacknowledged", by, now_s, announces=is_announced),)
 

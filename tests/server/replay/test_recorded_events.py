@@ -142,6 +142,27 @@ def test_a_pause_then_is_a_pause_there(tmp_path: Path) -> None:
     playback.close()
 
 
+@pytest.mark.parametrize(
+    ("change", "more"),
+    [
+        ("acknowledged", {"state": "ACKED", "by": "Ann"}),
+        ("handed_over", {"state": "ACKED", "by": "Ann"}),
+        ("cleared", {"state": "RTN_UNACKED"}),
+        ("silenced", {"state": "UNACKED", "by": "Ann"}),
+        ("unacknowledged", {"state": "UNACKED", "by": "Ann"}),
+    ],
+)
+def test_an_alarm_that_stood_before_the_part_stands_in_it_as_its_newest_event_says(
+    change: str, more: dict[str, Any], tmp_path: Path
+) -> None:
+    before = event(-4.0, change, alarm="gps_drift", title="GPS drift", priority="warning", **more)
+    playback = opened(record(tmp_path / "a.mcap", [], standing=json.dumps([before])))
+    (found,) = (one for one in at(playback, 1.0)["alarms"] if one["id"] == "gps_drift")
+    assert found["state"] == more["state"]
+    assert found["acknowledged_by"] == ("Ann" if more["state"] == "ACKED" else None)
+    playback.close()
+
+
 def test_a_planned_stop_then_is_one_there(tmp_path: Path) -> None:
     rows = [
         (5.0, "alarms", event(5.0, "raised", alarm="gps_drift", title="GPS drift", priority="warning", sound="low")),

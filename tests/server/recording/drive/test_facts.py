@@ -275,3 +275,13 @@ def test_planned_stops_and_the_alarms_in_them(tmp_path: Path) -> None:
     ]
     assert (log.planned_stops[1].ended, log.planned_stops[1].ended_by) == ("The planned stop ended: the car moves.", "")
     assert [(one.alarm, one.planned_stop) for one in log.alarms] == [("gps_drift", True), ("speed_limit", False)]
+
+
+def test_a_planned_stop_is_kept_in_what_is_known_before_the_recording(tmp_path: Path) -> None:
+    entries = EarlyEntries()
+    _, _, began = logged(-30.0, "planned_stop", reason="parked", by="A. K. (Pixel)")
+    entries.note("alarms", began)
+    (stop,) = log_of(recorded(tmp_path, [], standing=entries.standing()["standing"])).planned_stops
+    assert (stop.reason, stop.by, stop.from_ms, stop.to_ms) == ("parked", "A. K. (Pixel)", BEGIN_MS - 30_000, None)
+    entries.note("alarms", logged(-20.0, "planned_stop_ended", reason="parked")[2])
+    assert json.loads(entries.standing()["standing"]) == []
