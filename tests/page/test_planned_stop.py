@@ -26,7 +26,7 @@ async def test_it_is_begun_from_the_menu_with_a_reason(phone: Phone, canned: Can
     await phone.f("menu").tap()
     await phone.page.locator("#sheet-menu [data-f=planned-stop]").tap()
     sheet = phone.page.locator("#sheet-planned-stop")
-    await expect(sheet).to_contain_text("Critical alarms sound; others make no sound.")
+    await expect(sheet).to_contain_text("Only critical ones and those of catgraph itself sound.")
     await expect(sheet.locator("[data-reason]")).to_have_text(
         ["Parked", "In the workshop", "Charging or refuelling", "Being set up"]
     )
@@ -53,7 +53,7 @@ async def test_every_tab_says_it_and_one_key_ends_it(phone: Phone, canned: Canne
 async def test_a_speed_that_is_not_known_is_said(phone: Phone, canned: Canned) -> None:
     canned.state["session"]["planned_stop"] = stop(is_speed_known=False)
     await opened(phone, canned)
-    await expect(phone.page.locator(LINE)).to_contain_text("Speed not known: it does not end by itself until it is.")
+    await expect(phone.page.locator(LINE)).to_contain_text("Speed not known: ends by hand only.")
 
 
 async def test_alarms_are_shown_with_the_mark_and_a_critical_one_still_asks(phone: Phone, canned: Canned) -> None:

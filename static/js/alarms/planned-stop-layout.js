@@ -11,7 +11,7 @@ import { timeOfDay } from '../core/format.js';
 export const REASONS = /** @type {Record<Reason, string>} */ ({
   parked: 'Parked', workshop: 'In the workshop', charging: 'Charging or refuelling', set_up: 'Being set up',
 });
-const MEANING = 'Its alarms are shown, judged and recorded as ever, and marked. Critical alarms sound; others make no sound.';
+const MEANING = 'Its alarms are marked, and recorded as ever. Only critical ones and those of catgraph itself sound.';
 const ENDS = 'It ends by itself when the car moves.';
 const NOT_KNOWN = 'Speed not known: it does not end by itself until it is.';
 
@@ -22,7 +22,7 @@ export function titleOf(reason) {
 
 /** The line under the strip: since when, by whom, and that the speed is not known. @param {PlannedStop} stop */
 export function lineWords({ since_ms, by, is_speed_known }) {
-  return [`since ${timeOfDay(since_ms)}${by ? ` by ${by}` : ''}`, is_speed_known ? '' : NOT_KNOWN].filter(Boolean).join('. ');
+  return [`since ${timeOfDay(since_ms)}${by ? ` by ${by}` : ''}`, is_speed_known ? '' : 'Speed not known: ends by hand only.'].filter(Boolean).join('. ');
 }
 
 /** What the sheet says. @param {PlannedStop | null} stop */

@@ -67,7 +67,8 @@ def test_an_item_that_turns_is_no_other_line_and_a_signature_is() -> None:
 def standing(name: str, **more: Any) -> StandingAlarm:
     found: Any = {
         "id": name, "occurrence": 1, "title": f"Alarm {name}", "ended_title": f"{name} is over",
-        "priority": "warning", "state": "UNACKED", "active": True, "raised_ms": 5, "text": "0.4 m", "trip_text": "0.5 m",
+        "priority": "warning", "state": "UNACKED", "active": True, "raised_ms": 5, "text": "0.4 m",
+        "trip_text": "0.5 m",
         "acknowledged_by": None, "shelved_until_ms": None, "shelved_by": None, **more,
     }  # fmt: skip
     return found  # type: ignore[no-any-return]
