@@ -21,6 +21,8 @@ Change = Literal[
     "unsilenced",
     "suppressed",
     "unsuppressed",
+    "handed_over",
+    "unacknowledged",
 ]
 
 

@@ -1,4 +1,4 @@
-"""What the operator does about an alarm: acknowledge it, silence it or shelve it for a while, take it off the shelf."""
+"""What the operator does about an alarm: acknowledge, silence or shelve it, take it off the shelf, take it over."""
 
 from __future__ import annotations
 
@@ -24,6 +24,19 @@ def acknowledge(alarm: Alarm, occurrence: int, by: str, now_s: float) -> tuple[A
         after = replace(after, active=False, latched=False, held_s=0.0, cleared_s=now_s, causes=())
         transitions.append(_transition(after, "cleared", None, now_s))
     return after, tuple(transitions)
+
+
+def hand_over(alarm: Alarm, by: str, now_s: float, *, is_read_back: bool) -> tuple[Alarm, tuple[Transition, ...]]:
+    """Control went to `by` with read-back. Of a standing alarm that somebody else has acknowledged they are the owner
+    now, if they have read it back; else it is announced again, because nobody on duty has seen it."""
+    if not (alarm.active and alarm.acknowledged) or alarm.acknowledged_by == by:
+        return alarm, ()
+    if is_read_back:
+        after = replace(alarm, acknowledged_by=by)
+        return after, (_transition(after, "handed_over", by, now_s),)
+    after = replace(alarm, occurrence=alarm.occurrence + 1, acknowledged=False, acknowledged_by=None, announced_s=now_s)
+    is_announced = after.state is AlarmState.UNACKED
+    return after, (_transition(after, "unacknowledged", by, now_s, announces=is_announced),)
 
 
 def silence(alarm: Alarm, occurrence: int, by: str, now_s: float) -> tuple[Alarm, tuple[Transition, ...]]:

@@ -7,6 +7,11 @@ from dataclasses import replace
 
 from monitor.alarm import Alarm, AlarmState, Cause, Transition
 
+_FLAGS = {  # state → active, acknowledged; a log that begins in the middle of an alarm's life has no more
+    AlarmState.UNACKED: (True, False),
+    AlarmState.ACKED: (True, True),
+    AlarmState.RTN_UNACKED: (False, False),
+}
 MOST = 400  # alarms: a log of our making names fewer
 
 
@@ -45,6 +50,10 @@ def _after(alarm: Alarm, transition: Transition) -> Alarm:
         shelved_by=alarm.shelved_by if transition.shelved_until_s is not None else None,
         causes=tuple(Cause(name=name) for name in transition.causes),
     )
+    if transition.state in _FLAGS:
+        active, acknowledged = _FLAGS[transition.state]
+        raised_s = transition.at_s if active and alarm.raised_s is None else alarm.raised_s
+        alarm = replace(alarm, active=active, acknowledged=acknowledged, raised_s=raised_s)
     match transition.change:
         case "raised":
             alarm = replace(alarm, active=True, raised_s=transition.at_s, worst=transition.finding)
@@ -56,8 +65,10 @@ def _after(alarm: Alarm, transition: Transition) -> Alarm:
         case "cleared":
             acknowledged = alarm.acknowledged or not alarm.spec.needs_ack
             return replace(alarm, active=False, acknowledged=acknowledged, cleared_s=transition.at_s)
-        case "acknowledged":
+        case "acknowledged" | "handed_over":
             return replace(alarm, acknowledged=True, acknowledged_by=transition.by)
+        case "unacknowledged":
+            return _announced(alarm, transition)
         case "shelved":
             return replace(alarm, shelved_by=transition.by)
         case "unshelved" if alarm.active:  # its end announces the alarm again

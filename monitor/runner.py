@@ -14,6 +14,7 @@ from monitor.catalog import CHECKS, AllLimits, AnyCheck, compose
 from monitor.check import Finding, Scope, Verdict, unknown
 from monitor.check_runner import CheckRow, CheckRunner, Crash, blind_to_the_car
 from monitor.inhibition import table_of
+from monitor.planned_stop import silent_checks
 from monitor.restoring import numbered_on, restore
 from monitor.snapshot import Snapshot
 from monitor.tiles import Tile, places, tiles
@@ -57,6 +58,7 @@ class Monitor:
             raise ValueError("two checks have one id")
         self.alarms[IMPAIRED] = Alarm(id=IMPAIRED, spec=IMPAIRED_SPEC)
         self._declared = declared
+        self.silent_at_stop = silent_checks(declared)  # ids of alarms that make no sound in a planned stop
         self._places = places(declared)
         self._causes = table_of(self.alarms.values())
         by_id = {check.id: check for check in declared}
@@ -162,6 +164,14 @@ class Monitor:
 
     def unshelve(self, alarm_id: str, by: str, now_s: float) -> tuple[Transition, ...]:
         return self._respond(alarm_id, lambda alarm: response.unshelve(alarm, by, now_s))
+
+    def hand_over(self, is_read_back: Callable[[Alarm], bool], by: str, now_s: float) -> tuple[Transition, ...]:
+        """Control went to `by`, who has read back some of the alarms."""
+        transitions: list[Transition] = []
+        for name, alarm in self.alarms.items():
+            self.alarms[name], happened = response.hand_over(alarm, by, now_s, is_read_back=is_read_back(alarm))
+            transitions += happened
+        return tuple(transitions)
 
     def _respond(
         self, alarm_id: str, act: Callable[[Alarm], tuple[Alarm, tuple[Transition, ...]]]

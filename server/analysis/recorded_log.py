@@ -17,7 +17,7 @@ from server.recording.read.read import Recording
 from server.recording.standing import read_standing
 
 MOST_ENTRIES = 2000  # of the log on the page; the whole of it is in the recording and in its tables
-_ANNOUNCES = ("raised", "recaused", "unshelved")
+_ANNOUNCES = ("raised", "recaused", "unshelved", "unacknowledged")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -28,10 +28,11 @@ _SHOWN = {  # where an alarm of this priority is shown and how it sounds, if its
 _STATE_AFTER: Mapping[str, AlarmState] = {  # if its event does not say it; of any other change: it waits for a person
     "cleared": AlarmState.NORMAL,
     "acknowledged": AlarmState.ACKED,
+    "handed_over": AlarmState.ACKED,
     "shelved": AlarmState.SHELVED,
     "suppressed": AlarmState.SUPPRESSED,
 }
-_ANNOUNCE = ("raised", "recaused", "unshelved")  # if its event does not say it
+_ANNOUNCE = ("raised", "recaused", "unshelved", "unacknowledged")  # if its event does not say it
 _CHANGE_TO: Mapping[AlarmState, Change] = {  # if its event names a change that this version does not know
     AlarmState.NORMAL: "cleared",
     AlarmState.ACKED: "acknowledged",

@@ -20,7 +20,7 @@ from server.judge import pipeline
 from server.judge.drive import Drive, MessageSource, Row, SettingsEpoch
 from server.judge.pipeline import TICK_S
 from server.judge.reception_stats import Reception
-from server.judge.recorded_events import ChosenPhone, NewSettings, Pause
+from server.judge.recorded_events import ChosenPhone, NewSettings, Pause, StopChange
 from server.judge.recorded_slowdown import SlowDownEvent
 from server.judge.run_state import RunState
 from server.judge.unit_watch import UnitWatch
@@ -274,8 +274,9 @@ class OfflineRun:
                 if self._with_checks and event.by is not None:
                     self._respond(event, now_s)
             case Pause():
-                run_state.paused_s, run_state.paused_by = (now_s, event.by) if event.is_paused else (None, None)
-                run_state.state.set_paused(event.is_paused, run_state.paused_s)
+                run_state.pause(event, now_s)
+            case StopChange():
+                run_state.planned_stop = event.stop
             case SlowDownEvent():
                 run_state.slow_down = run_state.slow_down.after(event, now_s)
             case PhoneReport():
@@ -285,9 +286,8 @@ class OfflineRun:
             case NewSettings():
                 run_state.epoch += 1
                 self._epoch = self.drive.epochs[run_state.epoch]
-                limits = self._epoch.tuning.limits
-                run_state.monitor.limits = limits
-                run_state.state.expect(expected_rates(limits))
+                run_state.monitor.limits = self._epoch.tuning.limits
+                run_state.state.expect(expected_rates(run_state.monitor.limits))
 
     def _respond(self, event: Transition, now_s: float) -> None:
         """What an operator did about an alarm counts where the alarm is raised now as it was then."""

@@ -1,4 +1,5 @@
-"""What a recording of ours holds beside the car's messages: alarms, pauses, settings, phones, slow-downs."""
+"""What a recording of ours holds beside the car's messages: alarms, pauses, planned stops, settings, phones,
+slow-downs."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ from dataclasses import dataclass, field
 
 from monitor.alarm import Transition
 from monitor.phones import PhoneReport
+from monitor.planned_stop import PlannedStop
 from server.judge.recorded_slowdown import SlowDownEvent
 
 
@@ -15,6 +17,13 @@ class Pause:
 
     is_paused: bool
     by: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopChange:
+    """A planned stop began; None: it ended."""
+
+    stop: PlannedStop | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +40,7 @@ class ChosenPhone:
     phone: str | None
 
 
-RecordedEvent = Transition | Pause | NewSettings | PhoneReport | ChosenPhone | SlowDownEvent
+RecordedEvent = Transition | Pause | StopChange | NewSettings | PhoneReport | ChosenPhone | SlowDownEvent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 from monitor.alarm import Alarm
 from monitor.check_minute import CheckMinute
 from monitor.load import RecentLoad
+from monitor.planned_stop import PlannedStop
 from monitor.runner import Monitor
 from monitor.state import State
 from monitor.trends import Trends
 from server.judge.frames import Frames
 from server.judge.reception_stats import Reception
+from server.judge.recorded_events import Pause
 from server.judge.recorded_slowdown import RecordedSlowDown
 from server.judge.stamp_steps import StampSteps
 
@@ -38,6 +40,12 @@ class RunState:
     last_message_s: float | None = None
     paused_s: float | None = None
     paused_by: str | None = None
+    planned_stop: PlannedStop | None = None
     stamps: StampSteps = field(default_factory=StampSteps)
     slow_down: RecordedSlowDown = field(default_factory=RecordedSlowDown)
     frames: Frames | None = None  # where transforms move; None: those of the drive count throughout
+
+    def pause(self, event: Pause, now_s: float) -> None:
+        """Monitoring was paused then, or went on."""
+        self.paused_s, self.paused_by = (now_s, event.by) if event.is_paused else (None, None)
+        self.state.set_paused(event.is_paused, self.paused_s)

@@ -10,6 +10,7 @@ from monitor.alarm import AlarmState
 from monitor.alarm_spec import Action, Place, Priority, Sound
 from monitor.check import Verdict
 from monitor.interventions import By, KindOf
+from monitor.planned_stop import StopReason
 from monitor.values import Mode
 from server.protocol.departure import DepartureResult, RecurringItem
 from server.protocol.doc import doc
@@ -48,7 +49,8 @@ class StandingAlarm(TypedDict):
     ended_title: NotRequired[Annotated[str, doc("its title once it is not active; not from older agents")]]
     priority: Priority
     place: Annotated[Place, doc("where it is shown now")]
-    sound: Sound
+    sound: Annotated[Sound, doc("none: it makes no sound because of a planned stop")]
+    planned_stop: NotRequired[Annotated[bool, doc("the car stands on purpose; not from older agents")]]
     state: AlarmState
     active: bool
     needs_ack: Annotated[bool, doc("it stays until it is acknowledged, although its condition has gone")]
@@ -157,7 +159,8 @@ class EventDetails(TypedDict, total=False):
     changes: Annotated[dict[str, list[Any]], doc("name of a setting → from, to")]
     recording: Annotated[str, doc("the recording that was recovered")]
     phone: Annotated[str | None, doc("the phone that was chosen")]
-    since_ms: Annotated[int, doc("when the pause began")]
+    since_ms: Annotated[int, doc("when the pause or the planned stop began")]
+    reason: Annotated[StopReason, doc("of a planned stop")]
     resumes: Annotated[bool, doc("monitoring goes on after the server was started again: the drive is the same")]
     # Of a mark.
     mark: MarkId
@@ -193,6 +196,7 @@ class NewEvent(NotedEvent):
     causes: NotRequired[list[str]]
     suppressed_by: NotRequired[list[str]]
     shelved_until_ms: NotRequired[int | None]
+    planned_stop: NotRequired[Annotated[StopReason, doc("it happened in a planned stop, for this reason")]]
     measured: NotRequired[Quantity | None]
     limit: NotRequired[Quantity | None]
     worst: NotRequired[Annotated[Worst | None, doc("furthest beyond its limit since it was raised")]]

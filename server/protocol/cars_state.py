@@ -9,6 +9,7 @@ from typing_extensions import TypedDict
 from monitor.alarm import AlarmState
 from monitor.alarm_spec import Priority, Sound
 from monitor.link import Phase
+from monitor.planned_stop import StopReason
 from monitor.recorder import RecorderState
 from server.protocol.doc import doc
 from server.protocol.signal_state import SignalFreshness
@@ -27,7 +28,7 @@ class CarAlarm(TypedDict):
     state: AlarmState
     active: bool
     raised_ms: int
-    sound: Annotated[Sound, doc("none while it is silenced")]
+    sound: Annotated[Sound, doc("none while it is silenced, or makes none because of a planned stop")]
     text: NotRequired[Annotated[str, doc("value against limit, in words")]]
 
 
@@ -124,6 +125,7 @@ class CarSummary(TypedDict):
     requests: NotRequired[Annotated[list[AskedControl], doc("who asks for control, the oldest first, 3 at most")]]
     people: NotRequired[Annotated[list[PagePerson], doc("to whom its item can be handed over, 20 at most")]]
     challenge: NotRequired[Annotated[str, doc("as `challenge` of a state")]]
+    planned_stop: NotRequired[Annotated[StopReason | None, doc("why it stands on purpose; null: no planned stop")]]
 
 
 class OffOnPurpose(TypedDict):

@@ -18,6 +18,7 @@ from server.protocol.handover_commands import HandoverCommand
 from server.protocol.item_commands import ItemCommand
 from server.protocol.mark_commands import MarkCommand
 from server.protocol.mode_commands import DescribeIntervention
+from server.protocol.planned_stop_commands import PlannedStopCommand
 from server.protocol.slowing_commands import SlowingCommand
 
 MAX_COMMAND_BYTES = 16 * 1024
@@ -259,6 +260,7 @@ LoggedCommand = (
     | DepartureCommand
     | SlowingCommand
     | DescribeIntervention
+    | PlannedStopCommand
 )
 Command = LoggedCommand | PresentWord | AskOutcome
 

@@ -11,7 +11,7 @@ from monitor.phones import Why
 from server.protocol.doc import doc
 
 Ready = Literal["ready", "refused", "asks", "missing", "interrupted"]
-LineKind = Literal["alarm", "shelved", "limit", "rides", "driving", "departure", "slow_down", "paused"]
+LineKind = Literal["alarm", "shelved", "limit", "rides", "driving", "departure", "slow_down", "paused", "planned_stop"]
 ReaderEnded = Literal["silent", "blind", "hidden", "undrawn", "sound", "replay"]
 
 

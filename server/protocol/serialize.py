@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -12,10 +12,12 @@ import numpy as np
 
 from monitor import values
 from monitor.alarm import Alarm, Transition
+from monitor.alarm_spec import Sound
 from monitor.check import Finding, Quantity, Verdict
 from monitor.load import AlarmLoad
 from monitor.mounting import Mounting, within_half_turn
 from monitor.obstacle_view import ANGLE_STEP_RAD
+from monitor.planned_stop import StopReason
 from monitor.runner import Tile
 from monitor.scan import usable
 from monitor.trends import STEP_S, Piece
@@ -197,8 +199,10 @@ def tile(tile: Tile) -> TileState:
     }
 
 
-def alarm(alarm: Alarm, now_s: float, wall_ms: int) -> StandingAlarm:
-    """A standing alarm. Its times are turned from the monitor's clock into time of day by their age."""
+def alarm(alarm: Alarm, now_s: float, wall_ms: int, silent_at_stop: Collection[str] | None = None) -> StandingAlarm:
+    """A standing alarm. Its times are turned from the monitor's clock into time of day by their age.
+    `silent_at_stop`: in a planned stop, the ids of alarms without a sound; None: there is none.
+    """
     spec = alarm.spec
     finding = alarm.finding or alarm.trip
     raised_for_s = now_s - alarm.raised_s if alarm.raised_s is not None else 0.0
@@ -211,7 +215,8 @@ def alarm(alarm: Alarm, now_s: float, wall_ms: int) -> StandingAlarm:
         "ended_title": (finding.ended if finding else "") or spec.ended_title,
         "priority": spec.priority,
         "place": place,
-        "sound": spec.sound,
+        "sound": Sound.NONE if silent_at_stop is not None and alarm.id in silent_at_stop else spec.sound,
+        "planned_stop": silent_at_stop is not None,
         "state": alarm.state,
         "active": alarm.active,
         "needs_ack": spec.needs_ack,
@@ -296,14 +301,16 @@ def trends(piece: Piece) -> Trends:
     }
 
 
-def event(transition: Transition, at_ms: int, *, now_s: float, settings_version: int) -> NewEvent:
+def event(
+    transition: Transition, at_ms: int, *, now_s: float, settings_version: int, planned_stop: StopReason | None = None
+) -> NewEvent:
     """A transition as the log keeps it and the pages get it, at `at_ms`, which is `now_s`; the log adds its number.
 
     With it alone a restart knows where the alarm stands (`server.vehicle.restore`).
     """
     finding, spec = transition.finding, transition.spec
     until_s = transition.shelved_until_s
-    return {
+    found: NewEvent = {
         "at_ms": at_ms,
         "alarm": transition.alarm_id,
         "occurrence": transition.occurrence,
@@ -324,3 +331,6 @@ def event(transition: Transition, at_ms: int, *, now_s: float, settings_version:
         "limit": quantity(finding.limit if finding else None),
         "worst": _worst(transition.worst),
     }
+    if planned_stop is not None:
+        found["planned_stop"] = planned_stop
+    return found

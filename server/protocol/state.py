@@ -7,6 +7,7 @@ from typing import Annotated, Literal, NotRequired
 from typing_extensions import TypeAliasType, TypedDict
 
 from monitor.link import Phase
+from monitor.planned_stop import StopReason
 from server.protocol.alarm_state import AlarmLoad, StandingAlarm, SuppressedAlarm, Tile
 from server.protocol.departure import DepartureState
 from server.protocol.doc import doc
@@ -42,6 +43,15 @@ class HeldState(TypedDict):
     paused: bool
 
 
+class PlannedStopState(TypedDict):
+    """The car stands on purpose: its alarms are marked."""
+
+    reason: StopReason
+    by: str | None
+    since_ms: int
+    is_speed_known: Annotated[bool, doc("false: it does not end by itself until the speed is known")]
+
+
 class TrackState(TypedDict):
     number: Annotated[int, doc("another one: another track")]
     last: Annotated[int, doc("number of its newest point")]
@@ -65,6 +75,7 @@ class SessionState(TypedDict):
     paused: bool
     paused_by: str | None
     paused_for_s: float
+    planned_stop: NotRequired[Annotated[PlannedStopState | None, doc("null: there is none; not from older agents")]]
     held: Annotated[HeldState | None, doc("what was active when the server ended, while no car is monitored yet")]
     track_m: Annotated[float | None, doc("distance driven since connecting, from the car's positions")]
     track: TrackState

@@ -1,4 +1,4 @@
-"""Reads the channels of our own of a recording: alarms, pauses, settings, phones, slow-downs."""
+"""Reads the channels of our own of a recording: alarms, pauses, planned stops, settings, phones, slow-downs."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from monitor.phones import PhoneReport
+from monitor.planned_stop import PlannedStop, reason_of
 from server.judge import recorded_slowdown
-from server.judge.logged_transition import transition_of
+from server.judge.logged_transition import number_of, text_of, transition_of
 from server.judge.phone_report import phone_report
-from server.judge.recorded_events import ChosenPhone, NewSettings, Pause, RecordedEvent, RecordedEvents
+from server.judge.recorded_events import ChosenPhone, NewSettings, Pause, RecordedEvent, RecordedEvents, StopChange
 from server.protocol.commands import Position
 from server.recording.read.read import Recording
 from server.recording.standing import read_standing
@@ -76,6 +77,10 @@ def _of_event(row: Mapping[str, Any], at_s: float, start_s: float) -> RecordedEv
     if change in ("paused", "resumed"):
         by = row.get("by")
         return Pause(is_paused=change == "paused", by=by if isinstance(by, str) else None)
+    if change in ("planned_stop", "planned_stop_ended"):
+        since_s = number_of(row.get("since_ms"), number_of(row.get("at_ms"), 0.0)) / 1000 - start_s
+        stop = PlannedStop(reason=reason_of(row.get("reason")), since_s=since_s, by=text_of(row.get("by")))
+        return StopChange(stop=stop if change == "planned_stop" else None)
     if change == "ride":
         phone = row.get("phone")
         return ChosenPhone(phone=phone if isinstance(phone, str) else None)

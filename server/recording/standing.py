@@ -1,4 +1,4 @@
-"""What is in force when a part of a drive begins: alarms, pause, phone, slow-down, who is on duty and in control, mode.
+"""What is in force when a part of a drive begins: alarms, pause, planned stop, phone, slow-down, people, mode.
 Its metadata says so, for no message in it does."""
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ _MODES = {  # change → the mode that it begins or ends
     "paused": ("pause", True),
     "resumed": ("pause", False),
     "stopped": ("pause", False),
+    "planned_stop": ("planned stop", True),
+    "planned_stop_ended": ("planned stop", False),
     "armed": ("armed", True),
     "disarmed": ("armed", False),
     "ride": ("ride", True),

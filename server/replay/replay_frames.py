@@ -14,7 +14,7 @@ from server.protocol import serialize
 from server.protocol.state import RecordedState
 from server.vehicle.mode_shown import mode_shown
 from server.vehicle.scan_feed import judged
-from server.vehicle.state_frame import Facts, state_frame
+from server.vehicle.state_frame import Facts, silent_at, state_frame
 
 TRENDS_A_FRAME = 4
 
@@ -35,6 +35,7 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
         connected_s=0.0,
         paused_since_s=run_state.paused_s,
         paused_by=run_state.paused_by,
+        planned_stop=run_state.planned_stop,
         held=None,
         load=run_state.load.at(now_s),
         log_trouble=None,
@@ -73,7 +74,8 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
     link["cut"] = link["since_ms"] = link["problem"] = None
     link["topics_subscribed"] = len(epoch.published)
     if run.drive.recorded.has_alarms:
-        shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms) for alarm in _recorded_standing(run_state)]
+        silent = silent_at(run_state.planned_stop, run_state.monitor)
+        shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms, silent) for alarm in _recorded_standing(run_state)]
         shown["alarm_load"] = serialize.load(facts.load, run_state.recorded_alarms)
     return shown
 

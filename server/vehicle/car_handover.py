@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import assert_never
 
+from monitor.alarm import Alarm
 from monitor.runner import Refused
 from server.control.authorization import Authorization, Caller
 from server.control.handover import Handover, Line, NotReadBack, version_of
@@ -17,13 +18,16 @@ from server.slowdown.controller import SlowDownController
 from server.vehicle import phone
 from server.vehicle.car_departure import CarDeparture
 from server.vehicle.car_driving import CarDriving
+from server.vehicle.car_planned_stop import CarPlannedStop
 from server.vehicle.handover_lines import (
+    alarm_key,
     alarm_lines,
     departure_line,
     driving_line,
     limit_lines,
     mode_lines,
     rides_line,
+    stop_lines,
 )
 from server.vehicle.judgement import Judgement
 from server.vehicle.pause import Pause
@@ -38,6 +42,7 @@ class CarHandover:
         settings: ActiveSettings,
         authorization: Authorization,
         pause: Pause,
+        planned_stop: CarPlannedStop,
         slow_down: SlowDownController,
         driving: CarDriving,
         departure: CarDeparture,
@@ -47,6 +52,7 @@ class CarHandover:
         self._settings = settings
         self._authorization = authorization
         self._pause = pause
+        self._planned_stop = planned_stop
         self._slow_down = slow_down
         self._driving = driving
         self._departure = departure
@@ -104,6 +110,12 @@ class CarHandover:
         self._authorization.hand_over(offer.by, offer.fence, offer.to, now_s)
         titles = "; ".join(line.title for line in lines)
         self._log_step("accepted", f"{by.name} read back what is in force: {titles}.", by)
+        keys = {line.key for line in lines}
+
+        def is_read_back(alarm: Alarm) -> bool:
+            return any(alarm_key(kind, alarm.id, alarm.occurrence) in keys for kind in ("alarm", "shelved"))
+
+        self._judgement.report(self._judgement.monitor.hand_over(is_read_back, by.name, now_s))
         return offer.by
 
     def refusal(self, why: NotReadBack, now_s: float, wall_ms: int) -> Answer:
@@ -124,6 +136,7 @@ class CarHandover:
             ),
             driving_line(self._driving.frame(now_s, wall_ms)),
             departure_line(self._departure.state(), self._departure.failed_items),
+            *stop_lines(self._planned_stop.stop, now_s, wall_ms),
             *mode_lines(
                 slow_down["state"], slow_down["why"], self._pause.by, is_paused=self._pause.since_s is not None
             ),

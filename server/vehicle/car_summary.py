@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 
 import orjson
 
@@ -17,7 +17,7 @@ from server.protocol.cars_state import CarAlarm, CarPlace, CarSpeed, CarSummary
 from server.protocol.state import ServerState
 from server.vehicle import facts
 from server.vehicle.session_parts import SessionParts
-from server.vehicle.state_frame import where_cut
+from server.vehicle.state_frame import silent_at, where_cut
 
 log = logging.getLogger("catgraph.session")
 
@@ -96,7 +96,8 @@ class SummaryPublisher:
                 "trying_for_s": round(now_s - found.dialled_s, 1) if is_trying else 0.0,
                 "connected_for_s": _since(found.connected_s, now_s),
             },
-            "worst": worst(standing, now_s, wall_ms),
+            "planned_stop": None if found.planned_stop is None else found.planned_stop.reason,
+            "worst": worst(standing, now_s, wall_ms, silent_at(found.planned_stop, parts.judgement.monitor)),
             "waiting": sum(alarm.state in _ASKING for alarm in standing),
             "speed": _speed(snapshot, now_s),
             "holder": control["holder"],
@@ -116,13 +117,25 @@ class SummaryPublisher:
         }
 
 
-def worst(standing: Iterable[Alarm], now_s: float, wall_ms: int) -> CarAlarm | None:
-    """The alarm that needs a person most: one that stands unanswered, then one that ended so, then the others."""
+def worst(
+    standing: Iterable[Alarm], now_s: float, wall_ms: int, silent_at_stop: Collection[str] | None = None
+) -> CarAlarm | None:
+    """The alarm that needs a person most: one that stands unanswered, then one that ended so, then the others.
+    `silent_at_stop`: as of `serialize.alarm`. Of two alike it is the one that sounds: only this one is heard elsewhere.
+    """
     order = {"UNACKED": 2, "RTN_UNACKED": 1}
-    shown = [serialize.alarm(alarm, now_s, wall_ms) for alarm in standing]
+    shown = [serialize.alarm(alarm, now_s, wall_ms, silent_at_stop) for alarm in standing]
     if not shown:
         return None
-    first = max(shown, key=lambda one: (order.get(one["state"], 0), _RANK[one["priority"]], one["raised_ms"]))
+    first = max(
+        shown,
+        key=lambda one: (
+            order.get(one["state"], 0),
+            _RANK[one["priority"]],
+            one["sound"] != Sound.NONE,
+            one["raised_ms"],
+        ),
+    )
     return {
         "id": first["id"],
         "occurrence": first["occurrence"],

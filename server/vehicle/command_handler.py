@@ -20,6 +20,7 @@ from server.protocol import (
     item_commands,
     mark_commands,
     mode_commands,
+    planned_stop_commands,
     serialize,
     slowing_commands,
 )
@@ -28,7 +29,7 @@ from server.protocol.messages import Answer
 from server.protocol.state import LiveState
 from server.rosbridge.address import BadAddress
 from server.storage.storage_thread import StorageThread
-from server.vehicle import phone, queries, responses
+from server.vehicle import departure_seen, phone, queries, responses
 from server.vehicle.check_detail import check_answer
 from server.vehicle.outcomes import Outcomes
 from server.vehicle.session_parts import SessionActions, SessionParts
@@ -213,6 +214,8 @@ class CommandHandler:
             case commands.Resume():
                 if parts.pause.end(parts.judgement.state, by=by):
                     parts.judgement.judge(now_s)
+            case planned_stop_commands.OfPlannedStop():
+                self._plan_stop(command, now_s, by=by)
             case commands.Record():
                 await self._record_by_hand(command.on, by=by)
                 return None
@@ -268,6 +271,11 @@ class CommandHandler:
         self._actions.recording_ordered()
         parts.publisher.put()
         await parts.recording.demand_settled()
+
+    def _plan_stop(self, command: planned_stop_commands.PlannedStopCommand, now_s: float, *, by: str) -> None:
+        speed_mps, phase = departure_seen.speed_of(self._parts, now_s), self._parts.connection.phase
+        self._parts.planned_stop.obey(command, now_s, by=by, phase=phase, speed_mps=speed_mps)
+        self._actions.attention_changed()  # the summary of the car shows it
 
     def _ride(self, phone_: str | None, now_s: float, *, by: str) -> None:
         judgement = self._parts.judgement

@@ -10,6 +10,7 @@ from typing import Any
 from typing_extensions import Unpack
 
 from monitor.alarm import Transition
+from monitor.planned_stop import StopReason
 from server.bus.bus import SessionBus
 from server.control.acting import acting
 from server.judge.active_settings import ActiveSettings
@@ -47,6 +48,7 @@ class EventLog:
         self._waiting: deque[NotedEvent] = deque()
         self._lost = 0
         self._why: str | None = None
+        self.planned_stop: StopReason | None = None  # what happens to alarms meanwhile bears it
 
     @property
     def trouble(self) -> str | None:
@@ -68,7 +70,11 @@ class EventLog:
     def log_transitions(self, transitions: Collection[Transition], now_s: float) -> None:
         """What happened to alarms, at `now_s` of the monitor's clock."""
         at_ms = self._wall_ms()
-        self._write([serialize.event(one, at_ms, now_s=now_s, settings_version=self._version) for one in transitions])
+        events = [
+            serialize.event(one, at_ms, now_s=now_s, settings_version=self._version, planned_stop=self.planned_stop)
+            for one in transitions
+        ]
+        self._write(events)
 
     def note(self, change: str, text: str, *, by: str | None = None, **more: Unpack[EventDetails]) -> None:
         """Something of no alarm."""

@@ -86,6 +86,7 @@ def frame_facts(
         connected_s=connection.connected_s,
         paused_since_s=parts.pause.since_s,
         paused_by=parts.pause.by,
+        planned_stop=parts.planned_stop.stop,
         held=held,
         load=judgement.load,
         log_trouble=log_trouble,

@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 
+from monitor.planned_stop import REASONS, PlannedStop
 from monitor.values import Mode
 from server.control.handover import Line
 from server.control.lease import Operator
@@ -13,6 +14,7 @@ from server.protocol.alarm_state import StandingAlarm
 from server.protocol.answers import SettingsAnswer
 from server.protocol.departure import DepartureState
 from server.protocol.driving_state import ModeState, WhyUnknown
+from server.protocol.operator_state import LineKind
 from server.protocol.slow_down_state import SlowDownPhase
 
 MOST_ALARMS = 20  # each with a line of its own; more of them are one line
@@ -42,7 +44,7 @@ def alarm_lines(standing: Sequence[StandingAlarm]) -> list[Line]:
     active = [alarm for alarm in standing if alarm["state"] != "SHELVED"]
     lines = [
         Line(
-            key=f"alarm:{alarm['id']}:{alarm['occurrence']}",
+            key=alarm_key("alarm", alarm["id"], alarm["occurrence"]),
             kind="alarm",
             title=alarm["title"] if alarm["active"] else alarm["ended_title"],
             text=f"{alarm['text'] or alarm['trip_text']} {_answered(alarm)}".strip(),
@@ -58,7 +60,7 @@ def alarm_lines(standing: Sequence[StandingAlarm]) -> list[Line]:
         lines.append(Line(key="alarms:none", kind="alarm", title="No alarm is active"))
     return lines + [
         Line(
-            key=f"shelved:{alarm['id']}:{alarm['occurrence']}",
+            key=alarm_key("shelved", alarm["id"], alarm["occurrence"]),
             kind="shelved",
             title=f"Shelved: {alarm['title']}",
             text=f"{alarm['text']} {f'By {by}.' if (by := alarm['shelved_by']) else ''}".strip(),
@@ -68,6 +70,11 @@ def alarm_lines(standing: Sequence[StandingAlarm]) -> list[Line]:
         for alarm in standing
         if alarm["state"] == "SHELVED"
     ]
+
+
+def alarm_key(kind: LineKind, alarm: str, occurrence: int) -> str:
+    """The key of the line that one alarm has for itself."""
+    return f"{kind}:{alarm}:{occurrence}"
 
 
 def _answered(alarm: StandingAlarm) -> str:
@@ -125,6 +132,16 @@ def departure_line(check: DepartureState, failed_items: Mapping[str, str]) -> Li
     text = f"{by}: {', '.join(counts)}."
     key = _joined(f"departure:{check['state']}:{at_ms}", sorted(failed_items))
     return Line(key=key, kind="departure", title=title, text=text, since_ms=at_ms)
+
+
+def stop_lines(stop: PlannedStop | None, now_s: float, wall_ms: int) -> list[Line]:
+    """A planned stop."""
+    if stop is None:
+        return []
+    text = "Its alarms are marked; only critical ones sound." + (f" By {stop.by}." if stop.by else "")
+    since_ms = round(wall_ms - (now_s - stop.since_s) * 1000)
+    title = f"Planned stop: {REASONS[stop.reason]}"
+    return [Line(key=f"planned_stop:{stop.reason}", kind="planned_stop", title=title, text=text, since_ms=since_ms)]
 
 
 def mode_lines(slow_down: SlowDownPhase, why: str | None, paused_by: str | None, *, is_paused: bool) -> list[Line]:

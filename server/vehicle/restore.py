@@ -8,12 +8,19 @@ from typing import Any
 
 from monitor.alarm import AlarmState, Transition
 from monitor.load import KEPT, WINDOW_S
+from monitor.planned_stop import REASONS, PlannedStop, reason_of
 from monitor.response import SHELVE_AT_MOST_MIN
 from server.bus.bus import SessionBus
 from server.judge.logged_transition import Clock, number_of, text_of, transition_of
 
 _PORTION = 50
 _ENOUGH = 1000  # events of one alarm; the newest few give its state
+_MODES = {  # change → the change by which the mode began
+    "paused": "paused",
+    "resumed": "paused",
+    "planned_stop": "planned_stop",
+    "planned_stop_ended": "planned_stop",
+}
 ORDER_ENDED = ("released", "ended")
 ORDER_STANDS = ("ordered", "sent", "slows", "stands", "not_confirmed", "cut", "resumed")
 LONGEST_HOLD_S = 3600.0  # as the setting allows
@@ -26,6 +33,7 @@ class RestoredState:
     address: str | None = None  # of the car that was monitored when the server ended; None: none was
     paused_s: float | None = None  # since when its monitoring was paused
     paused_by: str | None = None
+    planned_stop: PlannedStop | None = None
     settings_version: int = 0  # the highest that the log knows
     order: Mapping[str, Any] | None = None  # the event of the slow-down that stood when the server ended
     transitions: tuple[Transition, ...] = ()  # of each alarm since it was last at rest, oldest first
@@ -43,8 +51,9 @@ class RestoredState:
         titles = [last.spec.title for last in self.standing.values()]
         stood = f" Active alarms: {', '.join(titles)}." if titles else " No alarm was active."
         paused = " Monitoring was paused." if self.paused_s is not None else ""
+        stop = f" A planned stop was in force: {REASONS[self.planned_stop.reason]}." if self.planned_stop else ""
         car = f" They come back when {self.address} is monitored again." if titles and self.address else ""
-        return f"The server was restarted; nothing was monitored meanwhile.{stood}{car}{paused}"
+        return f"The server was restarted; nothing was monitored meanwhile.{stood}{car}{paused}{stop}"
 
 
 def recall(bus: SessionBus, vehicle: str, *, now_s: float, wall_ms: int) -> RestoredState:
@@ -57,7 +66,8 @@ def recall(bus: SessionBus, vehicle: str, *, now_s: float, wall_ms: int) -> Rest
         """A time of day that was set back must not hide an alarm for longer than anybody may."""
         return now_s + min((until_ms - wall_ms) / 1000, SHELVE_AT_MOST_MIN * 60)
 
-    address, paused = _monitored(bus, vehicle)
+    address, modes = _monitored(bus, vehicle)
+    paused, stop = modes.get("paused"), modes.get("planned_stop")
     newest = bus.past_events(vehicle, limit=1)
     alarms = [_since_rest(bus, vehicle, alarm) for alarm in bus.logged_alarms(vehicle)]
     transitions = [
@@ -70,6 +80,13 @@ def recall(bus: SessionBus, vehicle: str, *, now_s: float, wall_ms: int) -> Rest
         address=address,
         paused_s=moment_s(number_of(paused.get("since_ms"), paused["at_ms"])) if paused else None,
         paused_by=text_of(paused.get("by")) if paused else None,
+        planned_stop=PlannedStop(
+            reason=reason_of(stop.get("reason")),
+            since_s=moment_s(number_of(stop.get("since_ms"), stop["at_ms"])),
+            by=text_of(stop.get("by")),
+        )
+        if stop
+        else None,
         settings_version=int(number_of(newest[0].get("settings_version"), 0)) if newest else 0,
         order=_order(bus, vehicle, wall_ms) if address is not None else None,
         transitions=tuple(transitions),
@@ -105,21 +122,19 @@ def _recent(bus: SessionBus, vehicle: str, wall_ms: int, moment_s: Clock, shelf_
     return found[::-1]
 
 
-def _monitored(bus: SessionBus, vehicle: str) -> tuple[str | None, Mapping[str, Any] | None]:
-    """The address that was monitored to the end, and the event which paused it."""
-    paused: Mapping[str, Any] | None = None
-    is_known = False  # whether it was paused
+def _monitored(bus: SessionBus, vehicle: str) -> tuple[str | None, Mapping[str, Mapping[str, Any]]]:
+    """The address that was monitored to the end, and by change the event of each mode that was in force then."""
+    newest: dict[str, Mapping[str, Any]] = {}
     for event in _backwards(bus, vehicle, ""):
-        match event["change"]:
-            case "started":
-                return text_of(event.get("address")), paused
-            case "stopped":
-                return None, None
-            case "paused" if not is_known:
-                paused, is_known = event, True
-            case "resumed":
-                is_known = True
-    return None, None
+        change = event["change"]
+        if change == "started":
+            in_force = {mode: one for mode, one in newest.items() if one["change"] == mode}
+            return text_of(event.get("address")), in_force
+        if change == "stopped":
+            break
+        if change in _MODES:
+            newest.setdefault(_MODES[change], event)
+    return None, {}
 
 
 def _since_rest(bus: SessionBus, vehicle: str, alarm: str) -> list[dict[str, Any]]:

@@ -211,6 +211,7 @@ class Session:
         self._parts.connection.dial(target, LinkMarks(self._parts.judgement.transport, self._parts.intake.subscribed))
         if before is not None:
             self._parts.pause.go_on(self._parts.judgement.state, before, self._now(), self._wall_ms())
+            self._parts.planned_stop.go_on(before.planned_stop, self._now(), self._wall_ms())
             if before.order is not None:
                 self._parts.slow_down.resume(before.order)
 
@@ -248,6 +249,7 @@ class Session:
         self._parts.connection.drop(has_last_word=said_farewell)
         self._parts.recording.ended()
         self._parts.pause.forget()
+        self._parts.planned_stop.end(": monitoring ended", by=None)
         self._clear()
 
     def _clear(self) -> None:

@@ -22,6 +22,7 @@ from server.vehicle.car_attention import CarAttention
 from server.vehicle.car_departure import CarDeparture
 from server.vehicle.car_driving import CarDriving
 from server.vehicle.car_handover import CarHandover
+from server.vehicle.car_planned_stop import CarPlannedStop
 from server.vehicle.connection import Connection, ConnectionObserver
 from server.vehicle.departure_file import LIST_SUFFIX, DepartureFile
 from server.vehicle.event_log import EventLog
@@ -48,6 +49,7 @@ class SessionParts:
     handover: CarHandover
     departure: CarDeparture
     pause: Pause
+    planned_stop: CarPlannedStop
     driving: CarDriving
     slow_down: SlowDownController
     publisher: StatePublisher
@@ -125,7 +127,7 @@ def session_parts(
     authorization = Authorization(event_log.note, fence=bus.last_event(vehicle))
     connection = Connection(vehicle, observer, intake, subscriptions, open_source, supervisor, now=now)
     intake.follow(connection)
-    pause = Pause(event_log)
+    pause, planned_stop = Pause(event_log), CarPlannedStop(event_log)
     driving = CarDriving(judgement, connection, event_log.note, marks.on_described, now=now, wall_ms=wall_ms)
     departure = CarDeparture(settings, DepartureFile(settings.beside(LIST_SUFFIX)), event_log.note)
     return SessionParts(
@@ -136,11 +138,13 @@ def session_parts(
         event_log=event_log,
         authorization=authorization,
         attention=CarAttention(judgement, authorization, event_log.note),
-        handover=CarHandover(judgement, settings, authorization, pause, slow_down, driving, departure, event_log.note),
+        handover=CarHandover(
+            judgement, settings, authorization, pause, planned_stop, slow_down, driving, departure, event_log.note
+        ),
         departure=departure,
         driving=driving,
         publisher=StatePublisher(vehicle, bus, frame, now=now),
-        pause=pause, slow_down=slow_down, intake=intake, marks=placed,
+        pause=pause, planned_stop=planned_stop, slow_down=slow_down, intake=intake, marks=placed,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from monitor import catalog, values
 from monitor.instruments import stopping_m, time_gap_s
 from monitor.link import Phase
 from monitor.load import AlarmLoad
+from monitor.planned_stop import PlannedStop
 from monitor.runner import Monitor
 from monitor.scan_shape import habit_words
 from monitor.signals import SIGNALS, Signal
@@ -24,7 +25,15 @@ from server.protocol.questions import Question
 from server.protocol.recording_state import RecordingState
 from server.protocol.signal_state import SignalFreshness, SignalState, SignalValue
 from server.protocol.slow_down_state import SlowDownState
-from server.protocol.state import Cut, HeldState, LinkState, NearestState, RecordedState, SessionState
+from server.protocol.state import (
+    Cut,
+    HeldState,
+    LinkState,
+    NearestState,
+    PlannedStopState,
+    RecordedState,
+    SessionState,
+)
 from server.rosbridge import connection_errors
 from server.rosbridge.address import Address
 from server.rosbridge.connection_errors import Problem
@@ -56,6 +65,7 @@ class Facts:
     connected_s: float | None
     paused_since_s: float | None
     paused_by: str | None
+    planned_stop: PlannedStop | None = None
     held: RestoredState | None  # what stood when the server ended, while no car is monitored yet
     load: AlarmLoad
     log_trouble: str | None
@@ -98,7 +108,10 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> RecordedS
         "signals": {name: _signal(signal, facts, snapshot) for name, signal in SIGNALS.items()},
         "nearest": _nearest(snapshot, monitor),
         "checks": [serialize.tile(tile) for tile in monitor.tiles()],
-        "alarms": [serialize.alarm(alarm, facts.now_s, facts.wall_ms) for alarm in monitor.standing()],
+        "alarms": [
+            serialize.alarm(alarm, facts.now_s, facts.wall_ms, silent_at(facts.planned_stop, monitor))
+            for alarm in monitor.standing()
+        ],
         "suppressed": [
             serialize.suppressed(alarm, monitor.alarms, facts.now_s, facts.wall_ms)
             for alarm in monitor.suppressed()[:MOST_SUPPRESSED]
@@ -132,11 +145,29 @@ def _session(facts: Facts, snapshot: Snapshot) -> SessionState:
         "paused": facts.paused_since_s is not None,
         "paused_by": facts.paused_by,
         "paused_for_s": round(facts.now_s - facts.paused_since_s, 1) if facts.paused_since_s is not None else 0.0,
+        "planned_stop": _planned_stop(facts, snapshot),
         "held": _held(facts.held),
         "track_m": serialize.plain(snapshot.track_m, 1),
         "track": {"number": facts.track_number, "last": snapshot.track[-1].number if snapshot.track else 0},
         "received": facts.reception.received,
         "rejected": facts.reception.rejected,
+    }
+
+
+def silent_at(stop: PlannedStop | None, monitor: Monitor) -> Collection[str] | None:
+    """Ids of the alarms that make no sound in it; None: there is none."""
+    return None if stop is None else monitor.silent_at_stop
+
+
+def _planned_stop(facts: Facts, snapshot: Snapshot) -> PlannedStopState | None:
+    stop = facts.planned_stop
+    if stop is None:
+        return None
+    return {
+        "reason": stop.reason,
+        "by": stop.by,
+        "since_ms": round(facts.wall_ms - (facts.now_s - stop.since_s) * 1000),
+        "is_speed_known": _fresh(snapshot, "speed") is not None,
     }
 
 

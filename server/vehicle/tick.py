@@ -104,6 +104,7 @@ class Tick:
             ("recorder", self.watch_recording),
             ("control", self.watch_control),
             ("slow-down", self.watch_slow_down),
+            ("planned stop", self.watch_planned_stop),
             ("departure check", self.watch_departure),
         ):
             self._attempts.attempt(part, partial(work, now_s))
@@ -117,6 +118,12 @@ class Tick:
             if not publisher.is_due:
                 publisher.put()
             self.summary.tick(now_s)
+
+    def watch_planned_stop(self, now_s: float) -> None:
+        parts = self._parts
+        if parts.planned_stop.tick(departure_seen.speed_of(parts, now_s)):
+            parts.publisher.put_soon()
+            self.summary.put()
 
     def watch_departure(self, now_s: float) -> None:
         parts, wall_ms = self._parts, self._wall_ms()

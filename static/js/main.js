@@ -53,7 +53,7 @@ import { mount as mountStrip } from './shell/strip.js';
 import { mount as mountTopbar } from './shell/topbar.js';
 import { mount as mountTrends } from './home/trends.js';
 import { mount as mountVeil } from './shell/veil.js';
-import { whenAsked } from './settings/when-asked.js';
+import { whenWanted } from './shell/when-wanted.js';
 
 /** The rest of the page waits no longer for the first values [ms]. */
 const WAITS_MS = 400;
@@ -106,7 +106,7 @@ async function begin() {
   mountChecks(need(page.monitor, '[data-part="checks"]'), page.store);
   await breath();
   mountTrends(need(page.monitor, '[data-part="trends"]'), page.store, page.say);
-  whenAsked(page.monitor, page.store, page.say);
+  whenWanted(page.monitor, page.store, page.say);
   await breath();
   mountBadge(page.store);
   page.router.onShown = () => {

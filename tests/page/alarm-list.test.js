@@ -72,7 +72,7 @@ test('states are said in the words of ISA-18.2', () => {
   const state = (/** @type {any} */ more) => shown([alarm('a', more)])[0]?.state;
   assert.equal(state({}), 'unacknowledged');
   assert.equal(state({ state: 'RTN_UNACKED', active: false }), 'returned unacknowledged');
-  assert.equal(state({ state: 'ACKED', acknowledged_by: 'Ann' }), 'acknowledged by Ann');
+  assert.equal(state({ state: 'ACKED', acknowledged_by: 'Ann', active: false }), 'acknowledged by Ann');
   assert.match(state({ state: 'SHELVED', shelved_by: 'Ann', shelved_until_ms: 0 }) ?? '', /^shelved until \d\d:\d\d:\d\d by Ann$/);
 });
 

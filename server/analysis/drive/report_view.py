@@ -65,7 +65,7 @@ def report_json(
 
 def _unknown() -> dict[str, Any]:
     """Of a recording without a log."""
-    names = ("people", "departure", "modes", "alarms", "marks", "interventions", "slow_downs")
+    names = ("people", "departure", "modes", "alarms", "marks", "interventions", "slow_downs", "planned_stops")
     return dict.fromkeys(names)
 
 
@@ -88,6 +88,7 @@ def _of_log(log: DriveLog, facts: DriveFacts) -> dict[str, Any]:
         if log.are_modes_known
         else None,
         "slow_downs": [asdict(one) for one in log.slow_downs],
+        "planned_stops": [asdict(one) for one in log.planned_stops],
     }
 
 

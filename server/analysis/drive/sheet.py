@@ -50,6 +50,7 @@ def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str
         "marks": _marks(found["marks"], media),
         "media_left": media.left_out,
         "slow_downs": _slow_downs(found["slow_downs"]),
+        "planned_stops": _planned_stops(found["planned_stops"], found["end_ms"]),
         "link": drawings.link_plot(facts, 340, 150),
         "link_head": _link_head(found["link_delay"]),
         "blind": _blind(found, facts.start_ms),
@@ -193,7 +194,7 @@ def _alarms(alarms: Sequence[Mapping[str, Any]] | None) -> list[tuple[str, str, 
             day_time(one["raised_ms"]),
             one["priority"],
             one["title"],
-            one["text"],
+            " · ".join(filter(None, ("planned stop" if one["planned_stop"] else "", one["text"]))),
             "not acknowledged" if one["to_acknowledge_s"] is None else f"{one['to_acknowledge_s']:.1f} s",
         )
         for one in alarms
@@ -255,6 +256,21 @@ def _slow_downs(found: Sequence[Mapping[str, Any]] | None) -> list[tuple[str, st
                 f"{(slows - one['ordered_ms']) / 1000:.1f} s" if slows else "not proven",
             )
         )
+    return rows
+
+
+def _planned_stops(found: Sequence[Mapping[str, Any]] | None, end_ms: int) -> list[tuple[str, str, str, str]] | None:
+    """When, why and by whom, how it ended, how long."""
+    if found is None:
+        return None
+    rows = []
+    for one in found[:MOST_ROWS]:
+        until_ms = end_ms if one["to_ms"] is None else one["to_ms"]
+        ended = "it was in force to the end" if one["to_ms"] is None else one["ended"] or "another reason followed"
+        by = f" By {one['ended_by']}." if one["ended_by"] else ""
+        title = f"{one['reason'].capitalize()}, by {one['by'] or 'nobody known'}"
+        lasted = report_text.length((until_ms - one["from_ms"]) / 1000)
+        rows.append((day_time(one["from_ms"]), title, f"{ended}{by}", lasted))
     return rows
 
 

@@ -86,9 +86,8 @@ def _things(found: Mapping[str, Any]) -> Iterator[list[Any]]:
         yield _row("mode span", one["from_ms"], one["to_ms"], what=one["mode"])
     for one in found["alarms"] or ():
         about = {"what": one["title"], "value": one["to_acknowledge_s"], "unit": "s to acknowledge"}
-        yield _row(
-            "alarm", one["raised_ms"], one["cleared_ms"], by=one["acknowledged_by"], details=one["text"], **about
-        )
+        details = " · ".join(filter(None, (one["text"], "planned stop" if one["planned_stop"] else "")))
+        yield _row("alarm", one["raised_ms"], one["cleared_ms"], by=one["acknowledged_by"], details=details, **about)
     for one in found["interventions"] or ():
         details = ": ".join(filter(None, (one["category"], one["what"])))
         about = {"what": one["kind"], "value": one["speed_mps"], "unit": "m/s", "by": one["initiated_by"]}
@@ -106,6 +105,8 @@ def _things(found: Mapping[str, Any]) -> Iterator[list[Any]]:
         yield _row(
             "slow-down", one["ordered_ms"], one["released_ms"], what=one["why"], by=one["by"], details=one["proof"]
         )
+    for one in found["planned_stops"] or ():
+        yield _row("planned stop", one["from_ms"], one["to_ms"], what=one["reason"], by=one["by"], details=_ended(one))
     for section, what in (("blind", "no message"), ("late", "messages late")):
         for one in found[section]:
             start = found["start_ms"]
@@ -118,6 +119,10 @@ def _things(found: Mapping[str, Any]) -> Iterator[list[Any]]:
     for name in ("damage", "left_out", "not_received"):
         for line in found[name]:
             yield _row("missing", what=name, value=line)
+
+
+def _ended(one: Mapping[str, Any]) -> str:
+    return " ".join(filter(None, (one["ended"], one["ended_by"] and f"By {one['ended_by']}.")))
 
 
 def _row(

@@ -28,6 +28,7 @@ class AlarmInDrive:
     acknowledged_ms: int | None = None
     acknowledged_by: str = ""
     cleared_ms: int | None = None
+    planned_stop: bool = False  # it was raised in a planned stop
 
     @property
     def to_acknowledge_s(self) -> float | None:
@@ -82,4 +83,5 @@ def _raised(alarm: str, event: Event) -> AlarmInDrive:
         text=text_of(event, "text", 300),
         component=component_of(alarm, named),
         raised_ms=event["at_ms"],
+        planned_stop=isinstance(event.get("planned_stop"), str),
     )

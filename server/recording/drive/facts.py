@@ -19,6 +19,7 @@ from server.recording.drive.drive_events import Event, of_change, read_drive_eve
 from server.recording.drive.modes import MODES, Intervention, ModeSpan, are_modes_known, interventions_of, mode_spans
 from server.recording.drive.motion import Motion
 from server.recording.drive.people import PersonInDrive, names_of, people_of
+from server.recording.drive.planned_stops import PlannedStopInDrive, planned_stops_of
 from server.recording.drive.slow_downs import SlowDownInDrive, slow_downs_of
 from server.recording.event_channels import read_recorded_events
 from server.recording.marks.described import as_event
@@ -41,6 +42,7 @@ class DriveLog:
     marks: Sequence[DriveMark]
     alarms: Sequence[AlarmInDrive]
     slow_downs: Sequence[SlowDownInDrive]
+    planned_stops: Sequence[PlannedStopInDrive]
     resumes: bool  # the server was started again: the drive is that of the recording before
 
 
@@ -118,6 +120,7 @@ def _log_of(recording: Recording, events: Sequence[Event], start_ms: int, end_ms
         marks=marks_of(recording),
         alarms=alarms_of(events),
         slow_downs=slow_downs_of(events),
+        planned_stops=planned_stops_of(events),
         resumes=any(event.get("resumes") is True for event in of_change(events, "started")),
     )
 

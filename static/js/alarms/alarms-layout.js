@@ -1,8 +1,8 @@
 // The list of alarms as words: which row stands where, how its state reads, what its keys are, what fits a page of it. Pure functions, no DOM.
 
 import { byUrgency } from './alarm-layout.js';
-import { snackWords } from './standing.js';
-import { fixed, timeOfDay } from '../core/format.js';
+import { markWords, snackWords } from './standing.js';
+import { ageWords, fixed, timeOfDay } from '../core/format.js';
 import { ICONS } from '../core/priority.js';
 
 /**
@@ -38,7 +38,7 @@ function rowOf(alarm, mayAct) {
   const kind = kindOf(alarm);
   return {
     key: `${alarm.id} ${alarm.occurrence} ${alarm.state}`, id: alarm.id, kind, icon: kind === 'shelved' ? 'clock' : ICONS[alarm.priority], priority: alarm.priority, title: alarm.title,
-    words: rowWords(alarm), at: timeOfDay(alarm.raised_ms), state: stateWords(alarm), silent: silentWords(alarm), keys: mayAct ? keysOf(alarm) : [], alarm,
+    words: rowWords(alarm), at: timeOfDay(alarm.raised_ms), state: listedWords(alarm), silent: silentWords(alarm), keys: mayAct ? keysOf(alarm) : [], alarm,
   };
 }
 
@@ -91,6 +91,12 @@ export function stateWords(alarm) {
   if (alarm.state === 'SHELVED') return `shelved until ${timeOfDay(alarm.shelved_until_ms)}${by(alarm.shelved_by)}`;
   if (alarm.state === 'RTN_UNACKED') return 'returned unacknowledged';
   return alarm.state === 'ACKED' ? `acknowledged${by(alarm.acknowledged_by)}` : 'unacknowledged';
+}
+
+/** Its state in a list: of one that is acknowledged for how long it has been active, and whether the car stands on purpose. @param {Alarm} alarm */
+function listedWords(alarm) {
+  const age = alarm.state === 'ACKED' && alarm.active ? `active for ${ageWords(alarm.for_s)}` : '';
+  return [stateWords(alarm), age, markWords(alarm)].filter(Boolean).join(' · ');
 }
 
 /** Who took its sound, and until when; empty: nobody did. @param {Alarm} alarm */

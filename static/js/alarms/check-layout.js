@@ -1,7 +1,7 @@
 // One check as words and numbers: its answer, its three numbers, its alarms in this drive, the scale of its minute. Pure functions, no DOM.
 
 import { shownIn } from '../core/units.js';
-import { age, counted, fixed, timeOfDay } from '../core/format.js';
+import { age, ageWords, counted, fixed, timeOfDay } from '../core/format.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').CheckAnswer} Answer
@@ -92,7 +92,7 @@ export function episodesOf(events) {
     if (event.change === 'raised') {
       found.push({ at_ms: event.at_ms, ended_ms: null, worst: null, unit: '', side: 'above', by: null, took_s: null });
     } else if (!standing && event.change !== 'acknowledged') continue;
-    if (event.change === 'raised' || event.change === 'recaused' || event.change === 'unshelved') announced_ms = event.at_ms;
+    if (event.change === 'raised' || event.change === 'recaused' || event.change === 'unshelved' || event.change === 'unacknowledged') announced_ms = event.at_ms;
     const one = found.at(-1);
     if (!one) continue;
     if (event.worst && event.worst.value !== null) Object.assign(one, { worst: event.worst.value, unit: event.worst.unit, side: event.worst.side });
@@ -111,17 +111,17 @@ export function episodeWords({ at_ms, ended_ms, worst, unit, side, by, took_s },
   const said = [
     ended_ms === null ? 'active' : '',
     worst === null ? '' : `${side === 'above' ? 'highest' : 'lowest'} ${fixed(worst)} ${unit}`.trim(),
-    by === null ? (ended_ms === null ? '' : 'not acknowledged') : `acknowledged by ${by} after ${age(took_s)}${(took_s ?? 0) < 59.95 ? ' s' : ''}`,
+    by === null ? (ended_ms === null ? '' : 'not acknowledged') : `acknowledged by ${by} after ${ageWords(took_s ?? 0)}`,
   ];
   const lasted_s = ((ended_ms ?? now_ms) - at_ms) / 1000;
-  return { at: timeOfDay(at_ms), text: said.filter(Boolean).join(', ') || 'ended', lasted: `${age(lasted_s)}${lasted_s < 59.95 ? ' s' : ''}` };
+  return { at: timeOfDay(at_ms), text: said.filter(Boolean).join(', ') || 'ended', lasted: ageWords(lasted_s) };
 }
 
 /** "3 times, 18.4 s in all". @param {Episode[]} episodes @param {number} now_ms */
 export function totalWords(episodes, now_ms) {
   if (!episodes.length) return 'no alarm';
   const all_s = episodes.reduce((sum, { at_ms, ended_ms }) => sum + Math.max(0, (ended_ms ?? now_ms) - at_ms) / 1000, 0);
-  return `${counted(episodes.length, 'time')}, ${age(all_s)}${all_s < 59.95 ? ' s' : ''} in all`;
+  return `${counted(episodes.length, 'time')}, ${ageWords(all_s)} in all`;
 }
 
 /**

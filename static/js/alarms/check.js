@@ -9,7 +9,7 @@ import { whyUnchecked } from './checks.js';
 import { openShelve } from './shelve.js';
 import { dialogWords } from './standing.js';
 import { html, icon, listen, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
-import { fixed } from '../core/format.js';
+import { fixed, timeOfDay } from '../core/format.js';
 import { write } from '../core/ink.js';
 import { openScreen } from '../core/open-screen.js';
 import { ICONS } from '../core/priority.js';
@@ -139,7 +139,7 @@ class CheckView {
     if (!alarm) return;
     setText(parts.alarmTitle, alarm.title);
     setWords(parts.state, [stateWords(alarm), silentWords(alarm)].filter(Boolean).join(', '));
-    setWords(parts.story, isKnown ? dialogWords(alarm) : alarm.advice);
+    setWords(parts.story, isKnown ? dialogWords(alarm) : `Began ${timeOfDay(alarm.raised_ms)}. ${alarm.advice}`);
   }
 
   /** @param {import('./alarms-layout.js').Key} name */

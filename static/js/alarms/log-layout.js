@@ -17,9 +17,9 @@ export const KINDS = /** @type {const} */ ([
 export const MARKS = { critical: ['crit', 'c-crit'], warning: ['warn', 'c-warn'], advisory: ['info', ''] };
 const CHANGES = /** @type {Record<string, string>} */ ({
   raised: '', recaused: 'again', cleared: 'ended', acknowledged: 'acknowledged', shelved: 'shelved', unshelved: 'no longer shelved', silenced: 'silenced', unsilenced: 'sounds again',
-  suppressed: 'not announced', unsuppressed: 'announced again',
+  suppressed: 'not announced', unsuppressed: 'announced again', handed_over: 'taken over', unacknowledged: 'unacknowledged again',
 });
-const RISES = new Set(['raised', 'recaused', 'unsuppressed']);
+const RISES = new Set(['raised', 'recaused', 'unsuppressed', 'unacknowledged']);
 const SLOWING = new Set(['armed', 'disarmed', 'slow_down']);
 const DAYS = ['Sunday', 'Monday', 'Tuesday', 'Wednesday', 'Thursday', 'Friday', 'Saturday'];
 const MONTHS = ['January', 'February', 'March', 'April', 'May', 'June', 'July', 'August', 'September', 'October', 'November', 'December'];
@@ -39,7 +39,7 @@ export function eventWords(event) {
   const [mark, kind] = isRise ? MARKS[event.priority ?? 'advisory'] : ['ok', ''];
   return {
     icon: mark ?? 'info', kind: kind ?? '', title: `${event.title ?? event.alarm} ${change}`.trim(),
-    text: [event.text, event.by ? `by ${event.by}` : ''].filter(Boolean).join(' · '),
+    text: [event.text, event.planned_stop ? 'planned stop' : '', event.by ? `by ${event.by}` : ''].filter(Boolean).join(' · '),
   };
 }
 

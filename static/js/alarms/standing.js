@@ -7,8 +7,11 @@ import { age, fixed, timeOfDay } from '../core/format.js';
  * @param {import('../core/protocol-types.js').StandingAlarm} alarm
  */
 export function standingWords(alarm) {
-  return [alarm.active ? snackWords(alarm) : alarm.trip_text || alarm.text, said(alarm)].filter(Boolean).join(' · ');
+  return [alarm.active ? snackWords(alarm) : alarm.trip_text || alarm.text, said(alarm), markWords(alarm)].filter(Boolean).join(' · ');
 }
+
+/** The mark of an alarm in a planned stop; empty: there is none. @param {Pick<import('../core/protocol-types.js').StandingAlarm, 'planned_stop'>} alarm */
+export const markWords = ({ planned_stop }) => (planned_stop ? 'planned stop' : '');
 
 /**
  * What the snackbar tells: what is wrong now; of what is over, what it was.
@@ -30,10 +33,11 @@ export function dialogWords(alarm) {
   const trip = alarm.trip_text && alarm.trip_text !== alarm.text ? `: ${lowered(bare(alarm.trip_text), alarm.causes ?? [])}` : '';
   const began = `Began ${at}${trip}.`;
   const worst = worstWords(alarm);
-  if (!alarm.active) return ['It has returned to normal.', began, worst].filter(Boolean).join(' ');
+  const mark = alarm.planned_stop ? 'The car is in a planned stop.' : '';
+  if (!alarm.active) return ['It has returned to normal.', began, worst, mark].filter(Boolean).join(' ');
   const isBlind = alarm.verdict === 'unknown';
   const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.verdict === 'ok' ? `Returning to normal: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
-  return [cause, `Active for ${age(alarm.for_s)} s.`, began, worst, alarm.advice].filter(Boolean).join(' ');
+  return [cause, `Active for ${age(alarm.for_s)} s.`, began, worst, mark, alarm.advice].filter(Boolean).join(' ');
 }
 
 /** How bad it was, where that is not what is measured now. @param {import('../core/protocol-types.js').StandingAlarm} alarm */

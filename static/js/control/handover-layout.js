@@ -25,5 +25,5 @@ export function endWords({ left, name, lines }, part) {
 export function markOf({ kind, priority, title }) {
   if (kind === 'alarm') return priority === 'critical' ? 'crit' : priority === 'warning' ? 'warn' : title === 'No alarm is active' ? 'ok' : 'info';
   if (kind === 'departure') return title === 'Departure check signed' ? 'ok' : 'info';
-  return /** @type {const} */ ({ shelved: 'bell-off', limit: 'settings', rides: 'operator', driving: 'car', slow_down: 'slow', paused: 'pause' })[kind];
+  return /** @type {const} */ ({ shelved: 'bell-off', limit: 'settings', rides: 'operator', driving: 'car', slow_down: 'slow', paused: 'pause', planned_stop: 'clock' })[kind];
 }

@@ -37,6 +37,11 @@ export function age(seconds, digits = 1) {
   return duration(least);
 }
 
+/** How long something lasts, with its unit: "4.1 s", "12:05". @param {number} seconds */
+export function ageWords(seconds) {
+  return `${age(seconds)}${seconds < 59.95 ? ' s' : ''}`;
+}
+
 /**
  * "0:42", "12:05", "1:02:05".
  * @param {number} seconds

@@ -112,6 +112,16 @@ export interface BeginDepartureCommand {
   kind: "begin_departure";
 }
 
+/** The car stands on purpose: its alarms are marked, and only critical ones sound. It ends by itself once the car moves. */
+export interface BeginPlannedStopCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "planned_stop";
+  /** why it stands; another one replaces it */
+  reason: "parked" | "workshop" | "charging" | "set_up";
+}
+
 /** The recording that is shown beside the one that the page replays, at its own moment. */
 export interface Beside {
   kind: "beside";
@@ -139,7 +149,7 @@ export interface CarAlarm {
   state: AlarmState;
   active: boolean;
   raised_ms: number;
-  /** none while it is silenced */
+  /** none while it is silenced, or makes none because of a planned stop */
   sound: Sound;
   /** value against limit, in words */
   text?: string;
@@ -202,6 +212,8 @@ export interface CarSummary {
   people?: Array<PagePerson>;
   /** as `challenge` of a state */
   challenge?: string;
+  /** why it stands on purpose; null: no planned stop */
+  planned_stop?: "parked" | "workshop" | "charging" | "set_up" | null;
 }
 
 /** All cars of a server that watches several: twice a second, and at once when the alarms of one change. */
@@ -702,6 +714,14 @@ export interface EndOfferCommand {
   kind: "end_offer";
 }
 
+/** Ends the planned stop. */
+export interface EndPlannedStopCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "end_planned_stop";
+}
+
 /** Events of the log, at most 100. */
 export interface Events {
   kind: "events";
@@ -797,7 +817,7 @@ export interface HandedOver {
 /** One thing that stands, to be read back. */
 export interface HandoverLine {
   key: string;
-  kind: "alarm" | "shelved" | "limit" | "rides" | "driving" | "departure" | "slow_down" | "paused";
+  kind: "alarm" | "shelved" | "limit" | "rides" | "driving" | "departure" | "slow_down" | "paused" | "planned_stop";
   title: string;
   text: string;
   /** of an alarm */
@@ -1065,8 +1085,10 @@ export interface LogEvent {
   recording?: string;
   /** the phone that was chosen */
   phone?: string | null;
-  /** when the pause began */
+  /** when the pause or the planned stop began */
   since_ms?: number;
+  /** of a planned stop */
+  reason?: "parked" | "workshop" | "charging" | "set_up";
   /** monitoring goes on after the server was started again: the drive is the same */
   resumes?: boolean;
   /** the mark's id */
@@ -1102,6 +1124,8 @@ export interface LogEvent {
   causes?: Array<string>;
   suppressed_by?: Array<string>;
   shelved_until_ms?: number | null;
+  /** it happened in a planned stop, for this reason */
+  planned_stop?: "parked" | "workshop" | "charging" | "set_up";
   measured?: Quantity | null;
   limit?: Quantity | null;
   /** furthest beyond its limit since it was raised */
@@ -1396,7 +1420,7 @@ export interface PageHello {
   page?: string;
 }
 
-export type PageMessage = PageHello | Take | Have | Watch | OpenReplay | OpenBeside | CloseBeside | LeaveReplay | SeekReplay | PlayReplay | PauseReplay | SetReplayRate | SeekReplayAlarm | ConnectCommand | RetryCommand | DisconnectCommand | PauseCommand | ResumeCommand | RecordCommand | AcknowledgeCommand | SilenceCommand | ShelveCommand | UnshelveCommand | SetCommand | ImportCommand | PositionCommand | RideCommand | TakeControlCommand | TakeItemCommand | ReleaseItemCommand | OfferItemCommand | AnswerItemCommand | WithdrawItemCommand | OfferControlCommand | ReadBackCommand | AcceptControlCommand | EndOfferCommand | PlaceMarkCommand | RemoveMarkCommand | BeginDepartureCommand | SetDepartureItemCommand | SignDepartureCommand | ReopenDepartureCommand | SetDepartureListCommand | ArmCommand | DisarmCommand | DecelerateCommand | ReleaseCommand | VetoCommand | DescribeInterventionCommand | PresentWordCommand | AskOutcomeCommand;
+export type PageMessage = PageHello | Take | Have | Watch | OpenReplay | OpenBeside | CloseBeside | LeaveReplay | SeekReplay | PlayReplay | PauseReplay | SetReplayRate | SeekReplayAlarm | ConnectCommand | RetryCommand | DisconnectCommand | PauseCommand | ResumeCommand | RecordCommand | AcknowledgeCommand | SilenceCommand | ShelveCommand | UnshelveCommand | SetCommand | ImportCommand | PositionCommand | RideCommand | TakeControlCommand | TakeItemCommand | ReleaseItemCommand | OfferItemCommand | AnswerItemCommand | WithdrawItemCommand | OfferControlCommand | ReadBackCommand | AcceptControlCommand | EndOfferCommand | PlaceMarkCommand | RemoveMarkCommand | BeginDepartureCommand | SetDepartureItemCommand | SignDepartureCommand | ReopenDepartureCommand | SetDepartureListCommand | ArmCommand | DisarmCommand | DecelerateCommand | ReleaseCommand | VetoCommand | DescribeInterventionCommand | BeginPlannedStopCommand | EndPlannedStopCommand | PresentWordCommand | AskOutcomeCommand;
 
 /** An operator's page that announces the alarms of this car. */
 export interface PagePerson {
@@ -1556,6 +1580,15 @@ export interface PlaceMarkCommand {
   age_ms?: number | null;
   category?: string | null;
   words?: string | null;
+}
+
+/** The car stands on purpose: its alarms are marked. */
+export interface PlannedStopState {
+  reason: "parked" | "workshop" | "charging" | "set_up";
+  by: string | null;
+  since_ms: number;
+  /** false: it does not end by itself until the speed is known */
+  is_speed_known: boolean;
 }
 
 /** Goes on; from the beginning where it stands at the end. */
@@ -2099,6 +2132,8 @@ export interface SessionState {
   paused: boolean;
   paused_by: string | null;
   paused_for_s: number;
+  /** null: there is none; not from older agents */
+  planned_stop?: PlannedStopState | null;
   /** what was active when the server ended, while no car is monitored yet */
   held: HeldState | null;
   /** distance driven since connecting, from the car's positions */
@@ -2365,7 +2400,10 @@ export interface StandingAlarm {
   priority: Priority;
   /** where it is shown now */
   place: Place;
+  /** none: it makes no sound because of a planned stop */
   sound: Sound;
+  /** the car stands on purpose; not from older agents */
+  planned_stop?: boolean;
   state: AlarmState;
   active: boolean;
   /** it stays until it is acknowledged, although its condition has gone */

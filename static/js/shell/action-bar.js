@@ -26,6 +26,9 @@ export function mount(root, store, router) {
       const answer = await store.ask(isPaused ? 'resume' : 'pause');
       if (!answer.ok) router.say(answer.reason ?? 'Refused.', isPaused ? 'Not resumed' : 'Not paused');
     }),
+    listen(field(document, 'planned-stop'), 'click', () => {
+      import('../alarms/planned-stop.js').then(({ openPlannedStop }) => openPlannedStop(store, router.say)).catch(() => router.say('This part of the page could not be loaded from the server. Try again.', 'Not opened'));
+    }),
     store.on('draw', draw),
     mountLedge(root, store),
   ];

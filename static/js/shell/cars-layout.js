@@ -127,9 +127,9 @@ const KIND = /** @type {const} */ ({ critical: 'crit', warning: 'warn', advisory
  * @param {number} for_s
  * @returns {Pick<CarRow, 'rank' | 'needs' | 'icon' | 'kind' | 'isFilled' | 'text'>}
  */
-function stateOf({ phase, paused, waiting }, worst, for_s) {
+function stateOf({ phase, paused, planned_stop, waiting }, worst, for_s) {
   if (!worst) {
-    if (phase === 'monitoring') return { rank: paused ? 15 : 10, needs: false, icon: paused ? 'unknown' : 'ok', kind: '', isFilled: false, text: paused ? 'Paused: no alarm is raised' : 'No alarm' };
+    if (phase === 'monitoring') return { rank: paused ? 15 : 10, needs: false, icon: paused ? 'unknown' : 'ok', kind: '', isFilled: false, text: paused ? 'Paused: no alarm is raised' : `No alarm${planned_stop ? ', planned stop' : ''}` };
     const text = phase === 'idle' ? 'Not connected' : phase === 'lost' ? 'Connection lost' : phase === 'failed' ? 'Connection failed' : 'Connecting';
     return { rank: phase === 'lost' || phase === 'failed' ? 20 : 5, needs: false, icon: 'unknown', kind: '', isFilled: false, text };
   }

@@ -5,7 +5,7 @@ import { html, icon, setAttribute, setIcon, setText, setWords, show } from '../c
 import { areAlarmsInSight } from './layout.js';
 import { Meant } from '../core/meant.js';
 import { openShelve } from '../alarms/shelve.js';
-import { snackWords } from '../alarms/standing.js';
+import { markWords, snackWords } from '../alarms/standing.js';
 
 /**
  * @param {HTMLElement} root
@@ -45,7 +45,7 @@ export function mount(root, store, say) {
     setAttribute(bar, 'data-priority', shown.priority);
     setIcon(mark, shown.priority === 'advisory' ? 'info' : 'warn');
     setWords(title, waiting.length > 1 ? `${shown.title} (${waiting.length} alarms)` : shown.title);
-    setWords(text, snackWords(shown));
+    setWords(text, [snackWords(shown), markWords(shown)].filter(Boolean).join(' · '));
     show(shelve, shown.active && shown.priority !== 'critical' && shown.actions.includes('shelve'));
     setText(acknowledge, 'Acknowledge');
   }

@@ -24,7 +24,7 @@ from server.recording.drive.departure import Departure
 from server.recording.export.outcome import ExportRefused
 from server.recording.marks.media import MediaName
 from server.recording.read.read import open_recording
-from tests.server.recording.drive.story import EVIL, PHOTO, recorded
+from tests.server.recording.drive.story import EVIL, PHOTO, logged, recorded
 from tests.server.recording.drive.test_facts import BEGIN_MS
 
 
@@ -92,6 +92,35 @@ def test_json_and_csv_say_the_same(folder: Path) -> None:
     rows = list(csv.reader(io.StringIO((folder / "report.csv").read_text(encoding="utf-8"), newline="")))
     assert {len(row) for row in rows} == {8}
     assert ["mark", "2023-11-14T22:13:53.330000Z", "", "object", EVIL, "", "A. K. (Pixel)", "m1"] in rows
+
+
+def test_a_planned_stop_is_in_it_with_its_times_its_reason_and_who(tmp_path: Path) -> None:
+    own = [
+        logged(10.0, "planned_stop", reason="workshop", by=EVIL),
+        logged(12.0, "raised", "gps_drift", text="0.4 m", state="UNACKED", planned_stop="workshop"),
+        logged(70.0, "planned_stop_ended", reason="workshop", text="The planned stop ended.", by="M. R. (Tablet)"),
+        logged(100.0, "planned_stop", reason="parked", by="M. R. (Tablet)"),
+    ]
+    with open_recording([recorded(tmp_path, own)]) as recording:
+        write_drive_page(recording, tmp_path / "page.html", name="drive")
+        write_report_csv(recording, tmp_path / "report.csv", name="drive")
+    text = (tmp_path / "page.html").read_text()
+    assert EVIL not in text
+    words = " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
+    ended = "The planned stop ended. By M. R. (Tablet)."
+    for said in (
+        f"22:13:30 In the workshop, by {EVIL} {ended} 60.0 s",
+        "22:15:00 Parked, by M. R. (Tablet) it was in force to the end 20.0 s",
+        "planned stop · 0.4 m",
+    ):
+        assert " ".join(said.split()) in words, said
+    rows = list(csv.reader(io.StringIO((tmp_path / "report.csv").read_text(encoding="utf-8"), newline="")))
+    stops = [row for row in rows if row[0] == "planned stop"]
+    assert [row[3:] for row in stops] == [
+        ["in the workshop", "", "", EVIL, ended],
+        ["parked", "", "", "M. R. (Tablet)", ""],
+    ]
+    assert [row[2] for row in stops] == ["2023-11-14T22:14:30.000000Z", ""]
 
 
 def test_the_authority_gets_its_columns(folder: Path) -> None:

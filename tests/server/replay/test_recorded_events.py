@@ -142,6 +142,53 @@ def test_a_pause_then_is_a_pause_there(tmp_path: Path) -> None:
     playback.close()
 
 
+@pytest.mark.parametrize(
+    ("change", "more"),
+    [
+        ("acknowledged", {"state": "ACKED", "by": "Ann"}),
+        ("handed_over", {"state": "ACKED", "by": "Ann"}),
+        ("cleared", {"state": "RTN_UNACKED"}),
+        ("silenced", {"state": "UNACKED", "by": "Ann"}),
+        ("unacknowledged", {"state": "UNACKED", "by": "Ann"}),
+    ],
+)
+def test_an_alarm_that_stood_before_the_part_stands_in_it_as_its_newest_event_says(
+    change: str, more: dict[str, Any], tmp_path: Path
+) -> None:
+    before = event(-4.0, change, alarm="gps_drift", title="GPS drift", priority="warning", **more)
+    playback = opened(record(tmp_path / "a.mcap", [], standing=json.dumps([before])))
+    (found,) = (one for one in at(playback, 1.0)["alarms"] if one["id"] == "gps_drift")
+    assert found["state"] == more["state"]
+    assert found["acknowledged_by"] == ("Ann" if more["state"] == "ACKED" else None)
+    playback.close()
+
+
+def test_a_planned_stop_then_is_one_there(tmp_path: Path) -> None:
+    rows = [
+        (5.0, "alarms", event(5.0, "raised", alarm="gps_drift", title="GPS drift", priority="warning", sound="low")),
+        (6.0, "alarms", event(6.0, "planned_stop", alarm=None, by="Anna", reason="workshop")),
+        (9.0, "alarms", event(9.0, "planned_stop_ended", alarm=None, reason="workshop")),
+    ]
+    playback = opened(record(tmp_path / "a.mcap", rows))
+    stop = at(playback, 7.0)["session"]["planned_stop"]
+    assert (stop["reason"], stop["by"], stop["since_ms"]) == ("workshop", "Anna", BEGAN_MS + 6000)
+    drift = next(one for one in at(playback, 7.0)["alarms"] if one["id"] == "gps_drift")
+    assert (drift["planned_stop"], drift["sound"]) == (True, "none")
+    after = at(playback, 10.0)
+    assert after["session"]["planned_stop"] is None
+    assert [(one["planned_stop"], one["sound"]) for one in after["alarms"] if one["id"] == "gps_drift"] == [
+        (False, "low")
+    ]
+    playback.close()
+
+
+def test_a_planned_stop_that_began_before_the_part_is_in_force_in_it(tmp_path: Path) -> None:
+    began = event(-30.0, "planned_stop", alarm=None, by="Anna", reason="parked")
+    playback = opened(record(tmp_path / "a.mcap", [], standing=json.dumps([began])))
+    assert at(playback, 1.0)["session"]["planned_stop"]["since_ms"] == BEGAN_MS - 30_000
+    playback.close()
+
+
 def test_the_phone_is_where_it_was(tmp_path: Path) -> None:
     fix = {
         "lat_deg": 32.23, "lon_deg": -110.95, "accuracy_m": 5.0, "at_ms": 1.0, "age_s": 0.2,

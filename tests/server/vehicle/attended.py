@@ -38,7 +38,10 @@ class Dialled(CarSource):
 class Attended:
     """`faults`: the priorities of the alarms that are active. `clock`: its own, else one that the test moves on."""
 
-    def __init__(self, name: str = "ocelot", clock: Callable[[], float] | None = None) -> None:
+    def __init__(
+        self, name: str = "ocelot", clock: Callable[[], float] | None = None, *, scope: Scope = Scope.SERVER
+    ) -> None:
+        """`scope`: of its checks; those of the car's link sound."""
         self.now_s = 0.0
         self.name = name
         self.faults: set[Priority] = set()
@@ -51,21 +54,20 @@ class Attended:
             now=self._clock,
             wall_ms=lambda: WALL_MS + round(1000 * self._clock()),
             server=dict,  # type: ignore[arg-type]
-            checks=[self._check(priority) for priority in Priority],
+            checks=[self._check(priority, scope) for priority in Priority],
             open_source=Dialled(),
         )
         self.session.connect("ws://127.0.0.1:9090", by=None)
         self.bus.serve(name, self.session._commands.handle)
         self.bus.watch(ALL, lambda _: None)
 
-    def _check(self, priority: Priority) -> Check[Limits]:
+    def _check(self, priority: Priority, scope: Scope) -> Check[Limits]:
         def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
             return fault(self.say_what) if priority in self.faults else ok("fine")
 
-        spec = AlarmSpec(
-            title=f"Test {priority}", priority=priority, place=Place.LIST, sound=Sound.NONE, needs_ack=False
-        )
-        return Check(id=f"test_{priority}", label=priority, alarm=spec, limits=Limits, find=find, scope=Scope.SERVER)
+        sound = Sound.NONE if scope is Scope.SERVER else Sound.MEDIUM
+        spec = AlarmSpec(title=f"Test {priority}", priority=priority, place=Place.LIST, sound=sound, needs_ack=False)
+        return Check(id=f"test_{priority}", label=priority, alarm=spec, limits=Limits, find=find, scope=scope)
 
     def tick(self, seconds: float = 0.0, *, heard: tuple[Mapping[str, Any], ...] = ()) -> None:
         """Time passes, a tick every 50 ms; the pages in `heard` report once a second."""

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from monitor.alarm import AlarmState
 from monitor.alarm_spec import Priority
-from tests.server.vehicle.attended import ANN, BEN, PROGRAM, SEEN, Attended
+from monitor.restoring import restore
+from server.vehicle import handover_lines
+from server.vehicle.restore import recall
+from tests.server.vehicle.attended import ANN, BEN, PROGRAM, SEEN, WALL_MS, Attended
 
 AK = {"person": {"name": "A. K.", "role": "operator", "device": "dev-a"}}
 MR = {"person": {"name": "M. R.", "role": "safety_driver"}}
@@ -198,3 +203,109 @@ async def test_an_offer_is_declined_or_taken_back() -> None:
 async def test_a_program_hands_nothing_over() -> None:
     car = Attended()
     assert "Only a page" in await car.refused(PROGRAM, "offer_control", to="page-b")
+
+
+def changes(car: Attended) -> list[tuple[str, str, str | None, bool]]:
+    """Alarm, change, by whom, announced: what a hand-over made of the alarms."""
+    found = reversed(car.bus.past_events("ocelot", limit=200))
+    kinds = ("handed_over", "unacknowledged")
+    return [(one["alarm"], one["change"], one["by"], one["announces"]) for one in found if one["change"] in kinds]
+
+
+async def handed_over(shift: Shift) -> None:
+    await shift.begin()
+    await shift.read_all()
+    assert (await shift.accept())["ok"] is True
+
+
+async def test_who_takes_over_owns_what_they_read_back() -> None:
+    shift = Shift()
+    await shift.seen()
+    car = shift.car
+    car.faults = {Priority.WARNING, Priority.ADVISORY}
+    car.tick(0.5)
+    await car.obeyed(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
+    before = car.session.frame()["alarms"][0]
+    await handed_over(shift)
+    after = {one["id"]: one for one in car.session.frame()["alarms"]}
+    assert (after["test_warning"]["state"], after["test_warning"]["acknowledged_by"]) == ("ACKED", "M. R. (Ben)")
+    assert (after["test_warning"]["raised_ms"], after["test_warning"]["occurrence"]) == (before["raised_ms"], 1)
+    assert after["test_advisory"]["state"] == "UNACKED", "reading back acknowledges nothing"
+    assert changes(car) == [("test_warning", "handed_over", "M. R. (Ben)", False)]
+    (event,) = car.bus.past_events("ocelot", change="handed_over")
+    assert (event["person"], event["role"], event["state"]) == ("M. R.", "safety_driver", "ACKED")
+
+
+async def test_what_the_taker_has_not_read_back_waits_for_them() -> None:
+    """An alarm that is hidden by another one is no line of the list."""
+    shift = Shift()
+    await shift.seen()
+    car = shift.car
+    car.faults = {Priority.WARNING}
+    car.tick(0.5)
+    await car.obeyed(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
+    alarms = car.session.judgement.monitor.alarms
+    alarms["test_warning"] = replace(alarms["test_warning"], suppressed_by=("another",))
+    await handed_over(shift)
+    assert alarms["test_warning"].acknowledged is False
+    assert changes(car) == [("test_warning", "unacknowledged", "M. R. (Ben)", False)]
+    car.tick(0.5)  # nothing hides it any more
+    (alarm,) = car.session.frame()["alarms"]
+    assert (alarm["state"], alarm["occurrence"], alarm["acknowledged_by"]) == ("UNACKED", 2, None)
+    assert "again meanwhile" in await car.refused(BEN | MR, "acknowledge", alarm="test_warning", occurrence=1)
+    await car.obeyed(BEN | MR, "acknowledge", alarm="test_warning", occurrence=2)
+
+
+async def test_what_the_taker_had_acknowledged_stays_as_it_is() -> None:
+    shift = Shift()
+    await shift.seen()
+    shift.car.faults = {Priority.WARNING}
+    shift.car.tick(0.5)
+    await shift.car.obeyed(BEN | MR, "acknowledge", alarm="test_warning", occurrence=1)
+    await handed_over(shift)
+    assert changes(shift.car) == []
+
+
+async def test_an_offer_that_is_declined_changes_no_owner() -> None:
+    shift = Shift()
+    await shift.seen()
+    shift.car.faults = {Priority.WARNING}
+    shift.car.tick(0.5)
+    await shift.car.obeyed(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
+    await shift.begin()
+    await shift.read_all()
+    await shift.car.obeyed(BEN | MR, "end_offer")
+    assert shift.car.session.frame()["alarms"][0]["acknowledged_by"] == "A. K. (Ann)"
+    assert changes(shift.car) == []
+
+
+async def test_the_owner_survives_a_restart() -> None:
+    shift = Shift()
+    await shift.seen()
+    car = shift.car
+    car.faults = {Priority.WARNING, Priority.ADVISORY}
+    car.tick(0.5)
+    for name in ("test_warning", "test_advisory"):
+        await car.obeyed(ANN | AK, "acknowledge", alarm=name, occurrence=1)
+    alarms = car.session.judgement.monitor.alarms
+    alarms["test_advisory"] = replace(alarms["test_advisory"], suppressed_by=("another",))
+    await handed_over(shift)
+    past = recall(car.bus, "ocelot", now_s=car.now_s, wall_ms=WALL_MS + round(car.now_s * 1000))
+    found = restore({}, past.transitions)
+    assert (found["test_warning"].state, found["test_warning"].acknowledged_by) == (AlarmState.ACKED, "M. R. (Ben)")
+    assert (found["test_advisory"].acknowledged, found["test_advisory"].occurrence) == (False, 2)
+
+
+async def test_an_alarm_that_is_one_of_many_in_a_line_was_not_seen_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(handover_lines, "MOST_ALARMS", 1)
+    shift = Shift()
+    await shift.seen()
+    shift.car.faults = {Priority.WARNING, Priority.ADVISORY}
+    shift.car.tick(0.5)
+    for name in ("test_warning", "test_advisory"):
+        await shift.car.obeyed(ANN | AK, "acknowledge", alarm=name, occurrence=1)
+    await handed_over(shift)
+    assert changes(shift.car) == [
+        ("test_warning", "handed_over", "M. R. (Ben)", False),
+        ("test_advisory", "unacknowledged", "M. R. (Ben)", True),
+    ]

@@ -131,6 +131,29 @@ async def test_a_pause_outlasts_a_restart_and_is_said(bridge: RosBridge, tmp_pat
 
 
 @pytest.mark.virtual_time
+async def test_a_planned_stop_outlasts_a_restart_and_motion_ends_it(bridge: RosBridge, tmp_path: Path) -> None:
+    address, speeds = bridge.address, {"now": 0.0}  # type: ignore[attr-defined]
+    config = Config(vehicles=(Vehicle(name="car", address=address),), data=tmp_path)
+    async with driving(bridge, speed=lambda _: speeds["now"]):
+        async with serving(config) as server, viewer(server, name="Ann") as one:
+            await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
+            assert (await one.ask(kind="planned_stop", reason="charging"))["ok"]
+            began = (await one.state(lambda s: s["session"]["planned_stop"]))["session"]["planned_stop"]
+        async with serving(config) as server, viewer(server, have_event=0) as one:
+            state = await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
+            again = state["session"]["planned_stop"]
+            assert (again["reason"], again["by"], again["is_speed_known"]) == ("charging", "Ann", True)
+            assert abs(again["since_ms"] - began["since_ms"]) <= 2
+            said = "the planned stop goes on: charging or refuelling"
+            await one.until(lambda: any(said in event["text"] for event in one.events))
+            speeds["now"] = 1.0
+            await one.state(lambda s: s["session"]["planned_stop"] is None)
+        async with serving(config) as server, viewer(server) as one:
+            state = await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
+            assert state["session"]["planned_stop"] is None
+
+
+@pytest.mark.virtual_time
 @pytest.mark.parametrize("same", [True, False])
 async def test_alarms_of_a_car_typed_by_hand_wait_for_that_car(bridge: RosBridge, tmp_path: Path, same: bool) -> None:
     """Started without an address the server dials nobody; of another car's alarms nothing is shown, and they end."""

@@ -247,3 +247,41 @@ def test_percentiles_and_components() -> None:
     assert component_of("signal_stale.position") == "Position"
     assert component_of("diagnostics_error", ["level 2", "planner"]) == "planner"
     assert component_of("link_lost") == "Link"
+
+
+def test_planned_stops_and_the_alarms_in_them(tmp_path: Path) -> None:
+    stop = {"reason": "workshop", "by": "A. K. (Pixel)"}
+    again = {"reason": "workshop", "by": "A. K. (Pixel)", "since_ms": BEGIN_MS + 10_000}
+    log = log_of(
+        recorded(
+            tmp_path,
+            [
+                logged(10.0, "planned_stop", **stop),
+                logged(12.0, "raised", "gps_drift", state="UNACKED", planned_stop="workshop"),
+                logged(15.0, "planned_stop", **again),  # the server was started again
+                logged(20.0, "planned_stop", reason="charging", by="M. R. (Tablet)"),
+                logged(30.0, "planned_stop_ended", reason="charging", text="The planned stop ended: the car moves."),
+                logged(31.0, "planned_stop_ended", text=EVIL),  # of none that is known
+                logged(40.0, "raised", "speed_limit", state="UNACKED"),
+                logged(50.0, "planned_stop", reason="of another version", by=EVIL),
+            ],
+        )
+    )
+    found = [(one.reason, one.from_ms - BEGIN_MS, one.to_ms and one.to_ms - BEGIN_MS) for one in log.planned_stops]
+    assert found == [
+        ("in the workshop", 10_000, 20_000),
+        ("charging or refuelling", 20_000, 30_000),
+        ("parked", 50_000, None),
+    ]
+    assert (log.planned_stops[1].ended, log.planned_stops[1].ended_by) == ("The planned stop ended: the car moves.", "")
+    assert [(one.alarm, one.planned_stop) for one in log.alarms] == [("gps_drift", True), ("speed_limit", False)]
+
+
+def test_a_planned_stop_is_kept_in_what_is_known_before_the_recording(tmp_path: Path) -> None:
+    entries = EarlyEntries()
+    _, _, began = logged(-30.0, "planned_stop", reason="parked", by="A. K. (Pixel)")
+    entries.note("alarms", began)
+    (stop,) = log_of(recorded(tmp_path, [], standing=entries.standing()["standing"])).planned_stops
+    assert (stop.reason, stop.by, stop.from_ms, stop.to_ms) == ("parked", "A. K. (Pixel)", BEGIN_MS - 30_000, None)
+    entries.note("alarms", logged(-20.0, "planned_stop_ended", reason="parked")[2])
+    assert json.loads(entries.standing()["standing"]) == []
