@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from monitor.planned_stop import StopReason
-from server.protocol.command_base import Needs, OfCar
+from server.protocol.command_base import Needs, OfCar, Prompt
 from server.protocol.doc import doc
 
 
@@ -13,7 +13,7 @@ class OfPlannedStop(OfCar):
     """Of the planned stop of a car."""
 
 
-class BeginPlannedStop(OfPlannedStop):
+class BeginPlannedStop(OfPlannedStop, Prompt):
     """The car stands on purpose: its alarms are marked, and only critical ones sound. It ends by itself once the car
     moves."""
 
@@ -27,6 +27,7 @@ class EndPlannedStop(OfPlannedStop):
 
     needs: ClassVar[Needs] = "operator"  # alarms sound again by it
     http: ClassVar[str] = "End the planned stop"
+    has_body: ClassVar[bool] = False
     kind: Literal["end_planned_stop"]
 
 

@@ -115,6 +115,10 @@ export interface BeginDepartureCommand {
 /** The car stands on purpose: its alarms are marked, and only critical ones sound. It ends by itself once the car moves. */
 export interface BeginPlannedStopCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   /** the car that the page named to its operator; refused by any other */
   vehicle?: string | null;
   kind: "planned_stop";

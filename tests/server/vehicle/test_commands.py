@@ -79,7 +79,7 @@ def test_a_command_is_served_over_http_where_it_says_so() -> None:
 # What would slow or release the car, hide alarms, or move control, long after somebody pressed it.
 OF_MOMENT = {
     "connect", "disconnect", "pause", "silence", "shelve", "control", "accept_control", "arm", "disarm", "slow_down",
-    "release", "veto",
+    "release", "veto", "planned_stop",
 }  # fmt: skip
 
 
