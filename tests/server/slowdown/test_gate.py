@@ -84,6 +84,7 @@ VALUES: dict[str, Any] = {
     "awake": "ready",
     "number": 1,
     "trigger": "speed",
+    "reason": "parked",
     "to": "0123abcd",
     "accept": True,
     "of": "p1",
