@@ -202,6 +202,10 @@ class Subscriptions:
             self._subscribe_anew(topic)
             self._noted(f"{topic} is now received as JSON: {why} could not be read, and is not recorded.")
 
+    def note(self, text: str) -> None:
+        """Something about a topic that operators have to know."""
+        self._noted(text)
+
     def fell_silent(self) -> None:
         """The link was given up because the bridge did not answer."""
         is_suspected, left = self.table.fell_silent()
