@@ -21,5 +21,6 @@ def open_source(
     marks: Marks | None = None,
 ) -> LiveSource:
     """The `OpenSource` of a session."""
-    opened = FoxgloveSource if address.is_foxglove else RosLink
-    return opened(address, listener, now=now, take_unparsed=take_unparsed, marks=marks)
+    if address.is_foxglove:
+        return FoxgloveSource(address, listener, now=now, take_unparsed=take_unparsed, marks=marks)
+    return RosLink(address, listener, now=now, take_unparsed=take_unparsed, marks=marks)

@@ -120,8 +120,9 @@ def _read_text(payload: bytes) -> Received:
 
 
 def _server_info(operation: Mapping[str, Any]) -> ServerInfo:
+    name = operation.get("name")
     return ServerInfo(
-        name=short_text(operation.get("name") or "", 60),
+        name=short_text(name, 60) if isinstance(name, str) else "",
         capabilities=frozenset(_texts(operation.get("capabilities"))),
         encodings=_texts(operation.get("supportedEncodings")),
         session=str(operation.get("sessionId") or "")[:200],

@@ -3,7 +3,8 @@
 A server of foxglove-sdk answers a ping at once and keeps up to 1024 messages of all topics in a queue of their own: a
 message that comes after the answer may have waited a minute. But the queue is in order, and each message has the time
 at which it entered it, on the server's clock. That clock is bounded by the first message of each subscription, which
-entered after the subscription was sent. So each message shows that whatever comes from then on is no older.
+entered after the subscription was sent, and by each message after a moment in which none waited. So each message shows
+that whatever comes from then on is no older.
 
 Pure: time is an argument, in seconds of our own clock.
 """
@@ -26,7 +27,7 @@ class StreamMarks:
         self._ahead_s: dict[int, float] = {}  # subscription → the most that its times are ahead of our clock
         self._moved_s: dict[int, tuple[float, float]] = {}  # … since when, and how much it was corrected
         self._pongs: deque[tuple[float, float]] = deque(maxlen=MOST_PINGS)  # answered: sent, and when the answer came
-        self._message_s = -float("inf")
+        self._message_s = self._proved_s = -float("inf")  # the newest message, and the newest ping that lies behind
 
     def subscribed(self, subscription: int, at_s: float) -> None:
         self._asked_s[subscription] = at_s
@@ -47,6 +48,7 @@ class StreamMarks:
         newest_s = None
         while entered_s is not None and self._pongs and self._pongs[0][0] <= entered_s:
             newest_s, _ = self._pongs.popleft()
+        self._proved_s = max(self._proved_s, newest_s or self._proved_s)
         return newest_s
 
     def idle(self, at_s: float) -> float | None:
@@ -54,16 +56,19 @@ class StreamMarks:
         idle = [sent_s for sent_s, came_s in self._pongs if self._message_s <= came_s <= at_s - IDLE_S]
         while idle and self._pongs[0][0] < idle[-1]:
             self._pongs.popleft()
-        return self._pongs.popleft()[0] if idle else None
+        if not idle:
+            return None
+        self._proved_s, _ = self._pongs.popleft()
+        return self._proved_s
 
     def _entered_s(self, subscription: int, sent_s: float, at_s: float) -> float | None:
         """When a message entered the queue at the earliest; None: its time is of no use."""
         asked_s = self._asked_s.pop(subscription, None)
         if asked_s is not None:
             self._ahead_s[subscription], self._moved_s[subscription] = sent_s - asked_s, (at_s, 0.0)
-        ahead_s = self._ahead_s.get(subscription)
-        if ahead_s is None:
+        if subscription not in self._ahead_s:
             return None
+        ahead_s = self._ahead_s[subscription] = min(self._ahead_s[subscription], sent_s - self._proved_s)
         future_s = sent_s - ahead_s - at_s
         if future_s > 0.0:  # the clocks drift; a kept sample or a played time is no clock
             since_s, moved_s = self._moved_s[subscription]

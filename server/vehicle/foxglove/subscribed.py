@@ -13,7 +13,7 @@ QUIET_S = 2.0  # without a message for so long, a topic may be subscribed to ane
 
 
 class Subscribed:
-    """Over all openings; the table is kept. `send(frame)` sends now; `sent(topic, number)` goes before a subscription."""
+    """Over all openings; the table is kept. `send(frame)` sends now; `sent(topic, number)` goes before each."""
 
     def __init__(self, send: Callable[[bytes], None], sent: Callable[[str, int], None]) -> None:
         self._send = send

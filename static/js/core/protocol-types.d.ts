@@ -283,7 +283,7 @@ export interface ComponentState {
 export interface ConnectCommand {
   id?: string | null;
   kind: "connect";
-  /** host, host:port, ws:// or wss://; empty: the car that was configured */
+  /** host, host:port, ws://, wss:// or foxglove://; empty: the car that was configured */
   address?: string;
 }
 

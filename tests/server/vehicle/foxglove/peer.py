@@ -13,7 +13,8 @@ from foxglove.websocket import Capability, Client, ClientChannel, ServerListener
 from server.judge.message import RosVersion
 from server.recording.read.schemas import TypeBook
 
-ODOMETRY, FIX, SCAN, TWIST = "nav_msgs/Odometry", "sensor_msgs/NavSatFix", "sensor_msgs/LaserScan", "geometry_msgs/Twist"
+ODOMETRY, FIX = "nav_msgs/Odometry", "sensor_msgs/NavSatFix"
+SCAN, TWIST = "sensor_msgs/LaserScan", "geometry_msgs/Twist"
 ZEROS_9, ZEROS_36 = [0.0] * 9, [0.0] * 36
 XYZ = {"x": 0.0, "y": 0.0, "z": 0.0}
 
