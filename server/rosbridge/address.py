@@ -30,7 +30,7 @@ _ISATAP = (0x00005EFE, 0x02005EFE)
 
 _NETLOC = re.compile(r"(\[[^\[\]]*\]|[^\[\]:]*)(:[^:]*)?\Z")
 _RUN_ON = re.compile(r"^\[[^\]/?#]*\][^:/?#]")  # a bracket and then no colon
-_FEW_SLASHES = re.compile(r"(?i)(wss?):/?(?=[^/\d]|\d+\.)")
+_FEW_SLASHES = re.compile(r"(?i)(wss?|foxglove(?:\+tls)?):/?(?=[^/\d]|\d+\.)")
 _LOGIN = re.compile(r"(^\s*|//)[^/?#]*@")
 _QUERY = "/%:@!$&'()*+,;=~?"
 _EXAMPLE = "Type a host and a port, such as 192.168.4.1:9090."

@@ -179,7 +179,7 @@ class Connection:
         self.prove()
         log.info("bridge status: vehicle=%s level=%s text=%s", self._name, level, text)
         if level == NOTE:
-            self.subscriptions.note(text)
+            self.subscriptions.noted(text)
         elif level == "error":
             self.subscriptions.bridge_complains(text)
 

@@ -19,9 +19,9 @@ from server.rosbridge.websocket import MAX_MESSAGE_BYTES, BridgeProtocol
 from server.system.clean_text import short_text
 from server.vehicle.foxglove import protocol
 from server.vehicle.foxglove.answers import Answers
+from server.vehicle.foxglove.delay import Delay
 from server.vehicle.foxglove.reader_table import ReaderTable
 from server.vehicle.foxglove.server_state import ServerState
-from server.vehicle.foxglove.stream_marks import StreamMarks
 from server.vehicle.foxglove.subscribed import Subscribed
 
 LAST_WORD_S = 0.2
@@ -51,7 +51,7 @@ class FoxgloveSource:
         self.server_software = ""
         self._listener = listener
         self._now = now
-        self._marks = marks
+        self._delay = Delay(marks, now)
         self._dialer = Dialer(address, self, protocols=protocol.SUBPROTOCOLS)
         self._socket: BridgeProtocol | None = None
         self._is_refused = False  # the newest socket speaks another protocol
@@ -59,15 +59,13 @@ class FoxgloveSource:
         self._calls = SafeCalls(address.shown)
         self._notify = self._calls.notify
         self._readers = ReaderTable(self._sync, self._note_once)
-        self._rows = Subscribed(self._send, self._subscription_sent)
+        self._rows = Subscribed(self._send, self._delay.subscribed)
         self._state = ServerState()
-        self._stream = StreamMarks()
 
     def _forget(self) -> None:
         """Another connection: nothing is known of it."""
         self._state.end()
         self._state = ServerState()
-        self._stream = StreamMarks()
         self._rows.closed()
 
     # -- for the session ---------------------------------------------------------------------------------------------
@@ -165,8 +163,7 @@ class FoxgloveSource:
     def received(self, socket: BridgeProtocol, size: int) -> None:
         if socket is self._socket:
             self.heard_s = self._now()
-            if self._marks is not None:
-                self._marks.took(size)
+            self._delay.took(size)
 
     def opened(self, socket: BridgeProtocol) -> None:
         self._is_refused = socket.websocket_protocol_in_use not in protocol.SUBPROTOCOLS
@@ -178,8 +175,7 @@ class FoxgloveSource:
         self.junk_count = 0
         socket.was_accepted = True
         self.heard_s = self._now()
-        if self._marks is not None:
-            self._marks.open(self._now())
+        self._delay.opened()
         self._notify(self._listener.link_opened)
 
     def closed(self, socket: BridgeProtocol) -> None:
@@ -191,20 +187,15 @@ class FoxgloveSource:
 
     def send_mark(self, socket: BridgeProtocol) -> None:
         sent_s = self._now()
-        is_followed = self._marks is not None and socket is self._socket
+        is_followed = self._delay.is_followed and socket is self._socket
         socket.send_mark(sent_s, is_followed=is_followed)
-        if self._marks is not None and is_followed:
-            self._marks.sent(sent_s)
-            self._answered(self._stream.idle(sent_s))
+        if is_followed:
+            self._delay.ping_sent(sent_s)
 
     def mark_answered(self, socket: BridgeProtocol, payload: bytes) -> None:
         sent_s = socket.take_mark(payload) if socket is self._socket else None
         if sent_s is not None:
-            self._stream.pong(sent_s, self._now())
-
-    def _answered(self, sent_s: float | None) -> None:
-        if sent_s is not None and self._marks is not None:
-            self._marks.answered(sent_s, self._now())
+            self._delay.pong(sent_s)
 
     def skipped(self, socket: BridgeProtocol, head: bytes, tail: bytes, size: int) -> None:
         if socket is self._socket:
@@ -256,21 +247,14 @@ class FoxgloveSource:
             self._rows.begin([one for one in self._state.offered.of(topic) if self._readers.is_ready(one)])
 
     def _end(self, topic: str) -> None:
-        for subscription in self._rows.end(topic):
-            self._stream.unsubscribed(subscription)
-
-    def _subscription_sent(self, topic: str, subscription: int) -> None:
-        self._stream.subscribed(subscription, self._now())
-        if self._marks is not None:
-            self._marks.subscribe(topic, 0)  # the marks stand behind what waits in the server
+        self._delay.ended(self._rows.end(topic))
 
     def _message(self, data: protocol.MessageData) -> None:
-        now_s = self._now()
-        self._answered(self._stream.message(data.subscription, data.sent_ns, now_s))
+        self._delay.message(data.subscription, data.sent_ns)
         channel = self._rows.channels.get(data.subscription)
         if channel is None:
             return  # of a subscription that was ended
-        self._rows.came(channel.topic, now_s)
+        self._rows.came(channel.topic, self._now())
         try:
             message = self._readers.read(channel, data.payload)
         except Undecodable as why:

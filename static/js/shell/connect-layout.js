@@ -85,7 +85,7 @@ export function dialled(typed) {
   const [, scheme = '', after = text] = /^(wss?|foxglove(?:\+tls)?):\/\/(.*)$/i.exec(text) ?? [];
   const isIpv6 = scheme === '' && isHost(`[${text}]`);
   const parts = /^(\[[\da-f:.]+\]|[\w.-]+)(?::(\d*))?([/?][^#]*)?(?:#.*)?$/i.exec(isIpv6 ? `[${text}]` : after);
-  if (!parts || (scheme === '' && /:\/\/|^wss?:\/?(?=[^/\d]|\d+\.)/i.test(text))) return '';
+  if (!parts || (scheme === '' && /:\/\/|^(?:wss?|foxglove(?:\+tls)?):\/?(?=[^/\d]|\d+\.)/i.test(text))) return '';
   const [, host = '', written = '', path = ''] = parts;
   if (!isHost(host)) return '';
   const dials = scheme.toLowerCase() || 'ws';
