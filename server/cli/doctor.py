@@ -37,7 +37,9 @@ ROS_SILENT = "DOES NOT ANSWER (get_time); after a restart of roscore restart ros
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("address", help="the car's rosbridge: host, host:port, ws:// or wss://; foxglove:// for a Foxglove server")
+    parser.add_argument(
+        "address", help="the car's rosbridge: host, host:port, ws:// or wss://; foxglove:// for a Foxglove server"
+    )
     parser.add_argument("--seconds", type=float, default=5.0, help="listening time (default 5)")
 
 

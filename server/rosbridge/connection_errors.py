@@ -169,7 +169,9 @@ def of_handshake(address: Address, reason: str, answer: bytes) -> Problem:
         return not_rosbridge(address, "It answers, but not as a WebSocket does.")
     if "timeout" in reason:
         return not_rosbridge(address, "It accepts the connection and then sends nothing.")
-    return not_rosbridge(address, f"It closes the connection at once; a secure one wants {address.scheme(secure=True)}://.")
+    return not_rosbridge(
+        address, f"It closes the connection at once; a secure one wants {address.scheme(secure=True)}://."
+    )
 
 
 def closed_by_bridge(address: Address, why: str) -> Problem:

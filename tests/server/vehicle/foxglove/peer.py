@@ -145,5 +145,3 @@ def peer(capabilities: Sequence[Capability] = (), encodings: Sequence[str] | Non
         yield one
     finally:
         one.stop()
-
-

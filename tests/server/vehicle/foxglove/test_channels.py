@@ -14,9 +14,7 @@ from server.vehicle.foxglove.channels import UNKNOWN_NODE, Offered
 from server.vehicle.foxglove.protocol import Channel, GraphUpdate
 from server.vehicle.foxglove.subscribed import QUIET_S, Subscribed
 
-ODOM = Channel(
-    id=1, topic="/odom", encoding="cdr", type="nav_msgs/msg/Odometry", schema="…", schema_encoding="ros2msg"
-)
+ODOM = Channel(id=1, topic="/odom", encoding="cdr", type="nav_msgs/msg/Odometry", schema="…", schema_encoding="ros2msg")
 TEXT = Channel(
     id=2, topic="/a", encoding="ros1", type="std_msgs/String", schema="string data\n", schema_encoding="ros1msg"
 )

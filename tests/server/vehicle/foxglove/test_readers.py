@@ -19,9 +19,7 @@ MESSAGES = {ODOMETRY: lambda version: odometry(version, 4.2, STAMP_NS), FIX: lam
 
 
 def channel(type: str, encoding: str, schema_encoding: str = "", schema: str = "") -> Channel:
-    return Channel(
-        id=1, topic="/a", encoding=encoding, type=type, schema=schema, schema_encoding=schema_encoding
-    )
+    return Channel(id=1, topic="/a", encoding=encoding, type=type, schema=schema, schema_encoding=schema_encoding)
 
 
 def plain(value: Any) -> Any:

@@ -332,7 +332,9 @@ async def test_a_session_judges_and_records_the_car(tmp_path: Path, version: Any
     assert {topic for topic, _, _ in rows} == set(types)
     speeds = [message["twist"]["twist"]["linear"]["x"] for topic, _, message in rows if topic == "/odom"]
     assert [speed for speed in speeds if speed != 4.2] == SPEEDS  # each message, once, in order
-    assert {type for topic, type, _ in rows if topic == "/scan"} == {SCAN if version == 1 else SCAN.replace("/", "/msg/")}
+    assert {type for topic, type, _ in rows if topic == "/scan"} == {
+        SCAN if version == 1 else SCAN.replace("/", "/msg/")
+    }
 
 
 @pytest.mark.parametrize(
