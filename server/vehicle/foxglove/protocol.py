@@ -130,7 +130,7 @@ def _server_info(operation: Mapping[str, Any]) -> ServerInfo:
 
 
 def _status(operation: Mapping[str, Any]) -> Status:
-    level = operation.get("level")
+    level: Any = operation.get("level")
     is_known = type(level) is int and 0 <= level < len(STATUS_LEVELS)
     return Status(STATUS_LEVELS[level] if is_known else "info", short_text(operation.get("message"), 500))
 
@@ -147,7 +147,7 @@ def _advertise(operation: Mapping[str, Any]) -> Advertise:
 def _channel(row: Any) -> Channel | None:
     if not isinstance(row, dict) or not _is_id(row.get("id")):
         return None
-    texts = [row.get(name) for name in ("topic", "encoding", "schemaName")]
+    texts: list[Any] = [row.get(name) for name in ("topic", "encoding", "schemaName")]
     schema, schema_encoding = row.get("schema") or "", row.get("schemaEncoding") or ""
     if not all(isinstance(text, str) and len(text) <= MAX_NAME for text in (*texts, schema_encoding)):
         return None
