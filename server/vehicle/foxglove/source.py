@@ -43,7 +43,7 @@ class FoxgloveSource:
         take_unparsed: Callable[[RawFrame], bool] = lambda _: False,
         marks: Marks | None = None,
     ) -> None:
-        """`take_unparsed` is not called: reading a message takes less here than looking into it."""
+        """`take_unparsed` is not called: every message is read at once, by a compiled decoder."""
         self.address = address
         self.attempts = 0
         self.heard_s: float | None = None
