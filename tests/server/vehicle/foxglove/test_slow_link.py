@@ -1,4 +1,4 @@
-"""A slow link before a real server, which answers pings at once and keeps messages in a queue: no age is too young."""
+"""A slow link before a real server: no age is too young, wherever the messages wait."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Followed(Ear):
         self.ages.append((self._delay.receive(topic, time.monotonic()), true_s))
 
 
-async def test_no_age_is_too_young_while_messages_wait_in_the_server() -> None:
+async def test_no_age_is_too_young_on_a_slow_link() -> None:
     delay = TransportDelay()
     ear = Followed(delay)
     with peer() as car:
