@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
 from pydantic import BaseModel, ConfigDict, Field
 
 from monitor.alarm_spec import Action, AlarmSpec, Place, Priority, Sound
+from monitor.immutable import immutable
 from monitor.snapshot import NotFresh, Snapshot
 
 __all__ = [
@@ -47,7 +48,7 @@ class Verdict(StrEnum):
     UNKNOWN = "unknown"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@immutable
 class Quantity:
     """A number the operator reads, in SI."""
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
+
+from monitor.immutable import immutable
 
 Phase = Literal["idle", "connecting", "failed", "monitoring", "lost"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@immutable
 class LinkFacts:
     """The link at one moment; all times on the clock of `received_s`."""
 

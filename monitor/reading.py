@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
 from monitor.freeze_detection import Repeats
+from monitor.immutable import immutable
 
 AGEING_PERIODS = 3
 AGEING_FLOOR_S = 0.4  # three periods of a 75 Hz signal are one hiccup of Wi-Fi; a healthy link has its own 0.15 s
@@ -15,7 +16,7 @@ Freshness = Literal["fresh", "ageing", "stale"]
 T_co = TypeVar("T_co", covariant=True)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@immutable
 class Reading(Generic[T_co]):
     """The newest value of a signal, and how old it may grow. Times are on the receiver's monotonic clock."""
 

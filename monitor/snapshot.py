@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal, overload
 
 from monitor.compared import NOTHING_COMPARED, Compared
 from monitor.gps_watch import GpsWatch
 from monitor.heard_modes import HeardMode
+from monitor.immutable import immutable
 from monitor.link import LinkFacts
 from monitor.phones import NO_PHONE, PhoneView
 from monitor.rates import Rate
@@ -48,7 +49,7 @@ class NotFresh(Exception):
         self.short = short
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@immutable
 class Snapshot:
     """Everything known of a vehicle at one moment, immutable: any moment of a recording can be judged alone."""
 

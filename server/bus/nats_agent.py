@@ -29,6 +29,7 @@ WANTED_FOR_S = 2.5  # after the last pull a node is taken to look no longer
 MOST_PULLS = 256  # that wait at once, of all nodes
 MOST_ASKED = 64  # requests at once; a flood is refused
 Admit = Callable[[str, Mapping[str, Any]], Awaitable[Mapping[str, Any]]]  # of vehicle, message; raises NotAdmitted
+SAID_AGAIN_S = 60.0  # the same complaint is logged no more often
 FILTERS = frozenset({"before", "alarm", "change", "since_ms", "until_ms"})
 
 
@@ -89,7 +90,8 @@ class NatsAgent:
         self._published: dict[str, int] = {}  # the number of each vehicle's newest event that was published
         self._stops: list[Callable[[], None]] = []
         self._subscriptions: list[Subscription] = []
-        self.refused = 0  # what could not be read, or was too much
+        self.refused = 0  # what could not be read or sent, or was too much
+        self._said_s: dict[str, float] = {}  # when it was logged that something is too large
 
     def open(self) -> None:
         """Nothing: an agent does without a broker."""
@@ -155,14 +157,24 @@ class NatsAgent:
             frame = await looked.after(pull.have if pull.run == self._run else 0, wire.PULL_WAITS_S)
         finally:
             self._pulls -= 1
+        data = self._framed(came_s, frame)
+        if len(data) > wire.LARGEST:
+            self.refused += 1
+            self._log_too_large(f"frame {kind}", vehicle, len(data))
+            await asyncio.sleep(wire.PULL_WAITS_S)  # it would be asked for again at once
+            data = self._framed(came_s, None)
+        await self._respond(message, data)
+
+    def _framed(self, came_s: float, frame: Frame | None) -> bytes:
+        """A frame as it is sent now; None: that there is no newer one."""
         now_s = self._now()
         head = wire.FrameHead(run=self._run, number=0, now_s=now_s, waited_s=now_s - came_s)
         if frame is None:
-            return await self._respond(message, wire.encode_frame(head))
+            return wire.encode_frame(head)
         head = head.model_copy(
             update={"number": frame.number, "age_s": now_s - frame.put_s, "is_text": isinstance(frame.payload, str)}
         )
-        await self._respond(message, wire.encode_frame(head, frame.payload))
+        return wire.encode_frame(head, frame.payload)
 
     # -- events --------------------------------------------------------------------------------------------------------
 
@@ -172,6 +184,7 @@ class NatsAgent:
             events = await self._bus.events_after(vehicle, n, wire.PORTION)
             if not events or self._published[vehicle] != n:  # another task was faster
                 return
+            events = wire.fitting(events)
             self._published[vehicle] = events[-1]["n"]
             await self._publish(vehicle, "events", wire.Events(run=self._run, events=events))
 
@@ -222,8 +235,26 @@ class NatsAgent:
             found["refused"], found["is_unknown"] = str(why), why.outcome == "unknown"
         finally:
             self._asked -= 1
+        if events := found.get("events"):
+            found["events"] = wire.fitting(events)
+            found["is_cut"] = len(found["events"]) < len(events)
         body = wire.Answer(run=self._run, now_s=self._now(), last=self._bus.last_event(vehicle), **found)
-        await self._respond(message, wire.encode(body))
+        data = wire.encode(body)
+        if len(data) > wire.LARGEST:
+            self._log_too_large(f"answer to {asked.do}", vehicle, len(data))
+            refusal = f"the answer of {vehicle} is too large for the broker ({len(data) // 1000} kB)"
+            data = wire.encode(
+                wire.Answer(
+                    run=body.run, now_s=body.now_s, last=body.last, refused=refusal, is_unknown=asked.do == "command"
+                )
+            )
+        await self._respond(message, data)
+
+    def _log_too_large(self, what: str, vehicle: str, size: int) -> None:
+        now_s = self._now()
+        if now_s - self._said_s.get(what, -SAID_AGAIN_S) >= SAID_AGAIN_S:
+            self._said_s[what] = now_s
+            log.error("too_large_for_the_broker what=%s vehicle=%s bytes=%d", what, vehicle, size)
 
     async def _command(self, vehicle: str, asked: wire.Ask) -> Any:
         """Raises NotServed, also for a command that came too late or was meant for an earlier run."""

@@ -62,10 +62,13 @@ class Questions:
         client = self.client
         if client is None or not client.is_connected:  # else it would wait in the client and come late
             raise NotServed("the broker is not connected", cut="server-broker")
-        try:
-            message = await client.request(
-                wire.subject(vehicle, "ask"), wire.encode(asked), timeout=within_s, headers=wire.headers()
+        data = wire.encode(asked)
+        if len(data) > wire.LARGEST:  # the broker would end the connection, with every car of this node
+            raise NotServed(
+                f"the request is too large for the broker ({len(data) // 1000} kB)", outcome="not_delivered"
             )
+        try:
+            message = await client.request(wire.subject(vehicle, "ask"), data, timeout=within_s, headers=wire.headers())
             answer = wire.decode(wire.Answer, message.data)
         except NoRespondersError:
             raise NotServed(f"the agent of {vehicle} is not connected to the broker", cut="broker-agent") from None
@@ -99,6 +102,6 @@ class Questions:
             portion = min(limit - len(found), wire.PORTION)
             answer = await self.ask(vehicle, question(found[-1]["n"] if found else None, portion))
             found += answer.events
-            if len(answer.events) < portion:
+            if len(answer.events) < portion and not (answer.is_cut and answer.events):
                 break
         return found

@@ -16,6 +16,7 @@ times are of the agent's monotonic clock, in seconds.
 
 from __future__ import annotations
 
+import logging
 from typing import Annotated, Any, Literal, TypeVar
 
 import orjson
@@ -28,8 +29,12 @@ HERE_EVERY_S = 1.0
 PULL_WAITS_S = 1.0  # an agent without a newer frame answers after so long that there is none
 PORTION = 100  # events of one message: far below the broker's largest
 TRACE = "Catgraph-Trace"
-LARGEST = 900_000  # bytes of a body; the broker takes 1 MiB
+LARGEST = 900_000  # bytes of a body; the broker takes 1 MiB, with the headers
+HEAD = 10_000  # bytes of a body besides its events
 KINDS = frozenset({"state", "scan", SUMMARY})
+
+
+log = logging.getLogger("catgraph.bus")
 
 
 class Malformed(ValueError):
@@ -97,6 +102,7 @@ class Answer(Body):
     last: Number
     answer: dict[str, Any] = {}
     events: Annotated[list[dict[str, Any]], Field(max_length=PORTION)] = []
+    is_cut: bool = False  # there are more events than fit into one answer
     resumed: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = None  # as `Resumed` has them
     refused: str = ""  # not served; why, as a sentence
     is_unknown: bool = False  # a command that was not served may have been carried out
@@ -128,6 +134,22 @@ def decode(kind: type[B], data: bytes) -> B:
         return kind.model_validate(orjson.loads(data))
     except (orjson.JSONDecodeError, ValidationError) as error:
         raise Malformed(str(error)[:200]) from None
+
+
+def fitting(events: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """As many of the first events as fit into one body. One that alone does not fit is cut to its number and time, so
+    that those behind it arrive."""
+    size, found = HEAD, []
+    for event in events:
+        length = len(orjson.dumps(event)) + 1
+        if HEAD + length > LARGEST:
+            log.error("event_too_large_for_the_broker n=%s bytes=%d", event.get("n"), length)
+            event = {name: event[name] for name in ("n", "at_ms", "alarm", "change") if name in event}
+            length = len(orjson.dumps(event)) + 1
+        if (size := size + length) > LARGEST:
+            break
+        found.append(event)
+    return found
 
 
 def encode_frame(head: FrameHead, payload: str | bytes = b"") -> bytes:

@@ -53,13 +53,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--wait", action="store_true", help="start when a client has subscribed, so that it receives every message"
     )
     parser.add_argument("--stay", action="store_true", help="keep the bridge running after the end, until interrupted")
-    parser.add_argument(
-        "--like",
-        choices=("helpful", "real"),
-        default="helpful",
-        help="real: behave as the real rosbridge_suite, which says nothing of errors and loses what it "
-        "cannot encode (default: helpful)",
-    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -85,7 +78,7 @@ class _Replay:
     def __init__(self, recording: Recording, args: argparse.Namespace) -> None:
         self._recording = recording
         self._args = args
-        self._bridge = RosBridge(ros_version=recording.ros_version, node="/replay", like=args.like)
+        self._bridge = RosBridge(ros_version=recording.ros_version, node="/replay")
         self._names = _renamed(recording, dict(args.remap))
         self._report = Report(recording, self._bridge)
         self._subscribed = asyncio.Event()  # a client subscribed to something

@@ -49,13 +49,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the lap controller keeps publishing beside other commands: the last message wins",
     )
     parser.add_argument("--rate", type=float, default=1.0, metavar="X", help="speed relative to real time (default 1)")
-    parser.add_argument(
-        "--like",
-        choices=("helpful", "real"),
-        default="helpful",
-        help="real: behave as the real rosbridge_suite, which says nothing of errors and loses what it "
-        "cannot encode (default: helpful)",
-    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -85,7 +78,6 @@ async def _simulate(args: argparse.Namespace) -> None:
         scenarios=args.scenario,
         has_stopper=not args.no_obstacle_stopper,
         gives_way=not args.competing_controller,
-        like=args.like,
     )
     port = await service.start()
     host = f"[{args.host}]" if ":" in args.host else args.host

@@ -44,8 +44,10 @@ class LogbookWeek(TypedDict):
     from_ms: int
     drives: int
     modes_m: dict[str, float]
-    interventions: Annotated[float | None, doc("per 100 km; null: not known, or less than 100 m")]
-    alarms: Annotated[float | None, doc("the same")]
+    interventions: Annotated[
+        float | None, doc("per 100 km that the car drove by itself; null: not known, or less than 100 m of it")
+    ]
+    alarms: Annotated[float | None, doc("per 100 km of all; null: the same")]
     interventions_median: Annotated[float | None, doc("of this and the four weeks before, without a week of no drives")]
     alarms_median: float | None
 
@@ -58,7 +60,9 @@ class LogbookTotals(TypedDict):
     driven_s: float
     modes_m: dict[str, float]
     modes_s: dict[str, float]
-    interventions: Annotated[float | None, doc("per 100 km, over the drives that know their mode")]
+    interventions: Annotated[
+        float | None, doc("per 100 km that the car drove by itself, over the drives that know their mode")
+    ]
     alarms: Annotated[float | None, doc("per 100 km, over the drives with a log")]
     checks_missing: Annotated[int, doc("drives without a signed departure check")]
     checks_known: Annotated[int, doc("of so many drives")]

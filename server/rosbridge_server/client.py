@@ -10,19 +10,20 @@ from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 
+from server.judge.message import Json
 from server.judge.ros_names import BadName, canonical_name, canonical_type
 from server.rosbridge.message_bytes import Unencodable
 from server.rosbridge_server import fields
 from server.rosbridge_server.calls import Calls
-from server.rosbridge_server.completion import TypeMismatch
 from server.rosbridge_server.connection import Connection
-from server.rosbridge_server.encoding import Encoding, Outgoing, json_frame
+from server.rosbridge_server.encoding import Encoding, json_frames
 from server.rosbridge_server.fields import Refused
 from server.rosbridge_server.fragments import Fragments
 from server.rosbridge_server.graph import Topic
 from server.rosbridge_server.interface import ClientHost
 from server.rosbridge_server.outbox import Outbox
 from server.rosbridge_server.provider import Providers
+from server.rosbridge_server.publications import Publications
 from server.rosbridge_server.subscription import Subscription, SubscriptionRequest
 
 _log = logging.getLogger("catgraph.bridge")
@@ -30,7 +31,6 @@ _log = logging.getLogger("catgraph.bridge")
 LEVELS = ("info", "warning", "error", "none")
 MOST_SUBSCRIPTIONS = 1_000
 MOST_WISHES = 100  # subscribe operations for one topic under different ids
-MOST_ADVERTISED = 1_000
 MOST_OFFERED = 100  # services
 BACKLOG_BYTES = 16_000_000  # messages that may wait for one client
 REPLY_BYTES = 1_000_000  # answers that may wait before we stop listening to the client
@@ -51,17 +51,18 @@ class Client:
         self._fragments = Fragments(limit_bytes=bridge.max_message_bytes)
         self._level = "error"
         self._subscriptions: dict[str, Subscription] = {}
-        self._advertised: dict[str, set[object]] = {}  # topic → ids under which it was advertised
-        self._calls = Calls(bridge.services, self._outbox.reply)
-        self._providers = Providers(bridge.services, lambda request: self._outbox.reply(json_frame(request)))
+        self._fragment_size = bridge.fragment_size
+        self._calls = Calls(bridge, self._reply)
+        self._providers = Providers(bridge.services, self._reply)
+        self._publications = Publications(bridge, self.say)
         self._may_listen = asyncio.Event()
         self._may_listen.set()
         self._operations: dict[str, Callable[[dict[str, Any], object], None]] = {
             "subscribe": self._subscribe,
             "unsubscribe": self._unsubscribe,
-            "advertise": self._advertise,
-            "unadvertise": self._unadvertise,
-            "publish": self._publish,
+            "advertise": self._publications.advertise,
+            "unadvertise": self._publications.unadvertise,
+            "publish": self._publications.publish,
             "call_service": self._calls.call,
             "advertise_service": self._advertise_service,
             "unadvertise_service": self._unadvertise_service,
@@ -91,7 +92,7 @@ class Client:
         except ConnectionClosed:
             pass
         finally:
-            self._leave()
+            self.leave()
 
     @property
     def is_drained(self) -> bool:
@@ -111,8 +112,9 @@ class Client:
             handler = self._operations.get(op)
             if handler is None:
                 raise Refused(_unknown(op, self._operations))
+            self._note_fragment_size(operation.get("fragment_size"))
             handler(operation, id)
-        except (Refused, BadName, TypeMismatch, Unencodable) as error:
+        except (Refused, BadName, Unencodable) as error:
             self.say("error", f"{op[:40]}: {error}" if op else str(error), id)
         except Exception:  # our own mistake must not cost the client its connection
             _log.exception("operation failed: op=%r", op[:40])
@@ -125,16 +127,27 @@ class Client:
         status: dict[str, Any] = {"op": "status", "level": level, "msg": text}
         if id is not None:
             status["id"] = id
-        self._outbox.reply(json_frame(status))
+        self._reply(status)
+
+    def _reply(self, message: Json) -> None:
+        self._outbox.reply(json_frames(message, self._fragment_size))
+
+    def _note_fragment_size(self, size: object) -> None:
+        """Of any operation, for all that is sent from now on."""
+        if type(size) is int and size > 0:
+            self._fragment_size = size
+            for subscription in self._subscriptions.values():
+                subscription.fragment_size = size
 
     def _subscribe(self, operation: dict[str, Any], id: object) -> None:
         spelling = fields.text(operation, "topic")
         wanted = fields.optional_text(operation, "type")
+        remarks: list[str] = []
         requested = SubscriptionRequest(
             type=None if wanted is None else self._bridge.message_type(wanted),
-            throttle_s=fields.whole_number(operation, "throttle_rate", 0) / 1000.0,
-            queue_length=fields.whole_number(operation, "queue_length", 0),
-            encoding=_encoding(fields.text(operation, "compression", "none")),
+            throttle_s=_count(operation, "throttle_rate", remarks) / 1000.0,
+            queue_length=_count(operation, "queue_length", remarks),
+            encoding=_encoding(fields.text(operation, "compression", "none"), remarks),
         )
         subscription = self._subscriptions.get(spelling)
         if subscription is None and len(self._subscriptions) >= MOST_SUBSCRIPTIONS:
@@ -150,17 +163,21 @@ class Client:
                 asyncio.get_running_loop(),
                 on_lost=lambda why: self.say("error", f"subscribe: {why}"),
             )
+            subscription.fragment_size = self._fragment_size
             self._subscriptions[spelling] = subscription
         elif id not in subscription.requested_by_id and len(subscription.requested_by_id) >= MOST_WISHES:
             raise Refused(f"a client may subscribe {MOST_WISHES} times to one topic")
         subscription.requested_by_id[id] = requested
         topic = self._bridge.graph.find_or_make(spelling, requested.type)
+        self._bridge.note_type(topic.name, topic.type)
         subscription.settle(topic.type)
         if subscription not in topic.subscribers:
             topic.subscribers[subscription] = self
         if topic.latched is not None:  # with each subscription, as of a real bridge
             subscription.offer(topic.latched)
         self._bridge.subscribed(topic.name)
+        for remark in remarks:
+            self.say("error", f"subscribe: {remark}", id)
         if topic.type is None:
             self.say("warning", f"subscribe: {topic.name} does not exist yet, and no type was given", id)
         self.say("info", f"subscribed to {topic.name}", id)
@@ -181,54 +198,6 @@ class Client:
         else:
             self._end(spelling)
         self.say("info", f"unsubscribed from {spelling[:100]}", id)
-
-    def _advertise(self, operation: dict[str, Any], id: object) -> None:
-        name = fields.text(operation, "topic")
-        type = self._bridge.message_type(fields.text(operation, "type"))
-        topic = self._bridge.graph.find(name)
-        if topic is not None and topic.type not in (None, type):
-            raise Refused(f"{topic.name} has the type {topic.type}, not {type}")
-        if len(self._advertised) >= MOST_ADVERTISED:
-            raise Refused(f"a client may advertise {MOST_ADVERTISED} topics")
-        topic = self._bridge.graph.find_or_make(name, type)
-        topic.publishers.add(self)
-        topic.latches |= operation.get("latch") is True
-        ids = self._advertised.setdefault(topic.name, set())
-        if len(ids) < MOST_WISHES:
-            ids.add(id)
-        self.say("info", f"advertised {topic.name}", id)
-
-    def _unadvertise(self, operation: dict[str, Any], id: object) -> None:
-        topic = self._bridge.graph.find(fields.text(operation, "topic"))
-        ids = None if topic is None else self._advertised.get(topic.name)
-        if topic is None or ids is None:
-            self.say("warning", "unadvertise: this topic was not advertised by this client", id)
-            return
-        ids.discard(id)
-        if id is None or not ids:
-            del self._advertised[topic.name]
-            topic.publishers.discard(self)
-            self._bridge.graph.tidy(topic)
-
-    def _publish(self, operation: dict[str, Any], id: object) -> None:
-        topic = self._bridge.graph.find(fields.text(operation, "topic"))
-        if topic is None or topic.type is None:
-            raise Refused("this topic has no type yet: advertise it first")
-        message = operation.get("msg", {})
-        if not isinstance(message, dict):
-            raise Refused("msg must be an object")
-        if topic.name not in self._advertised:
-            if len(self._advertised) >= MOST_ADVERTISED:
-                raise Refused(f"a client may publish to {MOST_ADVERTISED} topics")
-            self._advertised[topic.name] = {None}  # publishing makes a publisher, as in rosbridge
-            topic.publishers.add(self)
-        notes: list[str] = []
-        message = self._bridge.types.complete(topic.type, message, self._bridge.now(), notes)
-        for note in notes:
-            self.say("error", f"publish: {note}", id)
-        topic.distribute(Outgoing(self._bridge, topic.type, message))
-        for callback in self._bridge.on_publish:
-            callback(topic.name, topic.type, message)
 
     def _advertise_service(self, operation: dict[str, Any], id: object) -> None:
         name, type = fields.text(operation, "service"), fields.text(operation, "type")
@@ -279,28 +248,35 @@ class Client:
             topic.subscribers.pop(subscription, None)
             self._bridge.graph.tidy(topic)
 
-    def _leave(self) -> None:
+    def leave(self) -> None:
+        """The client is gone, and all that it subscribed to, advertised and offered ends."""
         self._connection.on_ready = self._connection.on_lost = None
         self._calls.close()
         self._providers.close()
         self._outbox.close()
         for spelling in list(self._subscriptions):
             self._end(spelling)
-        for name in self._advertised:
-            topic = self._bridge.graph.find(name)
-            if topic is not None:
-                topic.publishers.discard(self)
-                self._bridge.graph.tidy(topic)
+        self._publications.close()
 
 
-def _encoding(compression: str) -> Encoding:
+def _count(operation: dict[str, Any], name: str, remarks: list[str]) -> int:
+    """A number that rosbridge takes as 0 where it is below."""
+    value = operation.get(name)
+    if isinstance(value, int | float) and value < 0:
+        remarks.append(f"the field {name} must be a number, 0 or more: it is taken as 0")
+        return 0
+    return fields.whole_number(operation, name, 0)
+
+
+def _encoding(compression: str, remarks: list[str]) -> Encoding:
     match compression:
         case "none":
             return "json"
         case "cbor" | "cbor-raw" | "png":
             return compression
         case _:
-            raise Refused(f"compression {compression[:40]!r} is not offered here: none, cbor, cbor-raw or png")
+            remarks.append(f"compression {compression[:40]!r} is not offered here, but none, cbor, cbor-raw and png")
+            return "json"
 
 
 def _unknown(op: str, known: dict[str, Any]) -> str:

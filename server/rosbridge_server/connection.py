@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from websockets.asyncio.server import Server, ServerConnection
-from websockets.frames import Frame, Opcode
 from websockets.protocol import State
 from websockets.server import ServerProtocol
 
@@ -20,7 +19,6 @@ KEEPALIVE_S = 30  # TCP's own probe finds peers that vanished; rosbridge itself 
 class Admission(Protocol):
     """The listener, as a connection that came from it needs it."""
 
-    close_answer: Callable[[bytes], bytes] | None
     is_frozen: bool
 
     def admit(self, connection: Connection, /) -> bool: ...
@@ -34,8 +32,6 @@ class Connection(ServerConnection):
     def __init__(self, listener: Admission, protocol: ServerProtocol, server: Server, **options: Any) -> None:
         super().__init__(protocol, server, **options)
         self._listener = listener
-        if listener.close_answer is not None:
-            _answer_close(protocol, listener.close_answer)
         self.awake = asyncio.Event()  # not frozen
         self.awake.set()
         self._unread = bytearray()
@@ -62,11 +58,6 @@ class Connection(ServerConnection):
     def write(self, frame: bytes) -> None:
         """Writes one whole frame. Frames are never split here, so they cannot fall into the middle of another."""
         self.transport.write(frame)
-
-    def close_without_code(self) -> None:
-        """Ends the connection with a closing frame that is empty: the peer sees 1005."""
-        self.protocol.send_close()
-        self.send_data()
 
     def freeze(self) -> None:
         self.awake.clear()
@@ -128,17 +119,6 @@ class Connection(ServerConnection):
             self._deadline = self.loop.call_later(HANDSHAKE_S, self._end_handshake)
         else:
             self.transport.abort()
-
-
-def _answer_close(protocol: ServerProtocol, answer: Callable[[bytes], bytes]) -> None:
-    """Makes the protocol answer a closing frame with another one than it got."""
-    send = protocol.send_frame
-
-    def send_frame(frame: Frame) -> None:
-        is_answer = frame.opcode is Opcode.CLOSE and protocol.close_rcvd is not None and protocol.close_sent is None
-        send(Frame(Opcode.CLOSE, answer(bytes(frame.data))) if is_answer else frame)
-
-    protocol.send_frame = send_frame  # type: ignore[method-assign]
 
 
 def _keep_alive(sock: socket.socket) -> None:

@@ -9,11 +9,11 @@ import orjson
 
 from server.judge.message import Json
 from server.rosbridge.message_bytes import cbor_bytes, json_bytes
-from server.rosbridge_server.completion import stamp
-from server.rosbridge_server.real.raw import raw_bytes
-from server.rosbridge_server.real.shape import Lost
-from server.rosbridge_server.real.text import png
+from server.rosbridge_server.raw import raw_bytes
+from server.rosbridge_server.shape import Lost
+from server.rosbridge_server.text import fragments, png
 from server.rosbridge_server.types import RosContext
+from server.rosbridge_server.values import stamp
 
 Encoding = Literal["json", "cbor", "cbor-raw", "png"]
 
@@ -32,19 +32,20 @@ def frame(opcode: int, payload: bytes) -> bytes:
     return head + payload
 
 
-def text_frame(payload: bytes) -> bytes:
-    """A frame of ready-made text."""
-    return frame(_TEXT, payload)
+def text_frames(payload: bytes, fragment_size: int | None = None, id: object = None) -> bytes:
+    """The frame of a JSON text, or one after another those of its fragments of so many characters."""
+    if fragment_size is None or len(payload) <= fragment_size:
+        return frame(_TEXT, payload)
+    text = payload.decode()
+    if len(text) <= fragment_size:
+        return frame(_TEXT, payload)
+    pieces = fragments(text, fragment_size, 0 if id is None else id)
+    return b"".join(frame(_TEXT, json_bytes(piece)) for piece in pieces)
 
 
-def binary_frame(payload: bytes) -> bytes:
-    """A frame of ready-made bytes."""
-    return frame(_BINARY, payload)
-
-
-def json_frame(message: Json) -> bytes:
-    """A text frame of one JSON object; NaN and ±Inf become null."""
-    return frame(_TEXT, json_bytes(message))
+def json_frames(message: Json, fragment_size: int | None = None) -> bytes:
+    """The frame, or those of the fragments, of one JSON object; NaN and ±Inf become null."""
+    return text_frames(json_bytes(message), fragment_size, message.get("id"))
 
 
 class Outgoing:
@@ -58,24 +59,25 @@ class Outgoing:
         self._bridge = bridge
         self._message = message
         self._bodies: dict[Encoding, bytes] = {}
-        self._frames: dict[tuple[str, Encoding], bytes] = {}
+        self._frames: dict[tuple[str, Encoding, int | None], bytes] = {}
 
-    def frame(self, topic: str, encoding: Encoding) -> bytes:
+    def frames(self, topic: str, encoding: Encoding, fragment_size: int | None = None) -> bytes:
         """The WebSocket frame for clients which write the topic so ("chatter" and "/chatter" may both be in use).
 
+        Text that is longer than `fragment_size` becomes the frames of its fragments, one after another.
         Raises Unencodable, and Lost where the message is not of its type or that is not known: it has no raw bytes.
         """
-        key = (topic, encoding)
+        key = (topic, encoding, fragment_size)
         made = self._frames.get(key)
         if made is None:
-            made = self._frames[key] = self._make(topic, encoding)
+            made = self._frames[key] = self._make(topic, encoding, fragment_size)
         return made
 
-    def _make(self, topic: str, encoding: Encoding) -> bytes:
+    def _make(self, topic: str, encoding: Encoding, fragment_size: int | None) -> bytes:
         if encoding == "json":
-            return frame(_TEXT, self._as_text(topic))
+            return text_frames(self._as_text(topic), fragment_size)
         if encoding == "png":
-            return json_frame({"op": "png", "data": png(self._as_text(topic))})
+            return json_frames({"op": "png", "data": png(self._as_text(topic))}, fragment_size)
         # 0xa3: a map of three pairs, written by hand so that the body is encoded once for every spelling of the topic
         return frame(_BINARY, b"\xa3" + _CBOR_OP + _CBOR_TOPIC + cbor2.dumps(topic) + _CBOR_MSG + self._body(encoding))
 

@@ -18,7 +18,7 @@ class Subscriber(Protocol):
 
 
 class Owner(Protocol):
-    """The owner of a subscriber, who may publish too."""
+    """The owner of a subscriber."""
 
     def type_became(self, topic: Topic, subscription: Any, /) -> None: ...
 
@@ -31,7 +31,8 @@ class Topic:
     type: str | None  # canonical; None: only subscribed to, by clients that named no type
     latches: bool = False
     latched: Outgoing | None = None  # the newest message, for those who come later
-    publishers: set[Owner | str] = field(default_factory=set)
+    published: int = 0  # messages of clients: the seq of their headers in ROS 1
+    publishers: set[object] = field(default_factory=set)  # SOURCE and clients
     subscribers: dict[Subscriber, Owner] = field(default_factory=dict)
 
     def distribute(self, message: Outgoing) -> None:

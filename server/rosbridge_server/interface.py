@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, Protocol
+from typing import Protocol
 
 from server.judge.message import Json
-from server.rosbridge_server.graph import Graph, Topic
+from server.rosbridge_server.graph import Graph
 from server.rosbridge_server.outbox import Counters
-from server.rosbridge_server.real.options import RealOptions
 from server.rosbridge_server.services import Handler, Services
 from server.rosbridge_server.types import RosContext
-
-Like = Literal["helpful", "real"]
 
 
 class TypeSource(RosContext, Protocol):
@@ -21,36 +18,18 @@ class TypeSource(RosContext, Protocol):
     def advertised_types(self) -> set[str]: ...
 
 
-class TopicHost(TypeSource, Protocol):
-    """The topics, with the types they have and had."""
-
-    graph: Graph
-    down: str | None
-
-    def known_type(self, topic: str) -> str | None: ...
-
-    def note_type(self, topic: str, type: str | None) -> None: ...
-
-    def deliver(self, topic: Topic, type: str, message: Json, *, latches: bool = False) -> None: ...
-
-
 class ServiceHost(RosContext, Protocol):
-    """The services, with the nodes that offer them."""
+    """The services that can be called."""
 
     services: Services
-    dead_nodes: set[str]
-    down: str | None
 
 
-class RosapiHost(TypeSource, Protocol):
+class RosapiHost(TypeSource, ServiceHost, Protocol):
     """Everything that rosapi reports on."""
 
     node: str
     graph: Graph
-    services: Services
     parameters: dict[str, object]
-    like: Like
-    real: RealOptions
 
     def types_seen(self) -> dict[str, str]: ...
 
@@ -67,15 +46,17 @@ class RosapiHost(TypeSource, Protocol):
     ) -> None: ...
 
 
-class ClientHost(RosContext, Protocol):
-    """What serves a helpful client."""
+class ClientHost(ServiceHost, Protocol):
+    """What serves a client."""
 
     graph: Graph
-    services: Services
     counters: Counters
     max_message_bytes: int
+    fragment_size: int | None
     on_publish: list[Callable[[str, str, Json], None]]
 
     def message_type(self, name: str) -> str: ...
+
+    def note_type(self, topic: str, type: str | None) -> None: ...
 
     def subscribed(self, topic: str) -> None: ...

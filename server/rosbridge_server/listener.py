@@ -38,14 +38,10 @@ class Listener:
         *,
         max_clients: int,
         max_message_bytes: int,
-        server_header: str | None = None,
-        close_answer: Callable[[bytes], bytes] | None = None,
     ) -> None:
         self._serve_client = serve_client
         self._max_clients = max_clients
         self._max_message_bytes = max_message_bytes
-        self._server_header = server_header
-        self.close_answer = close_answer  # what a client's closing frame is answered; None: the same
         self._server: Server | None = None
         self._sockets: set[Connection] = set()
         self._clients = 0
@@ -74,7 +70,7 @@ class Listener:
                 max_size=self._max_message_bytes,
                 write_limit=WRITE_LIMIT,
                 process_request=self._reject,
-                server_header=self._server_header,
+                server_header=None,
                 logger=_quiet,
                 create_connection=cast("type[ServerConnection]", self._make_connection),
             )

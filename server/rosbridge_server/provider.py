@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 from collections.abc import Callable, Collection
 from typing import Any
 
@@ -16,27 +17,23 @@ class Providers:
     def __init__(self, services: Services, send: Callable[[Any], None]) -> None:
         self._services = services
         self._send = send
-        self._counts: dict[str, int] = {}  # requests, by the name of the service
-        self._waiting: dict[str, asyncio.Future[Json]] = {}
-
-    @property
-    def names(self) -> Collection[str]:
-        """The services that the client offers."""
-        return self._counts.keys()
+        self.names: set[str] = set()  # the services that the client offers
+        self._numbers = itertools.count(1)  # never again from 1: a late answer must not fit another call
+        self._waiting: dict[str, tuple[str, asyncio.Future[Json]]] = {}  # service and answer, by the id of the request
 
     def advertise(self, operation: dict[str, Any], id: object) -> None:
         name, type = operation["service"], operation["type"]
-        self._counts.setdefault(name, 0)
+        self.names.add(name)
         self._services.add(Service(name=name, type=type, handler=lambda args: self._ask(name, args)))
 
     def unadvertise(self, operation: dict[str, Any], id: object) -> None:
         name = operation["service"]
-        if self._counts.pop(name, None) is not None:
-            self._services.remove(name)
+        if name in self.names:
+            self._end([name], f"the service {name} was withdrawn")
 
     def respond(self, operation: dict[str, Any], id: object) -> bool:
         """Pass the client's answer on; False where no call waits for it."""
-        future = self._waiting.pop(operation["id"], None)
+        _, future = self._waiting.pop(operation["id"], (None, None))
         if future is None or future.done():
             return False
         if operation.get("result") is False:
@@ -47,21 +44,22 @@ class Providers:
 
     def close(self) -> None:
         """The client is gone: its services end, and whoever waits for one of them is told."""
-        for name in self._counts:
+        self._end(list(self.names), "the client that offers the service has gone")
+
+    def _end(self, names: Collection[str], why: str) -> None:
+        for name in names:
+            self.names.discard(name)
             self._services.remove(name)
-        self._counts.clear()
-        for future in self._waiting.values():
-            if not future.done():
-                future.set_exception(ServiceFailed("the client that offers the service has gone"))
-        self._waiting.clear()
+        for service, future in self._waiting.values():
+            if service in names and not future.done():
+                future.set_exception(ServiceFailed(why))
 
     async def _ask(self, name: str, args: Json) -> Json:
-        self._counts[name] = self._counts.get(name, 0) + 1
-        request = f"service_request:{name}:{self._counts[name]}"
+        request = f"service_request:{name}:{next(self._numbers)}"
         future: asyncio.Future[Json] = asyncio.get_running_loop().create_future()
-        self._waiting[request] = future
-        self._send({"op": "call_service", "id": request, "service": name, "args": args})
+        self._waiting[request] = (name, future)
         try:
+            self._send({"op": "call_service", "id": request, "service": name, "args": args})
             return await future
         finally:  # the caller may have gone
             self._waiting.pop(request, None)

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import fnmatch
 import json
-from collections.abc import Iterable
 from typing import Any
 
 from rosbags.typesys import get_types_from_msg
 
 from server.judge.message import Json
 from server.judge.ros_names import canonical_type
-from server.rosbridge_server.completion import stamp
 from server.rosbridge_server.graph import SOURCE, Topic
 from server.rosbridge_server.interface import RosapiHost
-from server.rosbridge_server.real.loader import Malformed, Unknown, load
+from server.rosbridge_server.loader import Malformed, Unknown, load
 from server.rosbridge_server.rosapi_answers import answer_text
 from server.rosbridge_server.typedefs import TIME_TYPEDEF, describe
+from server.rosbridge_server.values import stamp
 
 BRIDGE_NODE = "/rosbridge_websocket"
 ROSAPI_NODE = "/rosapi"
@@ -77,27 +75,25 @@ class _Rosapi:
         self._version = bridge.ros_version
 
     def topics(self, args: Json) -> Json:
-        topics = self._topics()
+        topics = self._bridge.graph.topics()
         return {"topics": [topic.name for topic in topics], "types": [topic.type or "" for topic in topics]}
 
     def topics_for_type(self, args: Json) -> Json:
         wanted = _text(args, "type")
         if self._version == 1:
             found = [name for name, type in self._bridge.types_seen().items() if type == wanted]
-            return {"topics": sorted(self._shown(found, self._bridge.real.rosapi_topics_glob))}
-        return {"topics": [topic.name for topic in self._topics() if topic.type == wanted]}
+            return {"topics": sorted(found)}
+        return {"topics": [topic.name for topic in self._bridge.graph.topics() if topic.type == wanted]}
 
     def topics_and_raw_types(self, args: Json) -> Json:
-        texts = [self._bridge.types.text(topic.type or "") for topic in self._topics()]
+        texts = [self._bridge.types.text(topic.type or "") for topic in self._bridge.graph.topics()]
         return {**self.topics(args), "typedefs_full_text": texts}
 
     def topic_type(self, args: Json) -> Json:
         name = _text(args, "topic")
-        if not self._shown([name], self._bridge.real.rosapi_topics_glob):
-            return {"type": ""}
         if self._version == 1:
             return {"type": self._bridge.types_seen().get(name, "")}
-        return {"type": next((topic.type or "" for topic in self._topics() if topic.name == name), "")}
+        return {"type": next((topic.type or "" for topic in self._bridge.graph.topics() if topic.name == name), "")}
 
     def get_time(self, args: Json) -> Json:
         return {"time": stamp(self._bridge.now(), self._version)}
@@ -142,15 +138,15 @@ class _Rosapi:
         }
 
     def services(self, args: Json) -> Json:
-        return {"services": self._services()}
+        return {"services": self._bridge.services.names()}
 
     def services_for_type(self, args: Json) -> Json:
         wanted = _text(args, "type")
-        return {"services": [name for name in self._services() if self._service_type(name) == wanted]}
+        return {"services": [one.name for one in self._bridge.services.all() if one.type == wanted]}
 
     def service_type(self, args: Json) -> Json:
-        name = _text(args, "service")
-        return {"type": self._service_type(name) if name in self._services() else ""}
+        service = self._bridge.services.find_exactly(_text(args, "service"))
+        return {"type": service.type if service else ""}
 
     def service_node(self, args: Json) -> Json:
         service = self._bridge.services.find(_text(args, "service"))
@@ -161,8 +157,7 @@ class _Rosapi:
 
     def service_providers(self, args: Json) -> Json:
         wanted = _text(args, "service")
-        shown = self._services()
-        found = [one.node for one in self._bridge.services.all() if one.type == wanted and one.name in shown]
+        found = [one.node for one in self._bridge.services.all() if one.type == wanted]
         return {"providers": found if self._version == 1 else sorted(set(found))}
 
     def service_request_details(self, args: Json) -> Json:
@@ -177,7 +172,7 @@ class _Rosapi:
     def get_param(self, args: Json) -> Json:
         default = _text(args, "default" if self._version == 1 else "default_value")
         name = self._parameter(args)
-        if name is None or not self._shown([name], self._bridge.real.rosapi_params_glob):
+        if name is None:
             return {"value": ""}
         if name in self._bridge.parameters:
             return {"value": json.dumps(self._bridge.parameters[name])}
@@ -213,30 +208,16 @@ class _Rosapi:
         name = _text(args, "name")
         return name if self._version == 1 or name.count(":") == 1 else None
 
-    def _topics(self) -> list[Topic]:
-        names = self._shown([topic.name for topic in self._bridge.graph.topics()], self._bridge.real.rosapi_topics_glob)
-        return [topic for topic in self._bridge.graph.topics() if topic.name in names]
-
-    def _services(self) -> list[str]:
-        return self._shown(self._bridge.services.names(), self._bridge.real.rosapi_services_glob)
-
-    def _shown(self, names: Iterable[str], globs: tuple[str, ...]) -> list[str]:
-        return [name for name in names if not globs or any(fnmatch.fnmatch(name, glob) for glob in globs)]
-
     def _nodes(self) -> list[str]:
         return [self._bridge.node, ROSAPI_NODE, BRIDGE_NODE]
 
     def _topic(self, args: Json) -> Topic | None:
         name = _text(args, "topic")
-        return next((topic for topic in self._topics() if topic.name == name), None)
+        return next((topic for topic in self._bridge.graph.topics() if topic.name == name), None)
 
     def _publisher_nodes(self, topic: Topic) -> list[str]:
         ours = [self._bridge.node] if SOURCE in topic.publishers else []
         return ours + ([BRIDGE_NODE] if topic.publishers - {SOURCE} else [])
-
-    def _service_type(self, name: str) -> str:
-        service = self._bridge.services.find(name)
-        return service.type if service else ""
 
     def _service_details(self, type: str, *, is_request: bool) -> Json:
         parts = [part for part in type.split("/") if part]

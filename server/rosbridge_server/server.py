@@ -11,33 +11,24 @@ from server.judge.ros_names import canonical_name, canonical_type
 from server.rosbridge_server.client import Client
 from server.rosbridge_server.connection import Connection
 from server.rosbridge_server.encoding import Outgoing
-from server.rosbridge_server.graph import SOURCE, Graph, Topic
-from server.rosbridge_server.interface import Like
+from server.rosbridge_server.graph import SOURCE, Graph
 from server.rosbridge_server.listener import CannotListen, Listener
 from server.rosbridge_server.outbox import Counters
-from server.rosbridge_server.real.client import RealClient
-from server.rosbridge_server.real.fragments import RealFragments
-from server.rosbridge_server.real.options import BOUND_BYTES, RealOptions
-from server.rosbridge_server.real.outgoing import RealOutgoing
-from server.rosbridge_server.real.publishers import Publishers
-from server.rosbridge_server.real.subscribers import Subscribers
-from server.rosbridge_server.rosapi import ROSAPI_NODE, add_rosapi
+from server.rosbridge_server.rosapi import add_rosapi
 from server.rosbridge_server.services import Handler, Service, ServiceFailed, Services
 from server.rosbridge_server.types import MessageTypes
 
-__all__ = ["CannotListen", "Like", "RealOptions", "RosBridge", "ServiceFailed"]
+__all__ = ["CannotListen", "RosBridge", "ServiceFailed"]
 
-_CLOSE_ANSWERS: dict[int, Callable[[bytes], bytes]] = {1: lambda _: b"\x03\xe8", 2: lambda data: data[:2]}
 ROSOUT = "/rosout"
 _LOG_TYPES = {1: "rosgraph_msgs/Log", 2: "rcl_interfaces/Log"}
-_SERVERS = {1: "AutobahnPython/22.7.1", 2: "TornadoServer/6.6.1"}
 
 
 class RosBridge:
     """Behaves as the rosbridge of `ros_version`; `now` is the ROS time of rosapi [s since 1970].
 
-    `like` "helpful" reports errors in `status` messages, and sends what the real server loses; "real" imitates that
-    server without its error messages, started with the options `real`, but not where a client ends or silences it.
+    It answers as rosbridge_suite does. What that only writes to its log is sent as a `status`, and what it cannot
+    encode is sent.
 
     Everything but start, stop, kill and revive is synchronous and belongs on the loop on which the bridge was started.
     """
@@ -50,36 +41,25 @@ class RosBridge:
         node: str = "/car",
         max_clients: int = 256,
         max_message_bytes: int = 10_000_000,
-        like: Like = "helpful",
-        real: RealOptions | None = None,
+        fragment_size: int | None = None,
     ) -> None:
         self.ros_version: RosVersion = ros_version
         self.now = now
         self.node = node  # name under which rosapi shows what we publish ourselves
         self.max_message_bytes = max_message_bytes
+        if fragment_size is None and ros_version == 2:  # as rosbridge does where nothing else is set
+            fragment_size = max_message_bytes
+        self.fragment_size = fragment_size  # characters of text in one frame
         self.counters = Counters()
         self.graph = Graph()
         self.services = Services()
         self.types = MessageTypes(ros_version)
         self.on_publish: list[Callable[[str, str, Json], None]] = []  # (topic, type, message) of what clients publish
         self.on_subscribe: list[Callable[[str], None]] = []  # (topic) each time a client subscribes
-        self.like: Like = like
-        self.real = real or RealOptions()
-        self.subscribers = Subscribers(self)
-        self.publishers = Publishers(self)
-        self.fragments = RealFragments()
-        self.dead_nodes: set[str] = set()  # their services are still listed and never answer
-        self.down: str | None = None  # what every service call is answered while ROS itself is gone
         self.parameters: dict[str, object] = {}
         self._types_seen: dict[str, str] = {}  # ROS 1's master remembers the type of every topic there ever was
-        self._listener = Listener(
-            self._serve_client,
-            max_clients=max_clients,
-            max_message_bytes=max_message_bytes if like == "helpful" else BOUND_BYTES,
-            server_header=None if like == "helpful" else _SERVERS[ros_version],
-            close_answer=None if like == "helpful" else _CLOSE_ANSWERS[ros_version],
-        )
-        self._clients: set[Client | RealClient] = set()
+        self._listener = Listener(self._serve_client, max_clients=max_clients, max_message_bytes=max_message_bytes)
+        self._clients: set[Client] = set()
         self._address: tuple[str, int] | None = None
         self.add_rosapi()
 
@@ -112,7 +92,6 @@ class RosBridge:
     async def stop(self) -> None:
         """Close every client's connection and stop listening."""
         self._address = None
-        self.publishers.close()
         await self._listener.close(abruptly=False)
 
     async def kill(self) -> None:
@@ -132,15 +111,6 @@ class RosBridge:
     def thaw(self) -> None:
         """Resume after a freeze: read and send what was waiting."""
         self._listener.thaw()
-
-    def mute(self, topic: str) -> None:
-        """Passes no message of a topic on to the clients of a bridge like the real one, as if another program of the
-        bridge's took them all; see `unmute`."""
-        self.subscribers.mute(topic)
-
-    def unmute(self, topic: str) -> None:
-        """Those who subscribe from now on get its messages again. Subscriptions made before stay without."""
-        self.subscribers.unmute(topic)
 
     def message_type(self, name: str) -> str:
         """A message type's name as this ROS version spells it. Raises BadName."""
@@ -182,14 +152,7 @@ class RosBridge:
         if found is None or SOURCE not in found.publishers:
             raise LookupError(f"{topic} was not advertised")
         assert found.type is not None
-        found.distribute(self._outgoing(found.type, message))
-
-    def deliver(self, topic: Topic, type: str, message: Json, *, latches: bool = False) -> None:
-        """Takes a message that a client of a bridge like the real one published."""
-        topic.latches |= latches
-        topic.distribute(self._outgoing(type, message))
-        for callback in self.on_publish:
-            callback(topic.name, type, message)
+        found.distribute(Outgoing(self, found.type, message))
 
     def add_service(
         self,
@@ -227,20 +190,12 @@ class RosBridge:
 
     def add_rosapi(self) -> None:
         """Offers the services of rosapi, at the beginning and again after its end."""
-        self.dead_nodes.discard(ROSAPI_NODE)
         add_rosapi(self)
 
     def note_type(self, topic: str, type: str | None) -> None:
         """Remembers the type of a topic."""
         if type is not None:
             self._types_seen[topic] = type
-
-    def known_type(self, topic: str) -> str | None:
-        """The type of a topic, in ROS 1 of any that ever was."""
-        found = self.graph.find(topic)
-        if self.ros_version == 1:
-            return self._types_seen.get(topic)
-        return found.type if found is not None else None
 
     def advertised_types(self) -> set[str]:
         """The types of what the source publishes: they are known to it, even where no definition came with them."""
@@ -249,9 +204,6 @@ class RosBridge:
     def types_seen(self) -> dict[str, str]:
         """Every topic there ever was, with its newest type."""
         return dict(self._types_seen)
-
-    def _outgoing(self, type: str, message: Json) -> Outgoing:
-        return RealOutgoing(self, type, message) if self.like == "real" else Outgoing(self, type, message)
 
     def subscribed(self, topic: str) -> None:
         """Called by a client when it has subscribed."""
@@ -267,12 +219,8 @@ class RosBridge:
             await asyncio.sleep(0.01)
         return True
 
-    def client(self, connection: Connection) -> Client | RealClient:
-        """The handler of one connection."""
-        return RealClient(self, connection) if self.like == "real" else Client(self, connection)
-
     async def _serve_client(self, connection: Connection) -> None:
-        client = self.client(connection)
+        client = Client(self, connection)
         self._clients.add(client)
         try:
             await client.run()

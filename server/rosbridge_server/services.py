@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Any
 
 from server.judge.message import Json
 from server.judge.ros_names import canonical_name
@@ -22,7 +21,7 @@ class Service:
     type: str
     handler: Handler
     arguments: tuple[str, ...] = ()  # names of the arguments in order, for callers that send a list
-    request: str | None = None  # .msg text of the request: a bridge like the real one checks the arguments by it
+    request: str | None = None  # .msg text of the request, by which the arguments are checked
     response: str | None = None  # .msg text of the response, for those who ask rosapi
     node: str = ""  # who offers it
 
@@ -45,18 +44,9 @@ class Services:
     def find(self, name: str) -> Service | None:
         return self._services.get(canonical_name(name))
 
+    def find_exactly(self, name: str) -> Service | None:
+        """The service whose full name is this, spelled in full."""
+        return self._services.get(name)
+
     def names(self) -> list[str]:
         return sorted(self._services)
-
-    def call(self, name: str, args: Any) -> Json | Awaitable[Json]:
-        """Calls the service. Raises ServiceFailed, BadName or whatever the handler raises."""
-        service = self.find(name)
-        if service is None:
-            raise ServiceFailed(f"Service {canonical_name(name)} does not exist")
-        if args is None:
-            args = {}
-        elif isinstance(args, list):
-            args = dict(zip(service.arguments, args, strict=False))
-        elif not isinstance(args, dict):
-            raise ServiceFailed("args must be an object or a list")
-        return service.handler(args)

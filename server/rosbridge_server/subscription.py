@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from server.rosbridge_server.encoding import Encoding, Outgoing
 from server.rosbridge_server.outbox import Counters, Lane, Outbox
-from server.rosbridge_server.real.shape import Lost
+from server.rosbridge_server.shape import Lost
 
 STRONGEST: tuple[Encoding, ...] = ("cbor-raw", "cbor", "png", "json")
 
@@ -39,6 +39,7 @@ class Subscription:
         """`on_lost` receives why messages cannot be sent in the requested encoding, once for each encoding."""
         self.spelling = spelling  # the topic's name as this client writes it
         self.requested_by_id: dict[object, SubscriptionRequest] = {}
+        self.fragment_size: int | None = None  # characters of text in one frame
         self._is_muted = False  # the topic has another type than the requested one
         self._on_lost = on_lost
         self._lost_as: set[Encoding] = set()
@@ -76,21 +77,24 @@ class Subscription:
 
     def _offer(self, message: Outgoing) -> None:
         if not self._throttle_s:
-            self._outbox.send(self._lane, message.frame(self.spelling, self._encoding))
+            self._outbox.send(self._lane, self._frames(message))
             return
         now = self._loop.time()
         if now >= self._next_at and not self._held:
             self._next_at = now + self._throttle_s
-            self._outbox.send(self._lane, message.frame(self.spelling, self._encoding))
+            self._outbox.send(self._lane, self._frames(message))
         elif not self._lane.limit:
             self._counters.throttled += 1
         else:
-            self._held.append(message.frame(self.spelling, self._encoding))
+            self._held.append(self._frames(message))
             if len(self._held) > self._lane.limit:
                 self._held.popleft()
                 self._counters.throttled += 1
             if self._timer is None:
                 self._timer = self._loop.call_at(self._next_at, self._release_one)
+
+    def _frames(self, message: Outgoing) -> bytes:
+        return message.frames(self.spelling, self._encoding, self.fragment_size)
 
     def close(self) -> None:
         if self._timer is not None:

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from server.judge.message import Json, RosVersion
-from server.rosbridge_server.completion import DEEPEST, TIMES, zero
-from server.rosbridge_server.real.shape import DEFAULTS, FLOATS, INTEGERS, Field, fields, shown
+from server.rosbridge_server.shape import DEEPEST, DEFAULTS, FLOATS, INTEGERS, TIMES, Field, fields, shown, zero
 
 TIME_TYPEDEF = {
     "fieldnames": ["secs", "nsecs"],
@@ -104,7 +103,7 @@ class _Description:
             return _Shown(self._repr(row.type))
         if row.type == "byte" and self._version == 2:
             return b"\0"
-        return DEFAULTS[self._version].get((type, row.name), zero("string" if row.type == "wstring" else row.type))
+        return DEFAULTS[self._version].get((type, row.name), zero(row.type))
 
     def _repr(self, type: str) -> str:
         rows = fields(type, self._definitions) if type in self._definitions else ()

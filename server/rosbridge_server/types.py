@@ -9,8 +9,7 @@ from typing import Any, Protocol
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from server.judge.message import Json, RosVersion
-from server.rosbridge_server.completion import complete
-from server.rosbridge_server.typedefs import describe
+from server.rosbridge_server.completion import Completion
 
 Definitions = dict[str, Any]  # type as rosbags spells it → (constants, fields)
 
@@ -45,20 +44,17 @@ class MessageTypes:
     def complete(self, type: str, message: Json, now_s: float, notes: list[str] | None = None) -> Json:
         """The message with every field that was left out, header stamps being now. Unknown types pass as they are.
 
-        `notes` receives a sentence for each part that is left out as rosbridge leaves it out. Raises TypeMismatch
-        where a field does not exist or has a value of the wrong kind.
+        `notes` receives a sentence for each part that is left out as rosbridge leaves it out. Raises Unfit where a
+        field does not exist or has a value of the wrong kind.
         """
         definitions = self.definitions(type)
         if definitions is None:
             return message
-        return complete(_long(type), definitions, self._version, message, now_s, [] if notes is None else notes)
-
-    def describe(self, type: str) -> list[Json]:
-        """The type and all it contains, as rosapi describes them. Raises LookupError where it is not known."""
-        definitions = self.definitions(type)
-        if definitions is None:
-            raise LookupError(f"the type {type} is unknown")
-        return describe(_long(type), definitions, self._version)
+        completion = Completion(_long(type), definitions, self._version, now_s)
+        made = completion.message(message)
+        if notes is not None:
+            notes += completion.notes
+        return made
 
     def has_package(self, package: str) -> bool:
         """Is any type of this package known?"""

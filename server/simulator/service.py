@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from server.judge.message import Json, RosVersion
-from server.rosbridge_server.server import CannotListen, Like, RosBridge, ServiceFailed
+from server.rosbridge_server.server import CannotListen, RosBridge, ServiceFailed
 from server.simulator.car import SimulatedCar, Step
 from server.simulator.messages import CMD_VEL
 from server.simulator.scenario import BridgeFault
@@ -47,7 +47,6 @@ class CarService:
         clock: Callable[[], float] = time.time,
         has_stopper: bool = True,
         gives_way: bool = True,
-        like: Like = "helpful",
     ) -> None:
         if not 0 < rate <= 100:
             raise ValueError(f"The rate must be above 0 and at most 100, not {rate:g}.")
@@ -62,7 +61,7 @@ class CarService:
             has_stopper=has_stopper,
             gives_way=gives_way,
         )
-        self.bridge = RosBridge(ros_version=ros_version, now=lambda: self.car.now_s, node="/simulated_car", like=like)
+        self.bridge = RosBridge(ros_version=ros_version, now=lambda: self.car.now_s, node="/simulated_car")
         for published in self.car.published:
             self.bridge.advertise(published.topic, published.type)
         self.bridge.advertise_rosout()

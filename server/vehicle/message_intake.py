@@ -16,7 +16,7 @@ from server.slowdown.command_target import GUARD_STATE
 from server.slowdown.controller import SlowDownController
 from server.vehicle import car_marks
 from server.vehicle.connection import Connection
-from server.vehicle.doubtful import ANSWERED_WITHIN_S, Doubtful, Held, answers_needed
+from server.vehicle.doubtful import ANSWERED_WITHIN_S, Doubtful, Held, may_be_kept
 from server.vehicle.judgement import Judgement
 from server.vehicle.marks import Marks
 from server.vehicle.scan_feed import ScanFeed
@@ -217,10 +217,15 @@ class MessageIntake:
     def _doubt(self, connection: Connection, topic: str, one: Held, arrival: Arrival) -> None:
         """Another subscription shows whether a message was published now, or is what its publisher keeps."""
         within_s = ANSWERED_WITHIN_S + self._judgement.transport.answer_s(one.at_s)
-        needed = answers_needed(arrival.period_s, arrival.silent_s, within_s)
-        verdict = self._doubtful.came(topic, one, needed, within_s)
+        verdict = self._doubtful.came(
+            topic, one, may_be_kept=may_be_kept(arrival.period_s, arrival.silent_s, within_s), within_s=within_s
+        )
         self._record_late(connection, topic, *verdict.record)
-        if verdict.probes and not connection.subscriptions.table.probe(topic):
+        if verdict.probes:
+            self._probe(connection, topic)
+
+    def _probe(self, connection: Connection, topic: str) -> None:
+        if not connection.subscriptions.table.probe(topic):
             self._record_late(connection, topic, *self._doubtful.settled(topic))
 
     def tick(self, now_s: float) -> None:
@@ -228,7 +233,10 @@ class MessageIntake:
         connection = self._connection
         if connection is None:
             return
-        for topic, held in self._doubtful.overdue(now_s, is_heard=connection.bridge_answers(now_s)):
+        is_heard = connection.bridge_answers(now_s)
+        for topic in self._doubtful.to_probe(now_s) if is_heard else ():
+            self._probe(connection, topic)
+        for topic, held in self._doubtful.overdue(now_s, is_heard=is_heard):
             self._record_late(connection, topic, *held)
             if not held:
                 self._sent_again.is_kept(topic)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from pathlib import Path
 
@@ -93,8 +92,6 @@ def test_a_snapshot_never_changes() -> None:
     assert not before.paused
     with pytest.raises(TypeError):
         before.readings["speed"] = reading(0.0)  # type: ignore[index]
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        before.now_s = 5.0  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("signal", [name for name in SIGNALS if name in VALUES])

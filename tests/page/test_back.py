@@ -8,6 +8,7 @@ from playwright.async_api import Page, expect
 from tests.page.canned import Canned, alarm, live
 from tests.page.canned_fleet import car
 from tests.page.conftest import Phone
+from tests.page.test_parts import until_sent
 
 GUARDED = "() => history.state?.over === true"
 PLAIN = "() => history.state?.over !== true"
@@ -121,7 +122,7 @@ async def test_a_hand_over_that_was_left_by_hand_opens_no_more_by_itself(
     phone: Phone, canned: Canned, way: str
 ) -> None:
     page = await opened(phone, f"{canned.address}/#home")
-    me = next(one["page"] for one in reversed(canned.heard) if one["kind"] == "hello")
+    me = (await until_sent(canned, "hello"))["page"]
     line = {
         "key": "limit", "kind": "limit", "title": "Speed limit: 2 m/s", "text": "", "priority": None, "since_ms": None,
         "until_ms": None, "read": False,

@@ -57,31 +57,34 @@ def _comparable(frame: str | bytes, parts: dict[str, str], transcript: Transcrip
         body = cbor2.loads(frame)
         if set(body["msg"]) == {"secs", "nsecs", "bytes"}:
             return f"cbor-raw {body['topic']}", body["msg"]["bytes"]
-        return f"cbor {body['topic']}", frame
-    body = json.loads(frame)
+        return f"cbor {body['topic']}", repr(body["msg"])
+    body = _loaded(frame)
+    if body["op"] == "status":  # the real ones write it to their logs
+        return "", None
     if body["op"] == "publish":
-        return f"json {body['topic']}", frame
+        return f"json {body['topic']}", body["msg"]
     if body["op"] == "png":
-        hidden = json.loads(picture_text(body["data"]))
-        return f"png {hidden['topic']}", hidden
+        hidden = _loaded(picture_text(body["data"]))
+        return f"png {hidden['topic']}", hidden["msg"]
     if body["op"] == "fragment":
         return _fragment(frame, body, parts, transcript)
     return "answers", _answer(body, transcript)
 
 
 def _fragment(frame: str, body: dict[str, Any], parts: dict[str, str], transcript: Transcript) -> tuple[str, Any]:
-    """Pieces of a topic's message as they are; of answers and pictures, whose length may differ, what they make up."""
+    """What the pieces make up, whose number may differ with the spaces between."""
     assert list(body) == ["op", "id", "data", "num", "total"]
     whole = body["data"] if body["num"] == 0 else parts[str(body["id"])] + body["data"]
     parts[str(body["id"])] = whole
-    if '{"op":"publish"'.startswith(whole.replace(" ", "")[:15]):
-        return "fragments", frame
     if body["num"] + 1 < int(body["total"]):
         return "", None
-    inner = json.loads(whole)
-    if inner["op"] == "png":
-        return "fragments of pictures", json.loads(picture_text(inner["data"]))
-    return "answers in fragments", (body["id"], body["total"] % 1 > 0, _answer(inner, transcript))
+    key, content = _comparable(whole, {}, transcript)
+    return (f"{key} in fragments" if key else ""), (body["id"], content)
+
+
+def _loaded(text: str) -> Any:
+    """JSON, with null for the bare words of ROS 2 that are none."""
+    return json.loads(text, parse_constant=lambda word: None)
 
 
 def _answer(body: dict[str, Any], transcript: Transcript) -> Any:

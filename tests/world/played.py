@@ -20,9 +20,9 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from server.judge.message import RosVersion
-from server.rosbridge_server.real.client import RealClient
-from server.rosbridge_server.real.shape import Field, fields
-from server.rosbridge_server.server import Like, RealOptions, RosBridge, ServiceFailed
+from server.rosbridge_server.client import Client
+from server.rosbridge_server.server import RosBridge, ServiceFailed
+from server.rosbridge_server.shape import Field, fields
 from tests.world.transcripts import Line, Transcript, read
 
 BEGAN_S = 1_795_403_000.0  # about when the transcripts were made
@@ -38,38 +38,6 @@ def end_rosapi(bridge: RosBridge) -> None:
     bridge.end_node("/rosapi")
 
 
-def kill_rosapi(bridge: RosBridge) -> None:
-    bridge.dead_nodes.add("/rosapi")
-
-
-def lose_master(bridge: RosBridge) -> None:
-    bridge.down = "Unable to communicate with master!"
-
-
-def find_empty_master(bridge: RosBridge) -> None:
-    """A new roscore, which knows none of the nodes."""
-    bridge.down = None
-    for node in ("/rosapi", "/car"):
-        bridge.end_node(node)
-
-
-def kill_car(bridge: RosBridge) -> None:
-    bridge.dead_nodes.add("/car")
-
-
-def start_car(bridge: RosBridge) -> None:
-    bridge.dead_nodes.discard("/car")
-    add_car_services(bridge)
-
-
-def invalidate(bridge: RosBridge) -> None:
-    """The first SIGTERM of a ROS 2 bridge; a ROS 1 bridge ends."""
-    if bridge.ros_version == 2:
-        bridge.down = (
-            "failed to get service names and types: rcl node's context is invalid, at /project/src/rcl/node.c:401"
-        )
-
-
 def start_late(bridge: RosBridge) -> None:
     bridge.advertise("/late", LATE["/late"])
 
@@ -81,14 +49,8 @@ def end_late(bridge: RosBridge) -> None:
 NOTES: dict[str, Callable[[RosBridge], None]] = {  # what the recorder did to ROS
     "rosapi ended with SIGINT": end_rosapi,
     "rosapi SIGTERM": end_rosapi,
-    "rosapi killed with SIGKILL": kill_rosapi,
     "rosapi started again": RosBridge.add_rosapi,
     "rosapi started again, new connection": RosBridge.add_rosapi,
-    "roscore killed": lose_master,
-    "roscore started again, all nodes old": find_empty_master,
-    "car killed": kill_car,
-    "car started again": start_car,
-    "bridge gets SIGTERM": invalidate,
     "publisher up, nobody subscribes": start_late,
     "publisher ended by SIGINT, we still subscribe": end_late,
     "SIGKILL, 20 s after": end_late,
@@ -126,45 +88,41 @@ class Wire:
 
     def __init__(self) -> None:
         self.frames: list[str | bytes] = []
-        self.code: int | None = None
         self.on_ready: Callable[[], None] | None = None
         self.on_lost: Callable[[], None] | None = None
         self.is_ready = True
         self.is_drained = True
 
-    def write(self, frame: bytes) -> None:
-        size = frame[1]
-        head = 2 if size < 126 else 4 if size == 126 else 10
-        assert frame[0] in (0x81, 0x82), "a whole text or binary frame"
-        self.frames.append(frame[head:].decode() if frame[0] == 0x81 else frame[head:])
-
-    def close_without_code(self) -> None:
-        self.code = 1005
+    def write(self, frames: bytes) -> None:
+        """Of one or more whole text or binary frames."""
+        while frames:
+            assert frames[0] in (0x81, 0x82)
+            head = {126: 4, 127: 10}.get(frames[1], 2)
+            end = head + (frames[1] if head == 2 else int.from_bytes(frames[2:head], "big"))
+            payload = frames[head:end]
+            self.frames.append(payload.decode() if frames[0] == 0x81 else payload)
+            frames = frames[end:]
 
 
 class Played:
-    """`frames`: what came back on each connection; `received`: what a ROS node got; `codes`: how connections ended."""
+    """`frames`: what came back on each connection; `received`: what a ROS node got."""
 
-    def __init__(self, transcript: Transcript, like: Like, options: RealOptions | None = None) -> None:
+    def __init__(self, transcript: Transcript, fragment_size: int | None = None) -> None:
         self.transcript = transcript
         self.bridge = RosBridge(
             ros_version=transcript.ros,
-            like=like,
-            real=options,
+            fragment_size=fragment_size,
             node="/car",
             now=lambda: BEGAN_S + asyncio.get_running_loop().time(),
         )
         self.wires: dict[str, list[Wire]] = {}
-        self.clients: dict[str, Any] = {}
+        self.clients: dict[str, Client] = {}
         self.received: list[tuple[str, Any]] = []
         self.bridge.on_publish.append(lambda topic, type, message: self.received.append((topic, message)))
         set_up_car(self.bridge, transcript)
 
     def frames(self, conn: str) -> list[str | bytes]:
         return [frame for wire in self.wires.get(conn, []) for frame in wire.frames]
-
-    def codes(self, conn: str) -> list[int | None]:
-        return [wire.code for wire in self.wires.get(conn, [])]
 
     async def run(self, acts: dict[int, Callable[[RosBridge], None]] | None = None) -> None:
         """Does every line at its time. `acts`: what happens to ROS before a line, by the line's number."""
@@ -186,8 +144,7 @@ class Played:
                 await asyncio.sleep(0)
         await asyncio.sleep(0.5)
         for client in self.clients.values():
-            client.leave() if isinstance(client, RealClient) else client._leave()
-        self.bridge.publishers.close()
+            client.leave()
 
     def _publish(self, topic: str, message: Any) -> None:
         found = self.bridge.graph.find(topic)
@@ -203,29 +160,19 @@ class Played:
         elif line.kind == "event" and line.text == "close":
             self._close(line.conn)
         elif line.kind == "out" and line.conn in self.clients:
-            if self.wires[line.conn][-1].code is None:
-                self._send(line.conn, whole(line))
-
-    def _send(self, conn: str, frame: str | bytes) -> None:
-        client, wire = self.clients[conn], self.wires[conn][-1]
-        if isinstance(client, RealClient):
-            if not client.take(frame):
-                wire.code = 1009
-        else:
-            client.handle(frame.encode() if isinstance(frame, str) else frame)
+            frame = whole(line)
+            self.clients[line.conn].handle(frame.encode() if isinstance(frame, str) else frame)
 
     def _open(self, conn: str) -> None:
         self._close(conn)
         wire = Wire()
         self.wires.setdefault(conn, []).append(wire)
-        self.clients[conn] = self.bridge.client(wire)  # type: ignore[arg-type]
+        self.clients[conn] = Client(self.bridge, wire)  # type: ignore[arg-type]
 
     def _close(self, conn: str) -> None:
         client = self.clients.pop(conn, None)
-        if isinstance(client, RealClient):
+        if client is not None:
             client.leave()
-        elif client is not None:
-            client._leave()
 
 
 def whole(line: Line) -> str | bytes:

@@ -27,7 +27,7 @@ async def test_where_only_we_may_command_nothing_is_said_to_be_missing(
     for name, value in (("RECORDED_AFTER_S", 1.0), ("RENEW_AFTER_S", 1.5), ("SILENT_AGAIN_S", 2.0)):
         monkeypatch.setattr(delivery, name, value)
     monkeypatch.setattr(delivery, "RECORDED_AGAIN_S", (2.0,))
-    async with bridging(ros_version=1, like="real") as (bridge, port), probing(port) as listener:
+    async with bridging(ros_version=1) as (bridge, port), probing(port) as listener:
         bridge.advertise("/catvehicle/vel", "geometry_msgs/Twist")
         await listener.subscribe(COMMAND, type="geometry_msgs/Twist")
         config = Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{port}"),), data=tmp_path)

@@ -13,7 +13,7 @@ import pytest
 
 from server.recording.delay import recorded_delay
 from server.recording.read.read import open_recording
-from server.vehicle.doubtful import ANSWERED_WITHIN_S, LEAST_ANSWERS, MOST_HELD, Doubtful, Held, Verdict, answers_needed
+from server.vehicle.doubtful import ANSWERED_WITHIN_S
 from tests.server.vehicle.keeping_bridge import KeepingBridge, Topic, monitored
 from tests.world.test_kept_samples import FUEL, ROUNDED_S, SPEED, TRANSPORT_S, drive, recorded, signal, topics
 
@@ -69,6 +69,44 @@ async def test_a_switch_that_is_sent_now_and_then_is_recorded_whole(tmp_path: Pa
             bridge.publish(SWITCH, {"data": True})
             bridge.publish(SPEED, {"linear": {"x": 3.0 + sent / 10, "y": 0.0, "z": 0.0}})
             sent += 1
+    [part] = recorded(tmp_path, SWITCH)
+    assert len(part) >= sent
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("count", "gap_s"), [(2, 0.25), (3, 0.1), (3, 0.25), (4, 0.02), (7, 0.25)])
+async def test_equal_messages_in_a_row_right_after_a_renewal_are_recorded(
+    tmp_path: Path, count: int, gap_s: float
+) -> None:
+    """Each comes as soon as an answer would, and then nothing more."""
+    bridge = KeepingBridge(both(is_latched=False))
+    async with monitored(bridge, tmp_path):
+        await drive(bridge, 4.0, hz=4.0)
+        bridge.publish(SWITCH, {"data": True})
+        await drive(bridge, 3.0, hz=4.0)
+        bridge.renew(SWITCH)
+        for _ in range(count):
+            await asyncio.sleep(gap_s)
+            bridge.publish(SWITCH, {"data": True})
+        await drive(bridge, 9.0, hz=4.0)
+    assert recorded(tmp_path, SWITCH) == [[True] * (count + 1)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+async def test_a_switch_that_is_sent_in_bursts_is_recorded_whole(tmp_path: Path, seed: int) -> None:
+    chance = random.Random(seed)
+    bridge = KeepingBridge(both(is_latched=False))
+    sent = 0
+    async with monitored(bridge, tmp_path):
+        await drive(bridge, 4.0, hz=4.0)
+        for _ in range(15):
+            bridge.renew(SWITCH)
+            for _ in range(chance.randint(1, 6)):
+                await asyncio.sleep(chance.choice((0.02, 0.06, 0.21)))
+                bridge.publish(SWITCH, {"data": True})
+                sent += 1
+            await drive(bridge, chance.choice((0.65, 1.3, 2.2, 6.5)), hz=4.0)
     [part] = recorded(tmp_path, SWITCH)
     assert len(part) >= sent
 
@@ -146,7 +184,7 @@ async def test_over_a_slow_link_a_kept_sample_is_recorded_once(tmp_path: Path) -
         for _ in range(2):
             await drive(bridge, 9.0, hz=4.0)
             bridge.renew(FUEL)
-        await drive(bridge, 9.0, hz=4.0)
+        await drive(bridge, 16.0, hz=4.0)
     assert recorded(tmp_path, FUEL) == [[60.0]]
 
 
@@ -191,81 +229,3 @@ async def test_what_comes_while_a_doubt_is_settled_is_not_missed(tmp_path: Path,
         await drive(bridge, 8.0, hz=4.0)
         await asyncio.gather(again, new)
     assert recorded(tmp_path, SWITCH) == [[True, True, False]]
-
-
-def held(at_s: float) -> Held:
-    return Held({"data": True}, 10, at_s, at_s)
-
-
-def test_a_fast_topic_is_recorded_at_once_and_a_quiet_one_needs_few_answers() -> None:
-    assert answers_needed(None, 1.0) == LEAST_ANSWERS
-    assert answers_needed(1.0, 20.0) == LEAST_ANSWERS
-    assert answers_needed(1.0, 1.0) == 4
-    assert answers_needed(0.2, 0.1) is None
-    assert answers_needed(0.0, 0.0) is not None  # two at once are no period
-    doubtful = Doubtful()
-    assert doubtful.came("/a", held(1.0), None).record == (held(1.0),)
-
-
-def test_without_an_answer_in_time_all_are_recorded() -> None:
-    doubtful = Doubtful()
-    assert doubtful.came("/a", held(1.0), 2).probes
-    assert not list(doubtful.overdue(1.2, is_heard=True))
-    assert list(doubtful.overdue(1.4, is_heard=True)) == [("/a", (held(1.0),))], "a kill loses no more than that"
-    assert not list(doubtful.overdue(20.0, is_heard=True))
-    assert doubtful.came("/a", held(21.0), 2).probes
-    assert doubtful.came("/a", held(22.0), 2).record == (held(21.0), held(22.0))
-
-
-def test_an_answer_that_comes_too_late_is_recorded_and_begins_no_other_doubt() -> None:
-    doubtful = Doubtful()
-    doubtful.came("/a", held(1.0), 2)
-    assert list(doubtful.overdue(1.4, is_heard=True)) == [("/a", (held(1.0),))]
-    assert doubtful.came("/a", held(1.6), 2) == Verdict(record=(held(1.6),))
-    assert not list(doubtful.all())
-    assert doubtful._bytes == 0
-
-
-def kept() -> Doubtful:
-    """It had its answers."""
-    doubtful = Doubtful()
-    assert [doubtful.came("/a", held(at_s), 2).probes for at_s in (1.0, 1.1, 1.2)] == [True, True, False]
-    return doubtful
-
-
-def test_what_had_its_answers_is_dropped_only_if_nothing_new_comes() -> None:
-    assert kept().settled("/a") == (held(1.0), held(1.1), held(1.2))
-    assert list(kept().overdue(6.3, is_heard=True)) == [("/a", ())]
-    assert not list(kept().all())
-    later = kept()
-    assert later.came("/a", held(4.0), 2) == Verdict()  # another renewal
-    assert not list(later.overdue(8.9, is_heard=True))
-    assert later.settled("/a")[-1] == held(4.0)
-
-
-def test_without_a_link_it_is_not_known_that_nothing_new_came() -> None:
-    doubtful = kept()
-    assert list(doubtful.overdue(3.0, is_heard=False)) == [("/a", (held(1.0), held(1.1), held(1.2)))]
-    assert not list(doubtful.overdue(6.3, is_heard=True))
-    assert doubtful._bytes == 0
-
-
-def test_an_answer_may_need_a_round_trip_from_when_the_subscription_was_sent() -> None:
-    doubtful = Doubtful()
-    doubtful.came("/a", held(1.0), 2)
-    doubtful.subscribed("/a", 2.0)
-    assert doubtful.came("/a", held(2.9), 2, 1.0).probes
-    assert doubtful.came("/a", held(4.0), 2, 1.0).record
-    assert answers_needed(2.0, 2.0, 1.5) is None
-    assert answers_needed(0.05, 0.3) is None  # a hiccup of the link
-
-
-def test_what_is_held_is_bounded() -> None:
-    doubtful = Doubtful()
-    at_once = sum(bool(doubtful.came(f"/{number}", held(1.0), 2).record) for number in range(MOST_HELD + 100))
-    assert at_once == 100
-    large = Held({"data": True}, 5_000_000, 1.0, 1.0)
-    doubtful = Doubtful()
-    assert [bool(doubtful.came(name, large, 2).record) for name in ("/a", "/b")] == [False, True]
-    assert list(doubtful.all()) == [("/a", large)]
-    assert not doubtful.came("/b", large, 2).record

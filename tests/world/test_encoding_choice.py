@@ -135,7 +135,7 @@ async def test_what_holds_too_much_to_be_read_as_cbor_is_recorded_as_json(tmp_pa
     """A path of 9000 poses, or a polygon of 60 000 points: it was counted as unreadable, and named nowhere."""
     polygon = {"points": [{"x": 1.0, "y": 2.0, "z": 0.5}] * 60_000}
 
-    async with bridging(ros_version=1, like="real") as (bridge, port):
+    async with bridging(ros_version=1) as (bridge, port):
         bridge.advertise("/catvehicle/vel", "geometry_msgs/Twist")
         bridge.advertise("/polygon", "geometry_msgs/Polygon")
 

@@ -128,7 +128,7 @@ async def test_after_a_silence_of_the_bridge_the_large_ones_that_never_came_wait
         link_opened(connection)
 
     monkeypatch.setattr(Connection, "link_opened", keep)
-    async with bridging(ros_version=2, like="real") as (bridge, port):
+    async with bridging(ros_version=2) as (bridge, port):
         bridge.advertise("/catvehicle/vel", "geometry_msgs/msg/Twist")
         bridge.advertise("/cloud", "std_msgs/msg/UInt8MultiArray")
         bridge.advertise("/word", "std_msgs/msg/String")

@@ -1,10 +1,10 @@
-"""A car behind a bridge like the real one: what is recorded, what is named as missing, which topics carry signals."""
+"""A car behind a bridge: what is recorded, what is named as missing, which topics carry signals."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,9 @@ from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
 from server.rosbridge.link_errors import CallFailed
 from server.rosbridge.rosapi_client import Asks
+from server.rosbridge_server.encoding import Outgoing
 from server.rosbridge_server.server import RosBridge
+from server.rosbridge_server.subscription import Subscription
 from server.vehicle import delivery, discovery
 from server.vehicle.undelivered import CLIENT_COUNT, Passing
 from server.vehicle.vehicle import Vehicle
@@ -66,7 +68,7 @@ def messages(version: RosVersion) -> dict[str, tuple[str, str, dict[str, Any]]]:
 
 @contextlib.asynccontextmanager
 async def car(version: RosVersion, *, hz: float = 10.0) -> AsyncIterator[tuple[RosBridge, int]]:
-    async with bridging(ros_version=version, like="real") as (bridge, port):
+    async with bridging(ros_version=version) as (bridge, port):
         said = messages(version)
         for topic, (type, definition, _) in said.items():
             text = definition or (TF_TEXT if "TFMessage" in type and version == 1 else "")
@@ -128,8 +130,10 @@ async def watched(port: int, data: Path) -> AsyncIterator[Viewer]:
 async def test_every_topic_is_recorded_as_its_type_and_exported_whole(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], version: RosVersion
 ) -> None:
-    async with car(version) as (_, port), watched(port, tmp_path) as one:
+    async with car(version) as (bridge, port), watched(port, tmp_path) as one:
         state = await one.state(lambda s: s["recording"]["messages"] > 200, SOON_S)
+        assert {requested(bridge, topic) for topic in ("/fixed", "/names", "/flags")} == {"json"}  # lost as CBOR
+        assert requested(bridge, "/scan") == "cbor"
         name = state["recording"]["name"]
         assert state["recording"]["as_json"] == 0
         await stop_recording(one)
@@ -152,6 +156,16 @@ async def test_every_topic_is_recorded_as_its_type_and_exported_whole(
         assert {topic: info.count for topic, info in bag.topics.items() if topic in counts} == counts
 
 
+def requested(bridge: RosBridge, topic: str) -> str:
+    """The encoding in which the one client wants a topic."""
+    found = bridge.graph.find(topic)
+    assert found is not None
+    (subscription,) = found.subscribers
+    assert isinstance(subscription, Subscription)
+    (encoding,) = {one.encoding for one in subscription.requested_by_id.values()}
+    return encoding
+
+
 async def stop_recording(one: Viewer) -> None:
     """Disconnects the car, and returns when the file is closed."""
     async with real_time():
@@ -165,6 +179,21 @@ def hasten(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(delivery, "RECORDED_AGAIN_S", (2.0,))
 
 
+def block(monkeypatch: pytest.MonkeyPatch, topics: Iterable[str]) -> set[str]:
+    """Keeps all messages of these topics from every subscription, until its end even if the topic leaves the set."""
+    blocked, without = set(topics), set[Subscription]()
+    offer = Subscription.offer
+
+    def offer_unless_blocked(subscription: Subscription, message: Outgoing) -> None:
+        if subscription.spelling in blocked:
+            without.add(subscription)
+        if subscription not in without:
+            offer(subscription, message)
+
+    monkeypatch.setattr(Subscription, "offer", offer_unless_blocked)
+    return blocked
+
+
 @pytest.mark.world(n=4)
 @pytest.mark.parametrize("version", [1, 2])
 async def test_what_a_neighbour_blocks_is_named_and_comes_when_the_neighbour_has_gone(
@@ -172,18 +201,16 @@ async def test_what_a_neighbour_blocks_is_named_and_comes_when_the_neighbour_has
 ) -> None:
     """Another client can keep a real bridge from passing a topic on to us, until we subscribe again after its end."""
     hasten(monkeypatch)
-    blocked = ("/floats", "/catvehicle/vel")
-    async with car(version) as (bridge, port):
-        for topic in blocked:
-            bridge.mute(topic)
+    topics = ("/floats", "/catvehicle/vel")
+    blocked = block(monkeypatch, topics)
+    async with car(version) as (_, port):
         async with probing(port) as neighbour:
             async with watched(port, tmp_path) as one:
                 state = await one.state(lambda s: len(s["recording"]["not_received"]) == 2, SOON_S)
-                assert set(state["recording"]["not_received"]) == set(blocked)
+                assert set(state["recording"]["not_received"]) == set(topics)
                 note = await one.until(lambda: next((e for e in one.events if e["change"] == "not_received"), None))
                 assert "/car)" in note["text"]
-                for topic in blocked:
-                    bridge.unmute(topic)
+                blocked.clear()
                 neighbour.socket.transport.abort()
                 await one.state(
                     lambda s: not s["recording"]["not_received"] and s["signals"]["speed"]["freshness"] == "fresh",

@@ -48,7 +48,7 @@ def header(at_s: float) -> dict[str, Any]:
 @contextlib.asynccontextmanager
 async def car() -> AsyncIterator[tuple[int, float]]:
     """A car whose values say when they were published: seconds since the time that is yielded with the port."""
-    async with bridging(ros_version=1, like="real") as (bridge, port):
+    async with bridging(ros_version=1) as (bridge, port):
         for topic, type in (
             (SPEED, "geometry_msgs/Twist"),
             (BRAKE, "geometry_msgs/Wrench"),

@@ -96,7 +96,10 @@ def _figures(found: Mapping[str, Any]) -> list[tuple[str, str | None, str, str]]
     auto_m = modes["autonomous"]["m"]
     is_known = found["modes"] is not None and metres is not None
     share = f"{100 * auto_m / metres:.0f} % of the distance" if is_known and metres else ""
-    per_km = f"{f['interventions'] / km:.2f} per km" if km and f["interventions"] is not None else ""
+    is_counted = is_known and auto_m > 0 and f["interventions"] is not None
+    per_km = f"{f['interventions'] / auto_m * 1000:.2f} per autonomous km" if is_counted else ""
+    alarms_per_km = f"{f['alarms'] / km:.2f} per km" if km and f["alarms"] is not None else ""
+    in_10_min = f"{load['in_10_min']:.1f} in 10 min" if load else ""
     marks = found["marks"] or []
     voices, photos = sum(one["voice"] for one in marks), sum(one["photo"] for one in marks)
     p50, p90 = f["acknowledged_p50_s"], f["acknowledged_p90_s"]
@@ -105,7 +108,7 @@ def _figures(found: Mapping[str, Any]) -> list[tuple[str, str | None, str, str]]
         ("Distance", _km(km), "km", _clock(f["driven_s"])),
         ("Autonomous", _km(auto_m / 1000) if is_known else None, "km", share),
         ("Interventions", _whole(f["interventions"]), "", per_km),
-        ("Alarms", _whole(f["alarms"]), "", f"{load['in_10_min']:.1f} in 10 min" if load else ""),
+        ("Alarms", _whole(f["alarms"]), "", ", ".join(filter(None, (alarms_per_km, in_10_min)))),
         ("To acknowledge", None if p50 is None else f"{p50:.1f}", "s", waited),
         ("Marks", _whole(f["marks"]), "", f"{voices} with voice, {photos} with photo" if marks else ""),
         ("Data lost", f"{f['blind_s']:.1f}", "s", f"in {report_text.counted(f['blind'], 'gap')}"),

@@ -121,12 +121,17 @@ def weeks_of(drives: Sequence[LogbookDrive]) -> list[LogbookWeek]:
 
 
 def rate(drives: Sequence[LogbookDrive], what: str, least_m: float = 0.0) -> float | None:
-    """How many on 100 km, over the drives that know; None: too short a distance."""
+    """How many on 100 km, over the drives that know: alarms of all that was driven, interventions of what the car
+    drove by itself. None: too short a distance."""
     known = [drive for drive in drives if _count(drive, what) is not None and drive["distance_m"] is not None]
-    metres = sum(drive["distance_m"] or 0.0 for drive in known)
+    metres = sum(_metres(drive, what) for drive in known)
     if metres <= least_m:
         return None
     return round(sum(_count(drive, what) or 0 for drive in known) / metres * 100_000, 2)
+
+
+def _metres(drive: LogbookDrive, what: str) -> float:
+    return (drive["modes_m"].get("autonomous") if what == "interventions" else drive["distance_m"]) or 0.0
 
 
 def _count(drive: LogbookDrive, what: str) -> int | None:

@@ -24,7 +24,7 @@ export class CheckFeed {
   #asked_ms = -Infinity;
   #isBusy = false;
   #isStopped = false;
-  /** The server has no such check: it is not asked again. */
+  /** The server has no such check, or the replay is over: it is not asked again. */
   #isRefused = false;
   /** @type {number | null} the newest event that the history knows */
   #event = null;
@@ -66,6 +66,7 @@ export class CheckFeed {
       this.#source = source;
       this.#asked_ms = -Infinity;
       this.#event = this.episodes = null;
+      this.#isRefused = false;
     }
     if (this.#isRefused) this.#since_ms = now_ms;
     else if (!this.#isBusy && now_ms - this.#asked_ms > EVERY_MS) void this.#fetch(now_ms);
@@ -88,8 +89,9 @@ export class CheckFeed {
       if (this.#isStopped) return;
       if (response.ok && body.id) this.#take(body);
       else {
-        this.problem = 'Nothing more is known of it.'; // an alarm of the server itself has no check
-        this.#isRefused = response.status === 409;
+        const isOver = response.status === 404 && this.store.frame?.replay != null;
+        this.problem = isOver ? 'This replay is over.' : 'Nothing more is known of it.'; // an alarm of the server itself has no check
+        this.#isRefused = isOver || response.status === 409;
         this.#since_ms = this.store.now();
       }
     } catch {

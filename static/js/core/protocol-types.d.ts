@@ -1199,7 +1199,7 @@ export interface LogbookTotals {
   driven_s: number;
   modes_m: Record<string, number>;
   modes_s: Record<string, number>;
-  /** per 100 km, over the drives that know their mode */
+  /** per 100 km that the car drove by itself, over the drives that know their mode */
   interventions: number | null;
   /** per 100 km, over the drives with a log */
   alarms: number | null;
@@ -1214,9 +1214,9 @@ export interface LogbookWeek {
   from_ms: number;
   drives: number;
   modes_m: Record<string, number>;
-  /** per 100 km; null: not known, or less than 100 m */
+  /** per 100 km that the car drove by itself; null: not known, or less than 100 m of it */
   interventions: number | null;
-  /** the same */
+  /** per 100 km of all; null: the same */
   alarms: number | null;
   /** of this and the four weeks before, without a week of no drives */
   interventions_median: number | null;

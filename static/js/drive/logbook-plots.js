@@ -35,7 +35,7 @@ export function ratePlot(weeks, what, width) {
   });
   const last = weeks.findLast((week) => week[median] !== null);
   if (last) parts.push(svg('text', { class: 'lb-end', x: frame.right + 8, y: y(last[median] ?? 0) + 7 }, numberOf(last[median] ?? 0)));
-  return drawn(frame, parts, `${what} per 100 km, week by week${last ? `; the median of the last weeks is ${numberOf(last[median] ?? 0)}` : ''}`);
+  return drawn(frame, parts, `${what} per 100 ${what === 'interventions' ? 'autonomous ' : ''}km, week by week${last ? `; the median of the last weeks is ${numberOf(last[median] ?? 0)}` : ''}`);
 }
 
 /** Solid autonomous, hollow manual, hatched not known. @param {Week[]} weeks @param {number} width */

@@ -123,13 +123,13 @@ class Logbook {
     options(this.person, [['', 'everybody'], ...people.map((name) => /** @type {[string, string]} */ ([name, name]))], this.#choice.person);
     show(this.person, people.length > 0);
     const mine = checks.filter(({ vehicle }) => vehicle === this.#choice.vehicle);
-    const { distance_m, driven_s, modes_m: { autonomous = 0, unknown = 0 } } = totals;
+    const { distance_m, driven_s, modes_s, modes_m: { autonomous = 0, unknown = 0 } } = totals;
     const share = (/** @type {number} */ part) => (distance_m > 0 ? (100 * part / distance_m).toFixed(0) : null);
     this.figures.replaceChildren(
-      figure('Distance', fixed(distance_m / 1000, distance_m < 1e5 ? 1 : 0), 'km', `${fixed(driven_s / 3600, driven_s < 36e4 ? 1 : 0)} h`),
-      figure('Autonomous', share(autonomous), '%', 'of the distance'),
-      figure('Not known', share(unknown), '%', 'mode of the car'),
-      figure('Interventions', totals.interventions === null ? null : numberOf(totals.interventions), 'per 100 km', ''),
+      figure('Distance', fixed(distance_m / 1000, distance_m < 1e5 ? 1 : 0), 'km', `${hours(driven_s)} h`),
+      figure('Autonomous', share(autonomous), '%', `of the distance, ${hours(modes_s['autonomous'])} h`),
+      figure('Not known', share(unknown), '%', `mode of the car, ${hours(modes_s['unknown'])} h`),
+      figure('Interventions', totals.interventions === null ? null : numberOf(totals.interventions), 'per 100 km', 'autonomous'),
       figure('Alarms', totals.alarms === null ? null : numberOf(totals.alarms), 'per 100 km', ''),
       overdueFigure(mine) ?? figure('Checks missing', totals.checks_known ? String(totals.checks_missing) : null, '', totals.checks_known ? `of ${counted(totals.checks_known, 'drive')}` : '', totals.checks_missing > 0));
     this.#drawPlots();
@@ -145,7 +145,7 @@ class Logbook {
     const width = Math.floor(this.plots.clientWidth) - 32;
     if (!weeks.length || width < 100) return this.plots.replaceChildren();
     this.plots.replaceChildren(
-      plot('Interventions per 100 km', 'dots: weeks · line: median of 5', ratePlot(weeks, 'interventions', width), weeks.some(({ interventions }) => interventions !== null)),
+      plot('Interventions per 100 autonomous km', 'dots: weeks · line: median of 5', ratePlot(weeks, 'interventions', width), weeks.some(({ interventions }) => interventions !== null)),
       plot('Alarms per 100 km', 'hatched: no drive', ratePlot(weeks, 'alarms', width), weeks.some(({ alarms }) => alarms !== null)),
       plot('Distance by mode, km a week', 'solid autonomous · hollow manual · hatched not known', modesPlot(weeks, width), true));
     return undefined;
@@ -156,6 +156,8 @@ class Logbook {
 function plot(title, more, drawing, isKnown) {
   return html('section', { class: 'lb-plot' }, html('h3', {}, title, html('span', {}, more)), isKnown ? drawing : html('p', { class: 'sub' }, 'not known in this time'));
 }
+
+const hours = (/** @type {number | undefined} */ s = 0) => fixed(s / 3600, s < 36e4 ? 1 : 0);
 
 /** @param {string} title @param {string} end @param {Node} what */
 const section = (title, end, what) => html('section', {}, html('h3', {}, title, html('span', {}, end)), what);

@@ -51,7 +51,15 @@ def test_the_page_shows_all_of_it(folder: Path) -> None:
     text = re.sub(r"<style>.*?</style>|<script.*?</script>", "", (folder / "page.html").read_text(), flags=re.S)
     words = html.unescape(re.sub(r"<[^>]+>", " ", text))
     for said in (
-        *("Drive report", "Intact: 3 records", "1.20", "0.70", "59 % of the distance", "0.84 per km", "p90 4.6 s"),
+        *(
+            "Drive report",
+            "Intact: 3 records",
+            "1.20",
+            "0.70",
+            "59 % of the distance",
+            "1.43 per autonomous km",
+            "p90 4.6 s",
+        ),
         *(
             "dry, 21 °C",
             "signed 22:13:26, A. K. (Pixel)",

@@ -106,11 +106,13 @@ async def replay_whole(file: Path, count: int) -> None:
     with open_recording([file]) as recording:
         expected = [(message.topic, as_sent(message.message)) for message in recording.messages()]
         types = {topic: info.type for topic, info in recording.topics.items()}
+        log = "rosgraph_msgs/Log" if recording.ros_version == 1 else "rcl_interfaces/msg/Log"
+    listed = {"/rosout": log} | types
     async with replaying(file, "--port", "0", "--rate", "10", "--wait") as replay:
         async with probing(await replay.port()) as probe:
             assert (await probe.call("/rosapi/topics"))["values"] == {
-                "topics": sorted(types),
-                "types": [types[topic] for topic in sorted(types)],
+                "topics": sorted(listed),
+                "types": [listed[topic] for topic in sorted(listed)],
             }
             for topic, type in types.items():
                 await probe.send(op="subscribe", topic=topic, type=type, queue_length=0)

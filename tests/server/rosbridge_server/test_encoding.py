@@ -86,16 +86,16 @@ def test_cbor_keeps_what_is_no_number_and_bytes() -> None:
 def test_a_message_is_encoded_once_for_all_who_want_it(encoding: Encoding) -> None:
     content = {"x": 1.0}
     message = Outgoing(RosBridge(), "geometry_msgs/Vector3", content)
-    first = message.frame("/t", encoding)
+    first = message.frames("/t", encoding)
     content["x"] = 2.0  # a second encoding would show this
-    assert message.frame("/t", encoding) is first
+    assert message.frames("/t", encoding) is first
     body = first[first.rindex(b"msg") :]
-    assert message.frame("t", encoding).endswith(body)  # another spelling of the topic
+    assert message.frames("t", encoding).endswith(body)  # another spelling of the topic
 
 
 def test_a_frame_names_the_topic_as_the_client_does() -> None:
     message = Outgoing(RosBridge(), "geometry_msgs/Vector3", {"x": 1.0})
-    text = message.frame('odd "topic"', "json")
+    text = message.frames('odd "topic"', "json")
     assert json.loads(text[2:]) == {"op": "publish", "topic": 'odd "topic"', "msg": {"x": 1.0}}
-    binary = message.frame("ünusual", "cbor")
+    binary = message.frames("ünusual", "cbor")
     assert cbor2.loads(binary[2:]) == {"op": "publish", "topic": "ünusual", "msg": {"x": 1.0}}

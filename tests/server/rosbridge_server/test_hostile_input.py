@@ -154,7 +154,7 @@ def test_no_sequence_of_operations_fails_inside(sequence: list[dict[str, Any]]) 
             client.handle(json.dumps(operation).encode("utf-8", "replace"))
             client.say("none", "", None)
         assert not any(b"internal error" in frame for frame in socket.frames)
-        client._leave()
+        client.leave()
         assert [topic.name for topic in bridge.graph.topics()] == ["/vel"]
 
     asyncio.run(handle())

@@ -207,9 +207,9 @@ async def test_clients_publish_to_each_other_and_to_us(bridge: RosBridge, port: 
 @pytest.mark.parametrize(
     ("message", "why"),
     [
-        ({"linear": {"x": None}}, "takes a number for linear.x, got None"),
-        ({"linear": {"speed": 1}}, "has no field linear.speed"),
-        ({"linear": [1, 2]}, "takes an object for linear"),
+        ({"linear": {"x": None}}, "requires a float64 for field linear.x, but got a <class 'NoneType'>"),
+        ({"linear": {"speed": 1}}, "does not have a field linear.speed"),
+        ({"linear": [1, 2]}, "requires a geometry_msgs/Vector3 for field linear"),
         ([], "msg must be an object"),
     ],
 )
@@ -224,6 +224,16 @@ async def test_a_message_that_is_not_of_its_type_goes_nowhere(
     assert (status["level"], status["id"]) == ("error", "p7")
     assert why in status["msg"]
     assert heard == []
+
+
+async def test_times_that_ros_1_leaves_out_are_said_once_for_a_topic(bridge: RosBridge, probe: Probe) -> None:
+    for topic in ("/a", "/b"):
+        await probe.send(op="advertise", topic=topic, type="std_msgs/Header")
+        for _ in range(3):
+            await probe.send(op="publish", topic=topic, msg={"stamp": {"sec": 3, "nanosec": 4}})
+    for topic in ("/a", "/b"):
+        assert (await probe.hear())["msg"].startswith(f"publish: {topic}: stamp has no secs and nsecs")
+    assert await probe.hears_nothing()
 
 
 async def test_publishing_to_a_topic_without_a_type_is_refused(probe: Probe) -> None:
@@ -278,7 +288,8 @@ async def test_services_answer_now_later_or_not(bridge: RosBridge, probe: Probe)
         "id": "call",
     }
     failed = await probe.call("/add", {"fail": True})
-    assert (failed["result"], failed["values"]) == (False, "the brake is stuck")
+    why = "service [/add] responded with an error: b'error processing request: the brake is stuck'"
+    assert (failed["result"], failed["values"]) == (False, why)
     broken = await probe.call("/add", {})
     assert broken["result"] is False
 
@@ -306,6 +317,7 @@ async def test_a_slow_service_holds_up_nobody(bridge: RosBridge, probe: Probe) -
         ({"op": "subscribe", "topic": "/a", "throttle_rate": "fast"}, "throttle_rate must be a number"),
         ({"op": "subscribe", "topic": "/a", "queue_length": -1}, "queue_length must be a number, 0 or more"),
         ({"op": "subscribe", "topic": "/a", "type": 7}, "type must be text"),
+        ({"op": "subscribe", "topic": "/a", "throttle_rate": -5}, "throttle_rate must be a number, 0 or more"),
         ({"op": "subscribe", "topic": "/a", "type": "nonsense"}, "not a valid type string"),
         ({"op": "subscribe", "topic": "/a", "compression": "zip"}, "compression 'zip' is not offered"),
         ({"op": "advertise", "topic": "/a"}, "expected a field type"),
@@ -326,6 +338,12 @@ async def test_wrong_operations_are_answered_with_their_id(probe: Probe, operati
     status = await probe.hear()
     assert (status["op"], status["level"], status["id"]) == ("status", "error", "the id")
     assert why in status["msg"]
+
+
+async def test_an_unknown_compression_is_json_as_on_a_real_bridge(vel: RosBridge, probe: Probe) -> None:
+    await probe.subscribe("/vel", compression="zip", throttle_rate=-5)
+    vel.publish("/vel", TWIST)
+    assert (await probe.hear())["msg"] == TWIST
 
 
 async def test_text_that_is_not_utf_8_ends_the_connection(bridge: RosBridge, port: int) -> None:

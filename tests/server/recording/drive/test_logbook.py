@@ -63,7 +63,10 @@ def test_a_part_that_does_not_know_makes_no_rate_better(what: str, counts: tuple
     found = logbook(drives_of([*rows, row(9, MONDAY + 99, **{what: 2})]), now_ms=MONDAY)
     drive = found["drives"][-1]
     assert (drive["interventions"] if what == "interventions" else drive["alarms"]) is None
-    assert (found["totals"]["interventions"] if what == "interventions" else found["totals"]["alarms"]) == 20.0
+    assert (found["totals"]["interventions"], found["totals"]["alarms"])[what == "alarms"] == {
+        "interventions": 25.0,
+        "alarms": 20.0,
+    }[what]
 
 
 @pytest.mark.parametrize(
@@ -86,15 +89,15 @@ def test_the_newest_part_that_knows_says_whether_it_was_checked(states: tuple[st
 def test_rates_count_only_drives_that_know() -> None:
     rows = [row(1, MONDAY, interventions=3), row(2, MONDAY, interventions=None, alarms=None, km=90)]
     found = logbook(drives_of(rows), now_ms=MONDAY)
-    assert (found["totals"]["interventions"], found["totals"]["alarms"]) == (30.0, 10.0)
+    assert (found["totals"]["interventions"], found["totals"]["alarms"]) == (37.5, 10.0), "3 on 8 km driven by itself"
     assert found["totals"]["distance_m"] == 100_000
-    assert found["weeks"][0]["interventions"] == 30.0
+    assert found["weeks"][0]["interventions"] == 37.5
 
 
 def test_a_week_without_a_drive_ends_the_line() -> None:
     counts = [1, 2, 9, 4, 5, 6, None, 8]
     rows = [
-        row(n, MONDAY + n * WEEK_MS, km=100.0, interventions=count)
+        row(n, MONDAY + n * WEEK_MS, km=125.0, interventions=count)
         for n, count in enumerate(counts)
         if count is not None
     ]

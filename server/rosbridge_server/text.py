@@ -1,30 +1,14 @@
-"""JSON text as the real bridge of each ROS version writes it, and the picture that png puts it into."""
+"""JSON text in other forms: a picture, and fragments."""
 
 from __future__ import annotations
 
 import base64
-import json
 import math
-import re
 import struct
 import zlib
 from typing import Any
 
-from server.judge.message import RosVersion
-from server.rosbridge_server.real.shape import Lost
-
-_DELETE = re.compile(r"(?<!\\)((?:\\\\)*)\\u007f")
-
-
-def dumps(value: Any, version: RosVersion) -> str:
-    """ROS 1: no spaces, every slash escaped. ROS 2: spaces, and bare words for what JSON does not have. Raises Lost."""
-    try:
-        if version == 2:
-            return json.dumps(value)
-        text = json.dumps(value, separators=(",", ":"), allow_nan=False)
-    except (TypeError, ValueError, RecursionError) as error:
-        raise Lost(str(error)) from None
-    return _DELETE.sub("\\1\x7f", text.replace("/", "\\/"))
+MOST_FRAGMENTS = 10_000  # of one message: shorter ones than that takes are not sent
 
 
 def png(data: bytes) -> str:
@@ -39,7 +23,8 @@ def png(data: bytes) -> str:
 
 
 def fragments(text: str, size: int, id: object) -> list[dict[str, Any]]:
-    """The pieces of a text that is longer than `size`. `total` is a fraction, as the real bridge divides."""
+    """The pieces of a text that is longer than `size`. `total` is a fraction, as rosbridge divides."""
+    size = max(size, math.ceil(len(text) / MOST_FRAGMENTS))
     total = (len(text) - 1) / size + 1
     starts = range(0, len(text), size)
     return [

@@ -1,4 +1,4 @@
-"""The fields of a message type, as the real bridge of each ROS version names and distinguishes them."""
+"""The fields of a message type, as rosbridge of each ROS version names and distinguishes them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from typing import Any, Literal
 from rosbags.interfaces import Nodetype
 
 from server.judge.message import RosVersion
-from server.rosbridge_server.completion import PLACEHOLDER, TIMES
+
+HEADER = "std_msgs/msg/Header"
+TIMES = {"builtin_interfaces/msg/Time": "time", "builtin_interfaces/msg/Duration": "duration"}  # primitives of ROS 1
+PLACEHOLDER = "structure_needs_at_least_one_member"  # of ROS 2 messages without fields
+DEEPEST = 32  # levels of messages in messages: a definition that contains itself never ends
 
 Array = Literal["", "fixed", "sequence"]
 
@@ -27,7 +31,7 @@ DEFAULTS: dict[int, dict[tuple[str, str], float]] = {
 
 
 class Lost(Exception):
-    """The real bridge fails here and sends nothing. The text is what it writes to its own log."""
+    """The message has no bytes of ROS. The text says why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,10 +57,6 @@ class Field:
     def is_number(self) -> bool:
         return self.type in FLOATS or self.type in INTEGERS
 
-    def is_time(self, version: RosVersion) -> bool:
-        """Time and duration: primitives in ROS 1, messages in ROS 2."""
-        return self.type in TIMES
-
     def item(self) -> Field:
         """One element of the array, as a field of its own."""
         return Field(name=self.name, type=self.type, is_message=self.is_message, text_bound=self.text_bound)
@@ -72,7 +72,7 @@ class Field:
 
 
 def shown(type: str, version: RosVersion) -> str:
-    """A message's type in two parts, as the real bridge writes it; time and duration are primitives of ROS 1."""
+    """A message's type in two parts, as rosbridge writes it; time and duration are primitives of ROS 1."""
     return TIMES[type] if version == 1 and type in TIMES else type.replace("/msg/", "/")
 
 
@@ -96,3 +96,8 @@ def _field(name: str, kind: Nodetype, what: Any) -> Field:
         length=length,
         text_bound=element.text_bound,
     )
+
+
+def zero(primitive: str) -> Any:
+    """The default value of a primitive type."""
+    return {"bool": False, "string": "", "wstring": ""}.get(primitive, 0.0 if primitive in FLOATS else 0)

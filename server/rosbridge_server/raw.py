@@ -11,9 +11,8 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from server.judge.message import RosVersion
-from server.rosbridge_server.completion import PLACEHOLDER, TIMES
-from server.rosbridge_server.real.shape import FLOATS, INTEGERS, Field, Lost, fields
-from server.rosbridge_server.real.values import bytes_of, items, primitive, time_of
+from server.rosbridge_server.shape import FLOATS, INTEGERS, PLACEHOLDER, TIMES, Field, Lost, fields
+from server.rosbridge_server.values import bytes_of, items, primitive, time_of
 
 
 def raw_bytes(type: str, definitions: dict[str, Any], version: RosVersion, message: Any) -> bytes:
@@ -50,8 +49,11 @@ def _value(store: Typestore, field: Field, definitions: dict[str, Any], version:
         return _item(store, field, definitions, version, value)
     if field.is_bytes:
         return np.frombuffer(bytes_of(field, value), dtype=np.uint8)
-    values = items(field, value)
     code = FLOATS.get(field.type) or INTEGERS.get(field.type) or ("?" if field.type == "bool" else None)
+    if code is not None and isinstance(value, np.ndarray):
+        with np.errstate(over="ignore"):
+            return np.asarray(value, dtype=code)
+    values = items(field, value)
     if code is not None:
         return np.array(values, dtype=code)
     return [_item(store, field.item(), definitions, version, item) for item in values]

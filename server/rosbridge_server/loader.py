@@ -1,4 +1,4 @@
-"""Message types by name, with the errors of the real bridge's loader."""
+"""Message types by name, with the errors of rosbridge's loader."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Unknown(Exception):
 
 
 def load(bridge: TypeSource, name: str) -> str:
-    """The type as the graph has it. Raises Malformed and Unknown, with the real texts."""
+    """The type as the graph has it. Raises Malformed and Unknown, with the texts of rosbridge."""
     try:
         type = canonical_type(name, bridge.ros_version)
     except BadName:
