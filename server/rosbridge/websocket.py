@@ -182,5 +182,10 @@ class BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
             self.factory.owner.frame(self, b"".join(data), self.message_is_binary)
 
     @property
+    def is_in_message(self) -> bool:
+        """Whether a part of a message came, and not yet its end: a ping may be answered in between."""
+        return bool(self.message_data or self.message_head)
+
+    @property
     def _is_too_large(self) -> bool:
         return bool(self.message_data_total_length > MAX_MESSAGE_BYTES)

@@ -1,4 +1,4 @@
-"""Tells those who follow how late a link is, which of its pings are answered behind the messages."""
+"""Reports which pings of a link are answered behind its messages to the part that follows how late the link is."""
 
 from __future__ import annotations
 
@@ -42,16 +42,19 @@ class Delay:
     def ping_sent(self, at_s: float) -> None:
         if self._marks is not None:
             self._marks.sent(at_s)
-            self._answered(self._stream.idle(at_s))
 
-    def pong(self, sent_s: float) -> None:
-        """The answer to a ping that was sent then came."""
-        self._stream.pong(sent_s, self._now())
+    def pong(self, sent_s: float, *, is_in_message: bool) -> None:
+        """The answer to a ping that was sent then came, `is_in_message`: between two parts of a message."""
+        idle = self._stream.pong(sent_s, self._now(), is_in_message=is_in_message)
+        if idle is not None and self._marks is not None:
+            self._marks.answered(*idle)
 
     def message(self, number: int, sent_ns: int) -> None:
         """A message of a subscription came, which the server took at that time of its own clock."""
-        self._answered(self._stream.message(number, sent_ns, self._now()))
-
-    def _answered(self, sent_s: float | None) -> None:
+        sent_s = self._stream.message(number, sent_ns, self._now())
         if sent_s is not None and self._marks is not None:
             self._marks.answered(sent_s, self._now())
+
+    def skipped(self) -> None:
+        """A message came that was not read."""
+        self._stream.skipped(self._now())

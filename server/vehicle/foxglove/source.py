@@ -195,10 +195,11 @@ class FoxgloveSource:
     def mark_answered(self, socket: BridgeProtocol, payload: bytes) -> None:
         sent_s = socket.take_mark(payload) if socket is self._socket else None
         if sent_s is not None:
-            self._delay.pong(sent_s)
+            self._delay.pong(sent_s, is_in_message=socket.is_in_message)
 
     def skipped(self, socket: BridgeProtocol, head: bytes, tail: bytes, size: int) -> None:
         if socket is self._socket:
+            self._delay.skipped()
             subscription = protocol.subscription_of(head)
             channel = None if subscription is None else self._rows.channels.get(subscription)
             self._junk(f"a message of more than {MAX_MESSAGE_BYTES // 2**20} MB")

@@ -81,12 +81,21 @@ class Listener(ServerListener):
 
 
 class Peer:
-    """`capabilities` and `encodings` are those of the server; channels live as long as this."""
+    """`capabilities`, `encodings` and `most_queued` messages are those of the server; channels live as long as this."""
 
-    def __init__(self, capabilities: Sequence[Capability] = (), encodings: Sequence[str] | None = None) -> None:
+    def __init__(
+        self,
+        capabilities: Sequence[Capability] = (),
+        encodings: Sequence[str] | None = None,
+        most_queued: int | None = None,
+    ) -> None:
         self.context = foxglove.Context()
         self.listener = Listener()
-        self._options = {"capabilities": list(capabilities), "supported_encodings": encodings}
+        self._options: dict[str, Any] = {
+            "capabilities": list(capabilities),
+            "supported_encodings": encodings,
+            "message_backlog_size": most_queued,
+        }
         self._channels: dict[str, tuple[foxglove.Channel, Any]] = {}
         self.port = 0
         self.start()
@@ -139,8 +148,10 @@ class Peer:
 
 
 @contextmanager
-def peer(capabilities: Sequence[Capability] = (), encodings: Sequence[str] | None = None) -> Iterator[Peer]:
-    one = Peer(capabilities, encodings)
+def peer(
+    capabilities: Sequence[Capability] = (), encodings: Sequence[str] | None = None, most_queued: int | None = None
+) -> Iterator[Peer]:
+    one = Peer(capabilities, encodings, most_queued)
     try:
         yield one
     finally:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from server.vehicle.foxglove.stream_marks import IDLE_S, StreamMarks
+import pytest
+
+from server.vehicle.foxglove.stream_marks import StreamMarks
 
 AHEAD_S = 1000.0  # the server's clock before ours
 NS = 10**9
@@ -31,40 +33,62 @@ def test_a_ping_is_behind_a_message_that_entered_after_it() -> None:
 
 
 def test_messages_that_waited_a_minute_answer_no_newer_ping() -> None:
+    """The server sends half of what enters its queue."""
     marks = steady()
-    for tenth in range(1, 600):
-        marks.pong(tenth / 10, tenth / 10 + 0.01)
-    assert marks.message(1, ns(1.05), 60.0) == 1.0
-    assert marks.idle(60.1) is None
+    for tenth in range(1, 1200):
+        at_s, entered_s = tenth / 10, tenth / 20
+        assert marks.pong(at_s, at_s + 0.01) is None
+        newest_s = marks.message(1, ns(entered_s), at_s + 0.05)
+        assert newest_s is None or entered_s - 0.2 < newest_s <= entered_s
+    assert newest_s is not None or marks.message(1, ns(60.1), 121.0) is not None
+
+
+def pongs(marks: StreamMarks, *sent_s: float) -> list[tuple[float, float] | None]:
+    """Answers that come 0.01 s after their pings."""
+    return [marks.pong(at_s, at_s + 0.01) for at_s in sent_s]
 
 
 def test_where_no_message_waits_a_ping_is_answered_by_its_answer() -> None:
     marks = steady()
-    marks.pong(1.0, 1.01)
-    assert marks.idle(1.01 + IDLE_S - 0.01) is None
-    assert marks.idle(1.01 + IDLE_S + 0.01) == 1.0
-    assert marks.idle(2.0) is None
-    marks.pong(2.0, 2.01)
+    assert pongs(marks, 1.0, 1.1, 1.3, 1.4) == [None] * 4  # the last one is the first that was sent long enough after
+    assert pongs(marks, 1.5) == [(1.0, 1.01)]  # and this one was sent when that was answered
+    assert pongs(marks, 1.6) == [(1.1, 1.11)]
     marks.message(1, ns(1.9), 2.02)  # it may have waited
-    marks.pong(2.1, 2.11)
-    assert marks.idle(2.2) is None
-    assert marks.idle(2.11 + IDLE_S + 0.01) == 2.1
+    assert pongs(marks, 2.1, 2.2, 2.3, 2.4, 2.5) == [None] * 5
+    assert pongs(marks, 2.6) == [(2.1, 2.11)]
+
+
+def test_answers_that_are_late_prove_nothing_of_the_time_before_they_came() -> None:
+    """A radio that was gone for 2 s passes on what the server wrote before: all of it comes at once."""
+    marks = steady()
+    for tenth in range(10, 30):
+        assert marks.pong(tenth / 10, 3.0 + tenth / 10_000) is None
+    assert pongs(marks, 3.1, 3.2) == [None, None]
+
+
+@pytest.mark.parametrize("is_skipped", [True, False])
+def test_a_message_that_is_not_read_or_not_whole_is_one(is_skipped: bool) -> None:
+    marks = steady()
+    assert pongs(marks, 1.0, 1.2) == [None, None]
+    if is_skipped:
+        marks.skipped(1.25)
+    else:
+        assert marks.pong(1.25, 1.26, is_in_message=True) is None
+    assert pongs(marks, 1.4, 1.5, 1.6, 1.7, 1.8) == [None] * 5
+    assert pongs(marks, 1.9) == [(1.4, 1.41)]
 
 
 def test_without_any_message_pings_are_answered() -> None:
-    marks = StreamMarks()
-    marks.pong(1.0, 1.01)
-    assert marks.idle(1.5) == 1.0
+    assert pongs(StreamMarks(), 1.0, 1.4, 1.5) == [None, None, (1.0, 1.01)]
 
 
 def test_the_first_message_long_after_its_subscription_bounds_the_clock_by_the_silence_before() -> None:
     marks = StreamMarks()
     marks.subscribed(1, 0.0)
-    marks.pong(9.5, 9.51)
-    assert marks.idle(9.9) == 9.5
+    assert pongs(marks, 9.4, 9.8, 9.9) == [None, None, (9.4, 9.41)]
     assert marks.message(1, ns(10.0), 10.01) is None
     marks.pong(10.02, 10.03)
-    assert marks.message(1, ns(10.6), 10.61) == 10.02  # not only after 10 s
+    assert marks.message(1, ns(10.7), 10.71) == 10.02  # not only after 10 s
 
 
 def test_a_kept_sample_is_no_clock() -> None:
