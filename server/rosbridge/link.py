@@ -134,9 +134,9 @@ class RosLink:
         """Renew the subscription of a topic without messages."""
         self._rows.renew(topic)
 
-    def again(self, topic: str) -> None:
+    def again(self, topic: str) -> bool:
         """As `SentRows.again`."""
-        self._rows.again(topic)
+        return self._rows.again(topic)
 
     @property
     def subscriptions(self) -> tuple[Subscription, ...]:

@@ -109,8 +109,9 @@ class LiveSource(CommandChannel, Protocol):
     def renew(self, topic: str) -> None:
         """Renew the subscription of a topic without messages: it ends and begins anew; what comes between is lost."""
 
-    def again(self, topic: str) -> None:
-        """Subscribe to a topic once more, without an end between: it is given what its publisher keeps."""
+    def again(self, topic: str) -> bool:
+        """Subscribe to a topic once more, without an end between: it is given what its publisher keeps. False: this
+        source cannot, and has sent nothing."""
 
     async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any:
         """The values of a service, such as `/rosapi/topics`. Raises CallFailed where there is none, LinkDown."""

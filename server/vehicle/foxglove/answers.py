@@ -1,4 +1,4 @@
-"""The questions of a session to a Foxglove server, which its source answers from what the server has said."""
+"""The questions of a session to a Foxglove server, which its source answers from what the server has listed."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import Any
 from server.rosbridge.link_errors import CallFailed
 from server.vehicle.foxglove.protocol import Channel, GraphUpdate
 
-UNKNOWN_NODE = "unknown node"  # who publishes what is offered, where the server does not say
+UNKNOWN_NODE = "unknown node"  # who publishes what is offered, where the server lists no nodes
 MAX_OFFERED = 5000
 
 
@@ -17,7 +17,9 @@ class Offered:
 
     def __init__(self) -> None:
         self.channels: dict[int, Channel] = {}
-        self.has_graph = False  # whether the server says which nodes there are
+        self.has_graph = False  # whether the server lists the nodes
+        self.is_full = False  # a channel was left out
+        self._ours: set[str] = set()  # topics that nobody offered before we advertised them
         self._publishers: dict[str, tuple[str, ...]] = {}
         self._subscribers: dict[str, tuple[str, ...]] = {}
 
@@ -25,15 +27,28 @@ class Offered:
         """Takes channels; returns those that are new, or another than before under the same number."""
         new = []
         for channel in channels:
-            if self.channels.get(channel.id) != channel and len(self.channels) < MAX_OFFERED:
-                self.channels.pop(channel.id, None)  # the newest stands last
-                self.channels[channel.id] = channel
-                new.append(channel)
+            if self.channels.get(channel.id) == channel:
+                continue
+            self.channels.pop(channel.id, None)  # the newest stands last
+            if len(self.channels) >= MAX_OFFERED:
+                self.is_full = True
+                continue
+            self.channels[channel.id] = channel
+            new.append(channel)
         return new
 
     def unadvertised(self, ids: Iterable[int]) -> list[Channel]:
         """The channels that are gone now."""
         return [self.channels.pop(id) for id in ids if id in self.channels]
+
+    def announced(self, topic: str) -> None:
+        """We advertise a topic: a bridge may offer it to us from then on, as that of a publisher."""
+        if self.type_of(topic) is None:
+            self._ours.add(topic)
+
+    def withdrawn(self, topic: str) -> None:
+        """We do not advertise it any more."""
+        self._ours.discard(topic)
 
     def graph(self, update: GraphUpdate) -> None:
         """Which nodes publish and subscribe to what; the rest stays as it was."""
@@ -59,7 +74,7 @@ class Offered:
         return [one for one in self.channels.values() if one.topic == topic and one.type == type]
 
     def answer(self, service: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
-        """As rosapi answers. Raises CallFailed where the server does not say."""
+        """As rosapi answers. Raises CallFailed where it is not known."""
         topic = str(arguments.get("topic", ""))
         match service:
             case "/rosapi/topics":
@@ -76,7 +91,7 @@ class Offered:
                 return {"type": type}
             case "/rosapi/get_time":
                 return {}  # the server is there; it has no clock that can be asked for
-            case "/rosapi/publishers":
+            case "/rosapi/publishers" if self.has_graph or topic not in self._ours:
                 return {"publishers": self._nodes_that_publish(topic)}
             case "/rosapi/subscribers" if self.has_graph:
                 return {"subscribers": [*self._subscribers.get(topic, ())]}
@@ -90,4 +105,5 @@ class Offered:
 def _definition(channel: Channel) -> str:
     """The .msg text of a type; where there is none, what rosapi of ROS 2 has in its place."""
     is_text = channel.encoding in ("cdr", "ros1") and channel.schema_encoding in ("ros1msg", "ros2msg", "")
-    return channel.schema if is_text else "# failed to get full definition text"
+    # An empty text is that of an unknown type too; a standard type without fields is known without it.
+    return channel.schema if is_text and channel.schema else "# failed to get full definition text"

@@ -9,6 +9,7 @@ from typing import Any
 from server.judge.message import RosVersion
 from server.recording.read.encode import TypeMismatch
 from server.recording.read.schemas import Schema, TypeBook
+from server.rosbridge.link_errors import LinkDown
 from server.rosbridge.message_bytes import json_bytes
 from server.rosbridge.outgoing import NotAllowed, Outgoing
 from server.vehicle.foxglove import protocol
@@ -28,18 +29,17 @@ class Commands:
         self._channels: dict[str, tuple[int, Schema | None]] = {}  # topic → our channel; None: JSON
 
     def problem(self, offered: Collection[str]) -> str | None:
-        """Why no command can be sent; `offered`: encodings of the car's channels. None: it can."""
+        """Why no command can be sent; `offered`: encodings of the car's channels, empty while none is known. None: it
+        can, or it is not known yet."""
         if CLIENT_PUBLISH not in self.info.capabilities:
             return "The Foxglove server takes no messages: start it with the capability clientPublish."
-        if self._encoding(offered) is None:
+        if offered and self._encoding(offered) is None:
             named = ", ".join(self.info.encodings[:5]) or "none"
             return f"The Foxglove server takes no message that catgraph can write: its encodings are {named}."
         return None
 
     def frames(self, operation: dict[str, Any], offered: Collection[str]) -> tuple[bytes, bool]:
-        """The frame of an operation, and whether it is binary. Raises NotAllowed."""
-        if (problem := self.problem(offered)) is not None:
-            raise NotAllowed(problem)
+        """The frame of an operation, and whether it is binary. Raises NotAllowed, LinkDown."""
         self._gate.frame(operation)
         match operation["op"]:
             case "advertise":
@@ -57,7 +57,11 @@ class Commands:
         return next((one for one in usable if one in offered), "json" if "json" in usable else None)
 
     def _advertise(self, topic: str, type: str, offered: Collection[str]) -> bytes:
-        encoding = self._encoding(offered) or "json"
+        if (problem := self.problem(offered)) is not None:
+            raise NotAllowed(problem)
+        encoding = self._encoding(offered)
+        if encoding is None:
+            raise LinkDown("not sent: the Foxglove server has not listed its channels yet")
         schema = TypeBook(_BINARY[encoding]).schema(type) if encoding in _BINARY else None
         if schema is None and encoding in _BINARY:
             raise NotAllowed(f"{type} cannot be written as {encoding}")

@@ -58,6 +58,7 @@ class Status(NamedTuple):
 class Advertise(NamedTuple):
     channels: tuple[Channel, ...]
     invalid: int  # rows that could not be read
+    too_many: int  # rows beyond MAX_CHANNELS, which were not looked at
 
 
 class Unadvertise(NamedTuple):
@@ -141,7 +142,7 @@ def _advertise(operation: Mapping[str, Any]) -> Advertise:
         raise BadFrame("an advertisement without channels")
     found = [_channel(row) for row in rows[:MAX_CHANNELS]]
     channels = tuple(one for one in found if one is not None)
-    return Advertise(channels, len(rows) - len(channels))
+    return Advertise(channels, len(found) - len(channels), len(rows) - len(found))
 
 
 def _channel(row: Any) -> Channel | None:

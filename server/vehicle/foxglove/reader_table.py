@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from server.recording.read.errors import Undecodable
@@ -17,11 +17,15 @@ MOST_READERS = 2000
 
 
 class ReaderTable:
-    """`ready(topic)` follows each reader that was made, `note(text)` says why there is none."""
+    """`ready(topic)` follows each reader that was made, `note(text)` has the reason where there is none."""
 
-    def __init__(self, ready: Callable[[str], None], note: Callable[[str], None]) -> None:
+    def __init__(
+        self, ready: Callable[[str], None], note: Callable[[str], None], *, used: Callable[[], Iterable[Channel]]
+    ) -> None:
+        """`used`: the channels whose messages are read now."""
         self._ready = ready
         self._note = note
+        self._used = used
         self._readers: dict[tuple[str, ...], Read | None] = {}  # None: there is none
         self._waiting: dict[tuple[str, ...], Channel] = {}
         self._task: asyncio.Task[None] | None = None
@@ -55,7 +59,8 @@ class ReaderTable:
                 made = await asyncio.to_thread(_made, channel)
                 del self._waiting[key]
                 if len(self._readers) >= MOST_READERS:
-                    self._readers.clear()
+                    used = {_key(one) for one in self._used()}
+                    self._readers = {key: one for key, one in self._readers.items() if key in used}
                 self._readers[key] = None if isinstance(made, str) else made
                 if isinstance(made, str):
                     self._note(f"{channel.topic} cannot be read: {made}.")

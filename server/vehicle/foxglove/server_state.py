@@ -1,4 +1,4 @@
-"""What one connection to a Foxglove server has said so far."""
+"""What is known of the server of one connection."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Mapping
 from typing import Any
 
-from server.rosbridge.link_errors import CallFailed
+from server.rosbridge.link_errors import CallFailed, LinkDown
 from server.vehicle.foxglove.channels import Offered
 from server.vehicle.foxglove.commands import Commands
 from server.vehicle.foxglove.protocol import ServerInfo
@@ -49,11 +49,23 @@ class ServerState:
         """Why no command can be sent; None: it can, or it is not known yet."""
         return None if self.commands is None else self.commands.problem(self.offered.encodings())
 
+    def command(self, operation: dict[str, Any]) -> tuple[bytes, bool]:
+        """The frame of a command, and whether it is binary. Raises LinkDown, NotAllowed."""
+        if self.commands is None:
+            raise LinkDown("not sent: the Foxglove server has not listed its capabilities yet")
+        frame = self.commands.frames(operation, self.offered.encodings())
+        match operation["op"]:
+            case "advertise":
+                self.offered.announced(operation["topic"])
+            case "unadvertise":
+                self.offered.withdrawn(operation["topic"])
+        return frame
+
     async def answer(self, service: str, arguments: Mapping[str, Any], timeout_s: float) -> dict[str, Any]:
         """As rosapi answers. Raises CallFailed."""
         try:
             async with asyncio.timeout(timeout_s):
                 await self._is_known.wait()
         except TimeoutError:
-            raise CallFailed("the Foxglove server did not say what it offers") from None
+            raise CallFailed("the Foxglove server has not listed its channels") from None
         return self.offered.answer(service, arguments)

@@ -19,6 +19,7 @@ from server.rosbridge.websocket import MAX_MESSAGE_BYTES, BridgeProtocol
 from server.system.clean_text import short_text
 from server.vehicle.foxglove import protocol
 from server.vehicle.foxglove.answers import Answers
+from server.vehicle.foxglove.channels import MAX_OFFERED
 from server.vehicle.foxglove.delay import Delay
 from server.vehicle.foxglove.reader_table import ReaderTable
 from server.vehicle.foxglove.server_state import ServerState
@@ -58,8 +59,8 @@ class FoxgloveSource:
         self._stopped = False
         self._calls = SafeCalls(address.shown)
         self._notify = self._calls.notify
-        self._readers = ReaderTable(self._sync, self._note_once)
         self._rows = Subscribed(self._send, self._delay.subscribed)
+        self._readers = ReaderTable(self._sync, self._note_once, used=self._rows.channels.values)
         self._state = ServerState()
 
     def _forget(self) -> None:
@@ -119,19 +120,14 @@ class FoxgloveSource:
         self._end(topic)
         self._sync(topic)
 
-    def again(self, topic: str) -> None:
-        """A server refuses a second subscription beside the first. A topic that is quiet is renewed; of another one a
-        message could be missed meanwhile."""
-        if self._rows.is_quiet(topic, self._now()):
-            self.renew(topic)
+    def again(self, topic: str) -> bool:
+        """A server refuses a second subscription beside the first, and between two a message could be lost."""
+        return False
 
     def send_now(self, operation: dict[str, Any]) -> None:
         if self._socket is None or not self.is_open:
             raise LinkDown("not sent: no connection to the car")
-        commands = self._state.commands
-        if commands is None:
-            raise LinkDown("not sent: the Foxglove server has not said what it takes")
-        frame, is_binary = commands.frames(operation, self._state.offered.encodings())
+        frame, is_binary = self._state.command(operation)
         self._socket.sendMessage(frame, isBinary=is_binary)
 
     def ping(self) -> None:
@@ -141,7 +137,7 @@ class FoxgloveSource:
         self._socket.sendPing(b"%d" % self._socket.pings)
 
     async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any:
-        """Answered here, from what the server has said. Raises CallFailed, LinkDown."""
+        """Answered here, from what the server has listed. Raises CallFailed, LinkDown."""
         if not self.is_open:
             raise LinkDown("not called: no connection to the car")
         return await self._state.answer(service, arguments or {}, timeout_s)
@@ -221,31 +217,34 @@ class FoxgloveSource:
                 self.server_software = received.name
                 if self._state.introduced(received):
                     self._send(protocol.subscribe_graph())
-            case protocol.Advertise(channels, invalid):
-                if invalid:
-                    self._junk("a channel that cannot be read")
-                self._advertised(channels)
+            case protocol.Advertise():
+                self._advertised(received)
             case protocol.Unadvertise(ids):
                 for channel in self._state.offered.unadvertised(ids):
-                    self._rows.gone(channel)
+                    self._delay.ended(self._rows.gone(channel))
                     self._sync(channel.topic)
             case protocol.GraphUpdate():
                 self._state.offered.graph(received)
             case protocol.Status(level, text):
                 self._notify(self._listener.status_received, level, text)
 
-    # -- what the server said ----------------------------------------------------------------------------------------
+    # -- what the server sends ---------------------------------------------------------------------------------------
 
-    def _advertised(self, channels: tuple[protocol.Channel, ...]) -> None:
-        for channel in self._state.offered.advertised(channels):
-            self._rows.gone(channel)  # where another one had this number
+    def _advertised(self, received: protocol.Advertise) -> None:
+        if received.invalid:
+            self._junk("a channel that cannot be read")
+        for channel in self._state.offered.advertised(received.channels):
+            self._delay.ended(self._rows.gone(channel))  # where another one had this number
             self._sync(channel.topic)
+        if received.too_many or self._state.offered.is_full:
+            self._note_once(f"The Foxglove server has more than {MAX_OFFERED} channels: the others are not received.")
         self._state.advertised()
 
     def _sync(self, topic: str) -> None:
         """Subscribes to the channels of a topic that is wanted, as soon as their messages can be read."""
         if self.is_open and topic in self._rows.table:
-            self._rows.begin([one for one in self._state.offered.of(topic) if self._readers.is_ready(one)])
+            ready = [one for one in self._state.offered.of(topic) if self._readers.is_ready(one)]
+            self._delay.ended(self._rows.begin(topic, ready))
 
     def _end(self, topic: str) -> None:
         self._delay.ended(self._rows.end(topic))
@@ -255,7 +254,6 @@ class FoxgloveSource:
         channel = self._rows.channels.get(data.subscription)
         if channel is None:
             return  # of a subscription that was ended
-        self._rows.came(channel.topic, self._now())
         try:
             message = self._readers.read(channel, data.payload)
         except Undecodable as why:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 
 from server.rosbridge.subscription import Subscription
 from server.vehicle.foxglove import protocol
 from server.vehicle.foxglove.protocol import Channel
-
-QUIET_S = 2.0  # without a message for so long, a topic may be subscribed to anew and nothing is missed
 
 
 class Subscribed:
@@ -19,41 +17,40 @@ class Subscribed:
         self._send = send
         self._sent = sent
         self._ids = itertools.count(1)  # never one again: what comes late belongs to its own subscription
-        self._came_s: dict[str, float] = {}
         self.table: dict[str, Subscription] = {}
         self.channels: dict[int, Channel] = {}  # number of the subscription → its channel
 
     def closed(self) -> None:
         self.channels.clear()
-        self._came_s.clear()
 
-    def begin(self, channels: Iterable[Channel]) -> None:
-        """Subscribes to channels, as far as that is not done."""
+    def begin(self, topic: str, channels: Collection[Channel]) -> list[int]:
+        """Subscribes to these channels of a topic, as far as that is not done, and to no other one of it. The numbers
+        that are free now."""
+        ended = self._end(number for number, one in self.channels.items() if one.topic == topic and one not in channels)
         known = set(self.channels.values())
         new = {next(self._ids): channel for channel in channels if channel not in known}
-        if not new:
-            return
         self.channels.update(new)
-        for number, channel in new.items():
-            self._sent(channel.topic, number)
-        self._send(protocol.subscribe((number, channel.id) for number, channel in new.items()))
+        for number in new:
+            self._sent(topic, number)
+        if new:
+            self._send(protocol.subscribe((number, channel.id) for number, channel in new.items()))
+        return ended
 
     def end(self, topic: str) -> list[int]:
         """The numbers that are free of their topic now."""
-        ended = [number for number, channel in self.channels.items() if channel.topic == topic]
+        return self.begin(topic, ())
+
+    def _end(self, numbers: Iterable[int]) -> list[int]:
+        ended = list(numbers)
         for number in ended:
             del self.channels[number]
         if ended:
             self._send(protocol.unsubscribe(ended))
         return ended
 
-    def gone(self, channel: Channel) -> None:
-        """A channel is not offered any more, and with it its subscriptions ended."""
-        for number in [number for number, one in self.channels.items() if one.id == channel.id]:
+    def gone(self, channel: Channel) -> list[int]:
+        """A channel is not offered any more, and with it its subscriptions ended: their numbers."""
+        ended = [number for number, one in self.channels.items() if one.id == channel.id]
+        for number in ended:
             del self.channels[number]
-
-    def came(self, topic: str, at_s: float) -> None:
-        self._came_s[topic] = at_s
-
-    def is_quiet(self, topic: str, now_s: float) -> bool:
-        return now_s - self._came_s.get(topic, -QUIET_S) >= QUIET_S
+        return ended

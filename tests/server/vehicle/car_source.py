@@ -74,8 +74,8 @@ class CarSource:
     def renew(self, topic: str) -> None:
         pass
 
-    def again(self, topic: str) -> None:
-        pass
+    def again(self, topic: str) -> bool:
+        return False
 
     def ping(self) -> None:
         self.heard_s = self._now()

@@ -146,8 +146,9 @@ class KeepingBridge:
         if self.connects_s:
             asyncio.get_running_loop().call_later(self.connects_s, self._rows.__setitem__, topic, row)
 
-    def again(self, topic: str) -> None:
+    def again(self, topic: str) -> bool:
         self._begin(self._rows[topic])
+        return True
 
     def ping(self) -> None:
         pass

@@ -8,6 +8,7 @@ from typing import Any
 import orjson
 import pytest
 
+from server.rosbridge.link_errors import LinkDown
 from server.rosbridge.outgoing import NotAllowed
 from server.vehicle.foxglove.commands import CLIENT_PUBLISH, Commands
 from server.vehicle.foxglove.protocol import ServerInfo
@@ -83,6 +84,19 @@ def test_a_server_that_takes_nothing_is_sent_nothing(one: Commands, offered: tup
     assert why in problem
     with pytest.raises(NotAllowed, match=why):
         one.frames(ADVERTISE, offered)
+
+
+def test_while_no_channel_is_known_a_server_is_not_blamed() -> None:
+    """After it was dialled again: its capabilities come first."""
+    one = commands("cdr", "ros1")
+    assert one.problem(()) is None
+    with pytest.raises(LinkDown):
+        one.frames(ADVERTISE, ())
+    one.frames(ADVERTISE, ("cdr",))
+    assert one.problem(()) is None
+    for offered in ((), ("protobuf",)):  # what is advertised goes on
+        assert one.frames(PUBLISH, offered)[0].endswith(NUMBERS)
+    assert channel_of(commands("cdr", "json").frames(ADVERTISE, ()))["encoding"] == "json"
 
 
 @pytest.mark.parametrize(

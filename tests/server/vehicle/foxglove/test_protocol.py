@@ -44,7 +44,7 @@ def text(op: str, **fields: Any) -> bytes:
         (text("status", level=1, message="slow"), Status("warning", "slow")),
         (text("status", level=2, message="full", id="x"), Status("error", "full")),
         (text("status", level="high", message="odd"), Status("info", "odd")),
-        (text("advertise", channels=[ROW | {"schemaEncoding": "ros2msg"}]), Advertise((CHANNEL,), 0)),
+        (text("advertise", channels=[ROW | {"schemaEncoding": "ros2msg"}]), Advertise((CHANNEL,), 0, 0)),
         (text("unadvertise", channelIds=[1, -1, "2", True, 3]), Unadvertise((1, 3))),
         (
             text(

@@ -13,7 +13,6 @@ from typing import Any
 import foxglove
 import pytest
 from foxglove.websocket import Capability
-from websockets.asyncio.server import serve
 
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
@@ -241,26 +240,6 @@ async def test_a_rosbridge_is_no_foxglove_server() -> None:
     assert problem.code == "not_rosbridge"
     assert "not a Foxglove server" in problem.title
     assert ear.all("opened") == []
-
-
-async def test_frames_that_are_none_are_counted_and_cost_nothing_else() -> None:
-    ear = Ear()
-    frames: list[str | bytes] = ["{", b"\x01\x00", b"\x01" + bytes(12), '{"op":"advertise"}', '{"op":"serverInfo"}']
-
-    async def handler(socket: Any) -> None:
-        for frame in frames:
-            await socket.send(frame)
-        await socket.wait_closed()
-
-    async with serve(handler, "127.0.0.1", 0, subprotocols=["foxglove.websocket.v1"]) as server:  # type: ignore[list-item]
-        port = next(iter(server.sockets)).getsockname()[1]
-        async with linked(f"foxglove://127.0.0.1:{port}", ear) as source:
-            await ear.hears("opened")
-            assert await source.call("/rosapi/topics", timeout_s=20.0) == {"topics": [], "types": []}
-            assert source.junk_count == 3
-            assert source.command_problem is not None
-            assert "clientPublish" in source.command_problem
-    assert ear.all("message") == []
 
 
 @asynccontextmanager

@@ -1,7 +1,7 @@
 """A modelled server behind a radio with gaps: nothing is ever taken for newer than it is.
 
-As that of foxglove-sdk, the server keeps the messages of all topics in one queue, and answers a ping at once: the answer
-goes before what is in the queue, and behind what the system has taken. A gap stops both directions.
+As that of foxglove-sdk, the server keeps the messages of all topics in one queue, and answers a ping at once: the
+answer goes before what is in the queue, and behind what the system has taken. A gap stops both directions.
 """
 
 from __future__ import annotations
