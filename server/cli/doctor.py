@@ -169,7 +169,7 @@ async def _discover_and_report(
     if behind is not None and behind not in (ROSAPI_MISSING, ROSAPI_ENDED) and offer is None:
         return _cannot(behind)
     print(f"{address.server} on {address.shown}: answers" + (f", ROS {offer.ros}" if offer and offer.ros else ""))
-    if not address.is_foxglove:  # such a server says nothing of ROS
+    if not address.is_foxglove:  # such a server does not report on ROS
         print(f"ROS behind it: {'answers' if alive else ROS_SILENT}")
     if offer is None:
         problem = behind or ROSAPI_MISSING
@@ -196,7 +196,7 @@ async def _discover_and_report(
     not_passed = await _not_passed(offer, choice.sources, ear, asks)
     if not_passed is not None:
         print(f"{not_passed.title} {not_passed.hint}")
-    return _print(offer, shown, ear, seconds)
+    return _print(address, offer, shown, ear, seconds)
 
 
 async def _map(asks: Questions, offer: discovery.Offer) -> tuple[Choice, set[str]]:
@@ -230,7 +230,7 @@ async def _not_passed(
     return passing.problem(BLOCKED_AFTER_S)
 
 
-def _print(offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: float) -> int:
+def _print(address: Address, offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: float) -> int:
     missing, sources = [], choice.sources
     print(f"\n{'signal':<14}{'topic':<46}{'type':<34}{'rate':>9}")
     for row in TOPICS:
@@ -270,9 +270,7 @@ def _print(offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: floa
     for words in ear.words[:10]:
         print(words)
     if ear.reception.frames.rejected:
-        print(
-            f"{ear.reception.frames.rejected} frames were no rosbridge operations: {ear.reception.frames.last_reason}"
-        )
+        print(f"{ear.reception.frames.rejected} frames could not be read: {ear.reception.frames.last_reason}")
     for question in choice.questions:
         print(f"To choose, in Settings or on Signals: {question['words']}")
     needed = [signal for signal in missing if signal in REPORT_SIGNALS]
@@ -281,7 +279,7 @@ def _print(offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: floa
     if optional:
         print(f"Missing and optional: {', '.join(optional)}")
     print(
-        "rosbridge has no login: everyone on this network can read this car and command it. "
+        f"{address.server} has no login: everyone on this network can read this car and command it. "
         "docs/safety.md explains how to restrict it."
     )
     return 1 if needed else 0

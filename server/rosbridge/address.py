@@ -77,6 +77,10 @@ class Address:
         return "Foxglove's server" if self.is_foxglove else "rosbridge"
 
     @property
+    def usual_port(self) -> int:
+        return FOXGLOVE_PORT if self.is_foxglove else DEFAULT_PORT
+
+    @property
     def kind(self) -> str:
         return "Foxglove server" if self.is_foxglove else "rosbridge"
 

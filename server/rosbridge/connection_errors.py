@@ -51,7 +51,7 @@ def of_dial_error(error: BaseException, address: Address) -> Problem:
             code="refused",
             title=f"{host} is there, but nothing listens on port {port}.",
             hint=f"Start {address.server} on the car, or check the port."
-            + (" rosbridge usually listens on 9090." if port in SCHEME_PORTS.values() else ""),
+            + (f" {address.server} usually listens on {address.usual_port}." if port in SCHEME_PORTS.values() else ""),
             mark="refused",
         )
     if isinstance(error, ssl.SSLError) or (address.secure and isinstance(error, ConnectionError)):

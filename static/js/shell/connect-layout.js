@@ -111,7 +111,7 @@ function isHost(text) {
   }
 }
 
-/** Whether both are addresses of one rosbridge; the usual port may be left out. @param {string} one @param {string} other */
+/** Whether both are addresses of one server; the usual port may be left out. @param {string} one @param {string} other */
 export function isSameCar(one, other) {
   const [a, b] = [one, other].map((address) => dialled(address) || address.trim());
   return a === b;

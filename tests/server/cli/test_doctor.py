@@ -71,4 +71,5 @@ async def test_a_car_with_a_foxglove_server_is_told_too() -> None:
     assert (code, err) == (1, "")
     assert f"Foxglove's server on 127.0.0.1:{car.port}: answers, ROS 2" in out
     assert "ROS behind it" not in out
+    assert "Foxglove's server has no login" in out
     assert "/odom" in out

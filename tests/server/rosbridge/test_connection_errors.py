@@ -159,6 +159,7 @@ FOXGLOVE = parse("foxglove://car")
     ("problem", "words"),
     [
         (of_dial_error(system_error(errno.ECONNREFUSED), FOXGLOVE), "Start Foxglove's server on the car"),
+        (of_dial_error(system_error(errno.ECONNREFUSED), parse("foxglove://car:80")), "usually listens on 8765."),
         (connection_errors.not_proved(FOXGLOVE, "", 0), "it is not a Foxglove server. It speaks WebSocket, but not"),
         (connection_errors.not_proved(parse("ws://car:8765"), "", 0), "and is dialled with foxglove://"),
         (connection_errors.closed_by_bridge(FOXGLOVE, ""), "Foxglove's server on car:8765 stopped"),
