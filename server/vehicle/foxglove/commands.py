@@ -78,6 +78,8 @@ class Commands:
         )
 
     def _message(self, topic: str, message: dict[str, Any]) -> bytes:
+        if topic not in self._channels:
+            raise NotAllowed(f"{topic} is not advertised on this connection")
         id, schema = self._channels[topic]
         if schema is None or schema.encode is None:
             return protocol.message(id, json_bytes(message))

@@ -92,6 +92,8 @@ def test_while_no_channel_is_known_a_server_is_not_blamed() -> None:
     assert one.problem(()) is None
     with pytest.raises(LinkDown):
         one.frames(ADVERTISE, ())
+    with pytest.raises(NotAllowed):
+        one.frames(PUBLISH, ())
     one.frames(ADVERTISE, ("cdr",))
     assert one.problem(()) is None
     for offered in ((), ("protobuf",)):  # what is advertised goes on
