@@ -22,11 +22,13 @@ from server.judge.unit_watch import UnitBasis
 from server.rosbridge.address import Address, BadAddress, parse
 from server.rosbridge.connection_errors import LOGIN_WANTED, ROSAPI_ENDED, ROSAPI_MISSING, Problem, not_proved
 from server.rosbridge.diagnosis import SILENT_S, Diagnosis
-from server.rosbridge.link import RosLink
 from server.rosbridge.link_errors import LinkDown
+from server.rosbridge.link_listener import NOTE
+from server.rosbridge.live_source import LiveSource
 from server.rosbridge.rosapi_client import Questions
 from server.rosbridge.subscription import Subscription
 from server.vehicle import discovery
+from server.vehicle.open_source import open_source
 from server.vehicle.undelivered import BLOCKED_AFTER_S, CLIENT_COUNT, Passing
 
 CONNECT_WITHIN_S = 5.0
@@ -35,7 +37,9 @@ ROS_SILENT = "DOES NOT ANSWER (get_time); after a restart of roscore restart ros
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("address", help="the car's rosbridge: host, host:port, ws:// or wss://")
+    parser.add_argument(
+        "address", help="the car's rosbridge: host, host:port, ws:// or wss://; foxglove:// for a Foxglove server"
+    )
     parser.add_argument("--seconds", type=float, default=5.0, help="listening time (default 5)")
 
 
@@ -96,7 +100,7 @@ class _Listener:
 
     def status_received(self, level: str, text: str) -> None:
         self.spoke.set()
-        self.words.append(f"{level}: {text}")
+        self.words.append(text if level == NOTE else f"The bridge reports {level}: {text}")
 
     def junk_received(self, why: str) -> None:
         self.reception.junk(why)
@@ -107,7 +111,7 @@ class _Listener:
 
 async def _examine(address: Address, seconds: float) -> int:
     ear = _Listener()
-    link = RosLink(address, ear, now=time.monotonic)
+    link = open_source(address, ear, now=time.monotonic)
     link.start()
     try:
         with contextlib.suppress(TimeoutError):
@@ -136,7 +140,7 @@ def _cannot(problem: Problem | None) -> int:
     return 2
 
 
-async def _report(address: Address, link: RosLink, ear: _Listener, seconds: float) -> int:
+async def _report(address: Address, link: LiveSource, ear: _Listener, seconds: float) -> int:
     diagnosis = Diagnosis()
     asks = Questions(link, diagnosis, now=time.monotonic)
     try:
@@ -146,7 +150,7 @@ async def _report(address: Address, link: RosLink, ear: _Listener, seconds: floa
 
 
 async def _discover_and_report(
-    address: Address, link: RosLink, ear: _Listener, asks: Questions, diagnosis: Diagnosis, seconds: float
+    address: Address, link: LiveSource, ear: _Listener, asks: Questions, diagnosis: Diagnosis, seconds: float
 ) -> int:
     server_software = link.server_software
     asked_s = time.monotonic()
@@ -164,8 +168,9 @@ async def _discover_and_report(
         return _cannot(not_proved(address, server_software, link.junk_count))
     if behind is not None and behind not in (ROSAPI_MISSING, ROSAPI_ENDED) and offer is None:
         return _cannot(behind)
-    print(f"rosbridge on {address.shown}: answers" + (f", ROS {offer.ros}" if offer and offer.ros else ""))
-    print(f"ROS behind it: {'answers' if alive else ROS_SILENT}")
+    print(f"{address.server} on {address.shown}: answers" + (f", ROS {offer.ros}" if offer and offer.ros else ""))
+    if not address.is_foxglove:  # such a server does not report on ROS
+        print(f"ROS behind it: {'answers' if alive else ROS_SILENT}")
     if offer is None:
         problem = behind or ROSAPI_MISSING
         print(f"{problem.title} {problem.hint}")
@@ -191,7 +196,7 @@ async def _discover_and_report(
     not_passed = await _not_passed(offer, choice.sources, ear, asks)
     if not_passed is not None:
         print(f"{not_passed.title} {not_passed.hint}")
-    return _print(offer, shown, ear, seconds)
+    return _print(address, offer, shown, ear, seconds)
 
 
 async def _map(asks: Questions, offer: discovery.Offer) -> tuple[Choice, set[str]]:
@@ -225,7 +230,7 @@ async def _not_passed(
     return passing.problem(BLOCKED_AFTER_S)
 
 
-def _print(offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: float) -> int:
+def _print(address: Address, offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: float) -> int:
     missing, sources = [], choice.sources
     print(f"\n{'signal':<14}{'topic':<46}{'type':<34}{'rate':>9}")
     for row in TOPICS:
@@ -263,11 +268,9 @@ def _print(offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: floa
     for topic in others:
         print(f"  {topic:<44}{offer.topics[topic]}")
     for words in ear.words[:10]:
-        print(f"The bridge reports {words}")
+        print(words)
     if ear.reception.frames.rejected:
-        print(
-            f"{ear.reception.frames.rejected} frames were no rosbridge operations: {ear.reception.frames.last_reason}"
-        )
+        print(f"{ear.reception.frames.rejected} frames could not be read: {ear.reception.frames.last_reason}")
     for question in choice.questions:
         print(f"To choose, in Settings or on Signals: {question['words']}")
     needed = [signal for signal in missing if signal in REPORT_SIGNALS]
@@ -276,7 +279,7 @@ def _print(offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: floa
     if optional:
         print(f"Missing and optional: {', '.join(optional)}")
     print(
-        "rosbridge has no login: everyone on this network can read this car and command it. "
+        f"{address.server} has no login: everyone on this network can read this car and command it. "
         "docs/safety.md explains how to restrict it."
     )
     return 1 if needed else 0

@@ -24,7 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="[NAME=]ws://CAR:9090",
-        help="a car to connect to at the start; can be repeated; without it the page asks for an address",
+        help="a car to connect to at the start, foxglove://CAR:8765 for a Foxglove server; can be repeated; "
+        "without it the page asks for an address",
     )
     parser.add_argument(
         "--only",

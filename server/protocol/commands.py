@@ -34,7 +34,7 @@ class Connect(Prompt):
         Field(
             max_length=300,
             examples=["ws://192.168.4.1:9090"],
-            description="host, host:port, ws:// or wss://; empty: the car that was configured",
+            description="host, host:port, ws://, wss:// or foxglove://; empty: the car that was configured",
         ),
     ] = ""
 

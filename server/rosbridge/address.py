@@ -5,11 +5,13 @@ from __future__ import annotations
 import ipaddress
 import re
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from urllib.parse import SplitResult, quote, urlsplit
 
 DEFAULT_PORT = 9090  # rosbridge's own, of an address without a scheme
 SCHEME_PORTS = {"ws": 80, "wss": 443}  # of a URL without a port (RFC 6455, 3)
+FOXGLOVE_PORT = 8765  # of a Foxglove server
+FOXGLOVE_SCHEMES = {"foxglove": "ws", "foxglove+tls": "wss"}  # what is dialled for each
 MASTER_PORT = 11311  # a ROS master, which uses XML-RPC and not rosbridge
 LONGEST = 300  # letters; a host name has at most 253
 
@@ -28,7 +30,7 @@ _ISATAP = (0x00005EFE, 0x02005EFE)
 
 _NETLOC = re.compile(r"(\[[^\[\]]*\]|[^\[\]:]*)(:[^:]*)?\Z")
 _RUN_ON = re.compile(r"^\[[^\]/?#]*\][^:/?#]")  # a bracket and then no colon
-_FEW_SLASHES = re.compile(r"(?i)(wss?):/?(?=[^/\d]|\d+\.)")
+_FEW_SLASHES = re.compile(r"(?i)(wss?|foxglove(?:\+tls)?):/?(?=[^/\d]|\d+\.)")
 _LOGIN = re.compile(r"(^\s*|//)[^/?#]*@")
 _QUERY = "/%:@!$&'()*+,;=~?"
 _EXAMPLE = "Type a host and a port, such as 192.168.4.1:9090."
@@ -47,12 +49,13 @@ class BadAddress(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Address:
-    """Where a rosbridge listens."""
+    """Where a rosbridge, or a Foxglove server, listens."""
 
     host: str  # name or IP address, IPv6 without brackets
     port: int
     secure: bool = False
     path: str = ""  # with its query, as transmitted
+    is_foxglove: bool = False
 
     @property
     def shown(self) -> str:
@@ -61,13 +64,36 @@ class Address:
 
     @property
     def url(self) -> str:
-        return f"{'wss' if self.secure else 'ws'}://{_bracketed(self.host)}:{self.port}{self.path}"
+        """What is typed for this address, in full."""
+        return f"{self.scheme(secure=self.secure)}://{self.shown}{self.path}"
+
+    @property
+    def websocket_url(self) -> str:
+        return f"{'wss' if self.secure else 'ws'}://{self.shown}{self.path}"
+
+    @property
+    def server(self) -> str:
+        """What is expected there, as the subject of a sentence."""
+        return "Foxglove's server" if self.is_foxglove else "rosbridge"
+
+    @property
+    def usual_port(self) -> int:
+        return FOXGLOVE_PORT if self.is_foxglove else DEFAULT_PORT
+
+    @property
+    def kind(self) -> str:
+        return "Foxglove server" if self.is_foxglove else "rosbridge"
+
+    def scheme(self, *, secure: bool) -> str:
+        plain = "wss" if secure else "ws"
+        foxglove = next(name for name, dialled in FOXGLOVE_SCHEMES.items() if dialled == plain)
+        return foxglove if self.is_foxglove else plain
 
 
 def parse(text: str) -> Address:
-    """The address in `text`: `ws://…`, `wss://…`, `host` or `host:port`.
+    """The address in `text`: `ws://…`, `wss://…`, `host` or `host:port`; `foxglove://…` or `foxglove+tls://…`.
 
-    Without a port a URL has that of its scheme, 80 or 443, and a host alone 9090.
+    Without a port a URL has that of its scheme, 80, 443 or 8765, and a host alone 9090.
     Raises BadAddress with a sentence of its own for each habit that leads nowhere.
     """
     typed = text.strip()
@@ -90,10 +116,12 @@ def parse(text: str) -> Address:
         return _split(f"ws://{typed}", DEFAULT_PORT)
     if scheme.lower() in ("http", "https", "rosrpc"):
         raise _wrong_scheme(scheme.lower(), rest)
-    if scheme.lower() not in ("ws", "wss"):
+    if scheme.lower() in FOXGLOVE_SCHEMES:
+        return replace(_split(f"{FOXGLOVE_SCHEMES[scheme.lower()]}://{rest}", FOXGLOVE_PORT), is_foxglove=True)
+    if scheme.lower() not in SCHEME_PORTS:
         raise BadAddress(
             f"“{scheme[:20]}” is not a supported scheme.",
-            "Use ws:// or wss://, or only host and port.",
+            "Use ws:// or wss://, or only host and port; foxglove:// for a Foxglove server.",
             code="scheme",
         )
     return _split(typed, SCHEME_PORTS[scheme.lower()])

@@ -11,10 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from server.protocol.state import ConnectionProblem
-from server.rosbridge.address import SCHEME_PORTS, Address, BadAddress
+from server.rosbridge.address import FOXGLOVE_PORT, SCHEME_PORTS, Address, BadAddress
 
 LOGIN_WANTED = "login_wanted"
 BRIDGE_SILENT = "bridge_silent"
+NOT_EXPECTED = "not_rosbridge"
 ROSBRIDGE_SERVERS = ("AutobahnPython", "TornadoServer")  # what rosbridge of ROS 1 and ROS 2 is built on
 MAX_NAMES = 3  # of topics in a sentence
 
@@ -49,8 +50,8 @@ def of_dial_error(error: BaseException, address: Address) -> Problem:
         return Problem(
             code="refused",
             title=f"{host} is there, but nothing listens on port {port}.",
-            hint="Start rosbridge on the car, or check the port."
-            + (" rosbridge usually listens on 9090." if port in SCHEME_PORTS.values() else ""),
+            hint=f"Start {address.server} on the car, or check the port."
+            + (f" {address.server} usually listens on {address.usual_port}." if port in SCHEME_PORTS.values() else ""),
             mark="refused",
         )
     if isinstance(error, ssl.SSLError) or (address.secure and isinstance(error, ConnectionError)):
@@ -86,13 +87,14 @@ def _of_tls_error(error: BaseException, address: Address) -> Problem:
         return Problem(
             code="tls_untrusted",
             title=f"The certificate of {address.host} is not trusted here.",
-            hint=f"{_sentence(error.verify_message)} Install the bridge's certificate here, or try ws://{address.shown}.",
+            hint=f"{_sentence(error.verify_message)} Install the bridge's certificate here, or try "
+            f"{address.scheme(secure=False)}://{address.shown}.",
             mark="not trusted",
         )
     return Problem(
         code="tls",
         title=f"{address.shown} does not speak TLS.",
-        hint=f"Try ws://{address.shown} instead of wss://.",
+        hint=f"Try {address.scheme(secure=False)}://{address.shown} instead of {address.scheme(secure=True)}://.",
         mark="no TLS",
     )
 
@@ -121,12 +123,15 @@ def _of_system_error(error: BaseException, address: Address) -> Problem:
 
 
 def not_rosbridge(address: Address, what: str) -> Problem:
-    """Another service answers at the address; `what` describes its answer."""
+    """Another service answers at the address than is expected; `what` describes its answer."""
+    port = "rosbridge usually listens on 9090."
+    if address.is_foxglove or address.port == FOXGLOVE_PORT:
+        port = f"a Foxglove server usually listens on {FOXGLOVE_PORT}, and is dialled with foxglove://."
     return Problem(
-        code="not_rosbridge",
-        title=f"Something answers on {address.shown}, but it is not a rosbridge.",
-        hint=f"{what} Check the port: rosbridge usually listens on 9090.",
-        mark="not rosbridge",
+        code=NOT_EXPECTED,
+        title=f"Something answers on {address.shown}, but it is not a {address.kind}.",
+        hint=f"{what} Check the port: {port}",
+        mark=f"not {address.kind.split()[0]}",
     )
 
 
@@ -134,7 +139,8 @@ def not_proved(address: Address, server_software: str, junk: int) -> Problem:
     """A WebSocket from which nothing came that only a rosbridge sends; `junk`: how much else came."""
     if server_software.startswith(ROSBRIDGE_SERVERS) and not junk:
         return BRIDGE_DEAF
-    return not_rosbridge(address, "It speaks WebSocket, but not rosbridge's protocol.")
+    name = "Foxglove" if address.is_foxglove else "rosbridge"
+    return not_rosbridge(address, f"It speaks WebSocket, but not {name}'s protocol.")
 
 
 def of_handshake(address: Address, reason: str, answer: bytes) -> Problem:
@@ -144,7 +150,7 @@ def of_handshake(address: Address, reason: str, answer: bytes) -> Problem:
         return Problem(
             code="wants_tls",
             title=f"{address.shown} wants a secure connection.",
-            hint=f"Try wss://{address.shown}.",
+            hint=f"Try {address.scheme(secure=True)}://{address.shown}.",
             mark="wants TLS",
         )
     status = re.search(r"upgrade failed \[(\d+)\]", reason)
@@ -163,7 +169,9 @@ def of_handshake(address: Address, reason: str, answer: bytes) -> Problem:
         return not_rosbridge(address, "It answers, but not as a WebSocket does.")
     if "timeout" in reason:
         return not_rosbridge(address, "It accepts the connection and then sends nothing.")
-    return not_rosbridge(address, "It closes the connection at once; a secure one wants wss://.")
+    return not_rosbridge(
+        address, f"It closes the connection at once; a secure one wants {address.scheme(secure=True)}://."
+    )
 
 
 def closed_by_bridge(address: Address, why: str) -> Problem:
@@ -172,7 +180,7 @@ def closed_by_bridge(address: Address, why: str) -> Problem:
     return Problem(
         code="closed",
         title="The bridge closed the connection.",
-        hint=f"rosbridge on {address.shown} stopped, or the network dropped{detail}. "
+        hint=f"{address.server} on {address.shown} stopped, or the network dropped{detail}. "
         "The server tries again automatically.",
         mark="closed",
     )
@@ -249,7 +257,8 @@ def bridge_silent(address: Address) -> Problem:
     return Problem(
         code=BRIDGE_SILENT,
         title="The bridge does not answer.",
-        hint=f"Nothing comes from {address.shown}: the car is out of radio range, switched off, or rosbridge hangs.",
+        hint=f"Nothing comes from {address.shown}: the car is out of radio range, switched off, "
+        f"or {address.server} hangs.",
         mark="silent",
     )
 

@@ -12,6 +12,7 @@ import ipaddress
 import logging
 import socket as sockets
 import ssl
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import roslibpy
@@ -58,10 +59,11 @@ class Dialer(AsyncioRosBridgeClientFactory):  # type: ignore[misc]
 
     protocol = BridgeProtocol
 
-    def __init__(self, address: Address, owner: DialOwner) -> None:
-        url = address.url
+    def __init__(self, address: Address, owner: DialOwner, protocols: Sequence[str] = ()) -> None:
+        """`protocols`: the subprotocols that are offered, the best first."""
+        url = address.websocket_url
         self._manager = OwnLoop()
-        super(AsyncioRosBridgeClientFactory, self).__init__(url, loop=self._manager.loop)
+        super(AsyncioRosBridgeClientFactory, self).__init__(url, protocols=list(protocols), loop=self._manager.loop)
         self._proto = None
         self._proto_lock = contextlib.nullcontext()  # one loop, one thread: nothing to lock
         self._stop = False

@@ -11,7 +11,6 @@ versions in `ASSUMPTIONS`, which lists each assumption; each has its own test. W
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -21,17 +20,17 @@ from server.rosbridge.connection_errors import Problem
 from server.rosbridge.dialer import RosClient
 from server.rosbridge.fragments import TooLarge
 from server.rosbridge.frame_reader import Answer, FrameReader, InvalidFrame, Publish, Status
+from server.rosbridge.large_message import topic_of
 from server.rosbridge.link_errors import LinkDown, NoWebSocket
 from server.rosbridge.link_listener import LinkListener, Marks
 from server.rosbridge.outgoing import NotAllowed, Outgoing
 from server.rosbridge.raw_frame import RawFrame
+from server.rosbridge.safe_calls import SafeCalls
 from server.rosbridge.sent_rows import SentRows
 from server.rosbridge.service_calls import ServiceCalls
 from server.rosbridge.subscription import Subscription, operation_of
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES, BridgeProtocol
 from server.system.clean_text import short_text
-
-log = logging.getLogger("catgraph.link")
 
 ASSUMPTIONS = {
     "roslibpy": "2.1.0",
@@ -45,7 +44,6 @@ ASSUMPTIONS = {
 }
 
 LAST_WORD_S = 0.2
-MAX_FAULTS = 200  # different ones that are logged
 
 
 class RosLink:
@@ -69,6 +67,8 @@ class RosLink:
         self.attempts = 0
         self.heard_s: float | None = None  # when the bridge last sent anything, pongs included
         self._listener = listener
+        self._safe = SafeCalls(address.shown)
+        self._notify = self._safe.notify
         self._take_unparsed = take_unparsed
         self._now = now
         self._marks = marks
@@ -82,7 +82,6 @@ class RosLink:
         self._was_asked = False  # anything, on this connection
         self.junk_count = 0  # frames that were no operations, on this connection
         self.server_software = ""  # what the other side called itself in its newest handshake
-        self._faults: set[str] = set()  # already reported
 
     # -- for the session ---------------------------------------------------------------------------------------------
 
@@ -104,7 +103,7 @@ class RosLink:
     def stop(self, *, has_last_word: bool = False) -> None:
         """Close the link finally, without further listener calls. Unsent data is dropped, except, with
         `has_last_word`, what was written just now, which gets a moment to arrive."""
-        self._stopped = True
+        self._stopped = self._safe.is_stopped = True
         self._ros.factory.stop()
         self._calls.fail_all("the link was ended")
         if has_last_word and self._socket is not None:
@@ -124,7 +123,7 @@ class RosLink:
         try:
             Outgoing().frame(operation_of("subscribe", wanted))
         except NotAllowed as why:  # a name that only a hostile or broken bridge offers
-            self._log_once(f"not subscribed: {why}")
+            self._safe.log_once(f"not subscribed: {why}")
             return
         self._rows.subscribe(wanted)
 
@@ -135,9 +134,9 @@ class RosLink:
         """Renew the subscription of a topic without messages."""
         self._rows.renew(topic)
 
-    def again(self, topic: str) -> None:
+    def again(self, topic: str) -> bool:
         """As `SentRows.again`."""
-        self._rows.again(topic)
+        return self._rows.again(topic)
 
     @property
     def subscriptions(self) -> tuple[Subscription, ...]:
@@ -151,7 +150,7 @@ class RosLink:
         try:
             frame = self._outgoing.frame(operation)
         except NotAllowed as why:
-            self._log_once(f"not sent: {why}")
+            self._safe.log_once(f"not sent: {why}")
             raise
         self._was_asked = True
         self._socket.sendMessage(frame, isBinary=False)
@@ -175,6 +174,11 @@ class RosLink:
     def unanswered(self) -> int:
         """How many of these pings the bridge has not answered: so much of what was sent it may not have read."""
         return 0 if self._socket is None else self._socket.pings - self._socket.pongs
+
+    @property
+    def command_problem(self) -> str | None:
+        """Every rosbridge takes messages."""
+        return None
 
     def is_current(self, socket: BridgeProtocol) -> bool:
         """Whether this is the open connection."""
@@ -235,7 +239,10 @@ class RosLink:
             self.junk_count += 1
             self._notify(self._listener.junk_received, why)
 
-    def skipped(self, socket: BridgeProtocol, topic: str | None, size: int) -> None:
+    def skipped(self, socket: BridgeProtocol, head: bytes, tail: bytes, size: int) -> None:
+        self._skipped(socket, topic_of(head, tail, is_binary=socket.message_is_binary), size)
+
+    def _skipped(self, socket: BridgeProtocol, topic: str | None, size: int) -> None:
         if socket is self._socket:
             self._junk(socket, f"a message of more than {MAX_MESSAGE_BYTES // 2**20} MB")
             self._notify(self._listener.large_skipped, topic, size)
@@ -254,7 +261,7 @@ class RosLink:
             case InvalidFrame(why):
                 self._junk(socket, why)
             case TooLarge() as large:
-                self.skipped(socket, large.topic, large.size)
+                self._skipped(socket, large.topic, large.size)
 
     def _takes_unparsed(self, raw: RawFrame) -> bool:
         """Whether nothing more is to be done with a frame; it is parsed where this fails."""
@@ -265,29 +272,6 @@ class RosLink:
             taken = self._take_unparsed(frame)
 
         return self._notify(take, raw) and taken and not self._stopped
-
-    def _notify(self, listener: Callable[..., None], *what: Any) -> bool:
-        """Call the listener unless stopped; return False if it raised.
-
-        A fault of the listener costs this message and not the link: otherwise each such message would end the link and
-        hide all others.
-        """
-        if self._stopped:
-            return True
-        try:
-            listener(*what)
-        except Exception as error:
-            fault = f"{listener.__name__}: {type(error).__name__}"
-            if fault not in self._faults:
-                self._faults.add(fault)
-                log.exception("handler failed (logged once): error=%s source=%s", fault, self.address.shown)
-            return False
-        return True
-
-    def _log_once(self, text: str) -> None:
-        if text not in self._faults and len(self._faults) < MAX_FAULTS:
-            self._faults.add(text)
-            log.error("%s (%s)", text, self.address.shown)
 
 
 def _problem_of_dialling(error: Exception, address: Address) -> Problem:

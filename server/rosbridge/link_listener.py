@@ -6,6 +6,8 @@ from typing import Any, Protocol
 
 from server.rosbridge.connection_errors import Problem
 
+NOTE = "note"  # the level of a status that is for the operators' log
+
 
 class Marks(Protocol):
     """Who follows how late the link is."""

@@ -36,8 +36,27 @@ class CommandChannel(Protocol):
         """Drop the connection at once, so that nothing buffered is delivered later."""
 
 
+class QuestionChannel(Protocol):
+    """The part of it that answers what a session asks of rosapi."""
+
+    @property
+    def is_open(self) -> bool: ...
+
+    @property
+    def unanswered(self) -> int: ...
+
+    def start(self) -> None: ...
+
+    def stop(self) -> None: ...
+
+    def ping(self) -> None: ...
+
+    async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any:
+        """The values of a service, such as `/rosapi/topics`. Raises CallFailed where there is none, LinkDown."""
+
+
 class LiveSource(CommandChannel, Protocol):
-    """One car's source of messages for the life of its monitoring. `RosLink` (rosbridge) is the one in use.
+    """One car's source of messages for the life of its monitoring: `RosLink` (rosbridge) or `FoxgloveSource`.
 
     A new source has these methods, all called on one event loop, which return at once. It reports to its
     `LinkListener`: `link_opened` and `link_closed` at each opening and end, `dial_failed` after a failed attempt, and
@@ -65,6 +84,10 @@ class LiveSource(CommandChannel, Protocol):
         """The name of the other side's software; "" if unknown."""
 
     @property
+    def command_problem(self) -> str | None:
+        """Why no command can be sent over it, as a sentence; None: it can, or it is not known."""
+
+    @property
     def subscriptions(self) -> tuple[Subscription, ...]:
         """What is subscribed to, kept over openings."""
 
@@ -86,18 +109,19 @@ class LiveSource(CommandChannel, Protocol):
     def renew(self, topic: str) -> None:
         """Renew the subscription of a topic without messages: it ends and begins anew; what comes between is lost."""
 
-    def again(self, topic: str) -> None:
-        """Subscribe to a topic once more, without an end between: it is given what its publisher keeps."""
+    def again(self, topic: str) -> bool:
+        """Subscribe to a topic once more, without an end between: it is given what its publisher keeps. False: this
+        source cannot, and has sent nothing."""
 
     async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any:
         """The values of a service, such as `/rosapi/topics`. Raises CallFailed where there is none, LinkDown."""
 
-    def beside(self, listener: LinkListener) -> LiveSource:
-        """Another connection to the same car, not started, for calls that may be held up."""
+    def beside(self, listener: LinkListener) -> QuestionChannel:
+        """Another channel to the same car, not started, for calls that may be held up."""
 
 
 class OpenSource(Protocol):
-    """Makes the source of a car that is dialled; `RosLink` does."""
+    """Makes the source of a car that is dialled; `open_source` does, by the address."""
 
     def __call__(
         self,

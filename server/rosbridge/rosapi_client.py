@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from server.rosbridge.connection_errors import LOGIN_WANTED, Problem
 from server.rosbridge.diagnosis import Diagnosis
 from server.rosbridge.link_errors import CallFailed, LinkDown, Refusal
-from server.rosbridge.live_source import LiveSource
+from server.rosbridge.live_source import LiveSource, QuestionChannel
 
 GIVE_UP_S = 6.0  # a quick question that is so old will not be answered on this connection
 GIVE_UP_LONG_S = 30.0  # the same of a question with a long answer, which a slow link takes long to carry
@@ -72,7 +72,7 @@ class Questions:
         self._main = main
         self._diagnosis = diagnosis
         self._now = now
-        self._own: LiveSource | None = None
+        self._own: QuestionChannel | None = None
         self._listener = _Silent()
         self._overdue: dict[asyncio.Task[Any], tuple[float, bool]] = {}  # time of the call, whether it is a quick one
         self._asking = 0
@@ -126,7 +126,7 @@ class Questions:
         """No question more."""
         self._drop()
 
-    async def _link(self) -> LiveSource:
+    async def _link(self) -> QuestionChannel:
         """The connection to ask on. Raises CallFailed while it is held up."""
         now_s = self._now()
         if self._overdue:
@@ -163,7 +163,7 @@ class Questions:
             elif isinstance(error, Refusal):
                 self._diagnosis.failed(str(error))
 
-    def _suspect(self, link: LiveSource) -> None:
+    def _suspect(self, link: QuestionChannel) -> None:
         """What is not answered is held against rosapi only where the bridge has read the question: it has answered
         the ping behind it."""
         if link is self._main or link.unanswered == 0:

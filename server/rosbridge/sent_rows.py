@@ -55,11 +55,12 @@ class SentRows:
             self._operate("unsubscribe", row)
             self._operate("subscribe", row)
 
-    def again(self, topic: str) -> None:
+    def again(self, topic: str) -> bool:
         """Subscribe once more under the same id: what a publisher keeps is given, and no message is missed."""
         row = self.table.get(topic)
         if row is not None and self._is_open():
             self._begin(row)
+        return True
 
     def _begin(self, row: Subscription) -> None:
         if row.type is None:

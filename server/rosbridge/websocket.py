@@ -17,7 +17,7 @@ from typing import Protocol
 
 from roslibpy.comm.comm_asyncio import AsyncioRosBridgeProtocol
 
-from server.rosbridge.large_message import ENDS_BYTES, topic_of
+from server.rosbridge.large_message import ENDS_BYTES
 
 for _name in ("autobahn", "txaio", "roslibpy"):  # they log each dropped connection; we report it to the operator
     logging.getLogger(_name).addHandler(logging.NullHandler())
@@ -43,7 +43,7 @@ class SocketOwner(Protocol):
     def closed(self, socket: BridgeProtocol) -> None: ...
     def send_mark(self, socket: BridgeProtocol) -> None: ...
     def mark_answered(self, socket: BridgeProtocol, payload: bytes) -> None: ...
-    def skipped(self, socket: BridgeProtocol, topic: str | None, size: int) -> None: ...
+    def skipped(self, socket: BridgeProtocol, head: bytes, tail: bytes, size: int) -> None: ...
     def frame(self, socket: BridgeProtocol, payload: bytes, is_binary: bool) -> None: ...
 
 
@@ -177,9 +177,14 @@ class BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
             return
         if self._is_too_large:
             size = int(self.message_data_total_length)
-            self.factory.owner.skipped(self, topic_of(head, tail, is_binary=self.message_is_binary), size)
+            self.factory.owner.skipped(self, head, tail, size)
         else:
             self.factory.owner.frame(self, b"".join(data), self.message_is_binary)
+
+    @property
+    def is_in_message(self) -> bool:
+        """Whether a part of a message came, and not yet its end: a ping may be answered in between."""
+        return bool(self.message_data or self.message_head)
 
     @property
     def _is_too_large(self) -> bool:

@@ -26,10 +26,19 @@ class CommandTarget:
     problem: str | None = None
 
 
-def target_of(*, phase: str, sources: Mapping[str, Source], offered: Mapping[str, str] | None) -> CommandTarget:
-    """`sources` by signal; `offered` topic → type of all topics, None while unknown."""
+def target_of(
+    *,
+    phase: str,
+    sources: Mapping[str, Source],
+    offered: Mapping[str, str] | None,
+    refusal: str | None = None,
+) -> CommandTarget:
+    """`sources` by signal; `offered` topic → type of all topics, None while unknown. `refusal`: why the car's server
+    takes no message; None: it does."""
     if phase not in ("monitoring", "lost"):
         return CommandTarget(problem="No car is connected.")
+    if refusal is not None:
+        return CommandTarget(problem=refusal)
     if offered is None:
         return CommandTarget(problem="The bridge does not say which topics the car has, so the type is not confirmed.")
     has_guard = GUARD_STATE in offered and kind_of(offered.get(GUARD_CMD, "")) is not None

@@ -6,6 +6,7 @@ from typing import Any
 
 from server.rosbridge.link_errors import LinkDown
 from server.rosbridge.live_source import CommandChannel
+from server.rosbridge.outgoing import NotAllowed
 
 ADVERTISE_ID = "catgraph:slow-down"
 
@@ -38,6 +39,8 @@ class CommandPublisher:
                 self._link_now().send_now({"op": "unadvertise", "id": f"{ADVERTISE_ID}:{topic}", "topic": topic})
             except LinkDown:
                 return
+            except NotAllowed:
+                continue  # the other topics still end
 
     def publish(self, topic: str, type: str, message: dict[str, Any]) -> None:
         """One message, written now. Raises LinkDown."""

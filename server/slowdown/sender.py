@@ -8,6 +8,7 @@ still holds is dropped with it (RFC 9293, RST) instead of arriving late.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -90,7 +91,8 @@ class Sender:
     def announce(self) -> None:
         """Advertises the command topic before anything is ordered: a publisher needs a moment to find its listeners."""
         if self.target.type is not None and self.is_linked:
-            self.publisher.advertise(self.target.topic, self.target.type)
+            with contextlib.suppress(LinkDown, NotAllowed):  # each command advertises too, and has the reason
+                self.publisher.advertise(self.target.topic, self.target.type)
 
     def begin(self) -> None:
         """An order was given: the loop sends it, from the next turn on."""

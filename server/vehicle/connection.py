@@ -12,7 +12,7 @@ from monitor.state import Phase
 from server.rosbridge import connection_errors
 from server.rosbridge.address import Address, BadAddress
 from server.rosbridge.connection_errors import Problem
-from server.rosbridge.link_listener import Marks
+from server.rosbridge.link_listener import NOTE, Marks
 from server.rosbridge.live_source import LiveSource, OpenSource
 from server.rosbridge.raw_frame import RawFrame
 from server.system.supervision import Supervisor
@@ -170,7 +170,7 @@ class Connection:
             if self.phase == "connecting":
                 self.since_s = now_s
             self.phase = "failed"
-        elif problem.code == "not_rosbridge" and self.address is not None:
+        elif problem.code == connection_errors.NOT_EXPECTED and self.address is not None:
             problem = connection_errors.bridge_silent(self.address)  # it was a rosbridge before: it hangs
         self.problem = problem
         self._observer.connection_changed(now_s)
@@ -178,7 +178,9 @@ class Connection:
     def status_received(self, level: str, text: str) -> None:
         self.prove()
         log.info("bridge status: vehicle=%s level=%s text=%s", self._name, level, text)
-        if level == "error":
+        if level == NOTE:
+            self.subscriptions.noted(text)
+        elif level == "error":
             self.subscriptions.bridge_complains(text)
 
     def junk_received(self, why: str) -> None:

@@ -16,6 +16,7 @@ from server.rosbridge.rosapi_client import Asks
 MAX_TOPICS = 5000
 MAX_PUBLISHERS = 100
 MAX_NAME = 120
+BRIDGES = ("rosbridge", "foxglove_bridge")  # in the names of the nodes through which we publish ourselves
 MAX_DETAILS = 100  # types fetched one by one
 DEFINITIONS_WITHIN_S = 5.0  # rosapi reads a file for each type
 _FAILED = "# failed to get full definition text"  # a comment in place of a definition, by ROS 2: not an empty message
@@ -90,7 +91,7 @@ async def fetch_publishers(link: Asks, topic: str, *, and_bridge: bool = False) 
     if not isinstance(names, list):
         return None
     found = {name for name in names[:MAX_PUBLISHERS] if isinstance(name, str)}
-    return tuple(sorted(name[:MAX_NAME] for name in found if and_bridge or "rosbridge" not in name))
+    return tuple(sorted(name[:MAX_NAME] for name in found if and_bridge or not any(own in name for own in BRIDGES)))
 
 
 async def fetch_subscribers(link: Asks, topic: str) -> tuple[str, ...] | None:

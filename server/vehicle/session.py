@@ -17,7 +17,6 @@ from server.protocol.state import LiveState, ServerState
 from server.recording.folder import RecordingsFolder
 from server.rosbridge import address
 from server.rosbridge.connection_errors import Problem
-from server.rosbridge.link import RosLink
 from server.rosbridge.live_source import LiveSource, OpenSource
 from server.storage.storage_thread import StorageThread
 from server.system import log_context
@@ -27,6 +26,7 @@ from server.vehicle.command_handler import CommandHandler
 from server.vehicle.judgement import Judgement
 from server.vehicle.link_marks import LinkMarks
 from server.vehicle.marks import NO_PLACE, MarksPlace
+from server.vehicle.open_source import open_source
 from server.vehicle.restoration import Restoration
 from server.vehicle.session_parts import session_parts
 from server.vehicle.state_frame import state_frame
@@ -57,7 +57,7 @@ class Session:
         on_finished: Callable[[Path], None] = lambda _: None,
         marks: MarksPlace = NO_PLACE,
         storage: StorageThread | None = None,
-        open_source: OpenSource = RosLink,
+        open_source: OpenSource = open_source,
     ) -> None:
         """`recordings` None: nothing is recorded. `on_finished` is called with each part. `marks`: where those go
         that no part covers.

@@ -169,10 +169,7 @@ class SubscriptionTable:
 
     def probe(self, topic: str) -> bool:
         """Subscribe to a topic once more, to see whether its publisher keeps a sample; False: it cannot be."""
-        if not any(row.topic == topic for row in self.rows):
-            return False
-        self._again(topic, is_quiet=True)
-        return True
+        return any(row.topic == topic for row in self.rows) and self._again(topic, is_quiet=True)
 
     def tries_another(self) -> bool:
         """Whether a topic on probation, or more or less of the transforms, is to be subscribed to now; then `subscribe`
@@ -236,10 +233,11 @@ class SubscriptionTable:
             link.subscribe(subscription)
         self._delivery.follow(judged, recorded, now_s=self._now())
 
-    def _again(self, topic: str, *, is_quiet: bool = False) -> None:
+    def _again(self, topic: str, *, is_quiet: bool = False) -> bool:
+        if self._link is None or not self._link.again(topic):
+            return False
         self._note_button(topic, is_quiet=is_quiet)
-        if self._link is not None:
-            self._link.again(topic)
+        return True
 
     def _note_button(self, topic: str, *, is_quiet: bool) -> None:
         if topic == car_marks.TOPIC:

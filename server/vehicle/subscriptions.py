@@ -51,7 +51,7 @@ class Subscriptions:
         self._now = now
         self._proved = proved
         self._recognised = recognised
-        self._noted = noted
+        self.noted = noted
         self._offer: discovery.Offer | None = None
         self._look_soon = False
         self._unfit: str | None = None  # why the car's button does not mark
@@ -194,13 +194,13 @@ class Subscriptions:
                 self._subscribe()
             else:
                 self._link.unsubscribe(topic)
-            self._noted(self.table.large.sentence(topic))
+            self.noted(self.table.large.sentence(topic))
 
     def unreadable(self, topic: str, why: str) -> None:
         """A message of a recorded topic could not be read: as JSON its text is recorded, whatever it holds."""
         if self._offer is not None and self.table.is_cbor(topic):
             self._subscribe_anew(topic)
-            self._noted(f"{topic} is now received as JSON: {why} could not be read, and is not recorded.")
+            self.noted(f"{topic} is now received as JSON: {why} could not be read, and is not recorded.")
 
     def fell_silent(self) -> None:
         """The link was given up because the bridge did not answer."""
@@ -211,7 +211,7 @@ class Subscriptions:
 
     def _note_left(self, topics: list[str]) -> None:
         for topic in topics:
-            self._noted(f"{topic} is no longer received: while it is subscribed, the bridge does not answer in time.")
+            self.noted(f"{topic} is no longer received: while it is subscribed, the bridge does not answer in time.")
 
     def bridge_complains(self, text: str) -> None:
         """An error the bridge states."""
@@ -261,7 +261,7 @@ class Subscriptions:
         self._subscribe()
         before, self._unfit = self._unfit, car_marks.unfit(offer.topics.get(car_marks.TOPIC))
         if self._unfit not in (None, before):
-            self._noted(self._unfit)
+            self.noted(self._unfit)
 
     def _subscribe(self) -> None:
         self.by_topic = pipeline.by_topic(self.signals.decoded)

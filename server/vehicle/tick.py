@@ -191,7 +191,9 @@ class Tick:
         """What slows the car learns what the judge knows, and the other way round."""
         parts, topics, slow_down = self._parts, self._parts.connection.subscriptions, self._parts.slow_down
         monitor = parts.judgement.monitor
-        target = target_of(phase=parts.connection.phase, sources=topics.signals.sources, offered=topics.offered)
+        link, sources = parts.connection.link, topics.signals.sources
+        refusal = None if link is None else link.command_problem
+        target = target_of(phase=parts.connection.phase, sources=sources, offered=topics.offered, refusal=refusal)
         slow_down.limits = monitor.limits.slow_down
         slow_down.competing_publishers = topics.ros.publishers
         slow_down.car.is_steering_known = monitor.limits.steering.tyre_rad_per_unit != 0.0

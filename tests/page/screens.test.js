@@ -46,10 +46,11 @@ test('what is dialled: the port of the scheme, and that of rosbridge without a s
     'car': 'ws://car:9090', ' Car.Local ': 'ws://car.local:9090', 'car:9091': 'ws://car:9091', 'car:': 'ws://car:9090',
     'ws://car': 'ws://car:80', 'ws://car/bridge': 'ws://car:80/bridge', 'wss://car': 'wss://car:443', 'WSS://car/b?x=1': 'wss://car:443/b?x=1',
     'wss://car:9090/': 'wss://car:9090', 'car/bridge': 'ws://car:9090/bridge', 'car?x=1': 'ws://car:9090/?x=1', 'car/ü%20': 'ws://car:9090/%C3%BC%20',
+    'foxglove://car': 'foxglove://car:8765', 'Foxglove+TLS://Car:9/x': 'foxglove+tls://car:9/x',
     'fd00::1': 'ws://[fd00::1]:9090', '[fd00::1]': 'ws://[fd00::1]:9090', 'wss://[fd00::1]/x': 'wss://[fd00::1]:443/x',
   };
   for (const [typed, url] of Object.entries(rows)) assert.equal(dialled(typed), url, typed);
-  for (const typed of ['', '  ', 'my car', 'http://car', 'ftp://car', 'ws:/car', 'ws:car', 'ws://', 'car:0', 'car:70000', 'car:abc', 'a:1:2', 'car:11311', 'ros@car', '<b>']) assert.equal(dialled(typed), '', typed);
+  for (const typed of ['', '  ', 'my car', 'http://car', 'ftp://car', 'foxglove:car', 'foxglove+ws://car', 'ws:/car', 'ws:car', 'ws://', 'car:0', 'car:70000', 'car:abc', 'a:1:2', 'car:11311', 'ros@car', '<b>']) assert.equal(dialled(typed), '', typed);
 });
 
 test('what is shown is what the server dials, for each spelling of a table that the tests of the server read too', () => {

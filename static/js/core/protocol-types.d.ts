@@ -311,7 +311,7 @@ export interface ConnectCommand {
   heard_ms?: number | null;
   held_s?: number;
   kind: "connect";
-  /** host, host:port, ws:// or wss://; empty: the car that was configured */
+  /** host, host:port, ws://, wss:// or foxglove://; empty: the car that was configured */
   address?: string;
 }
 

@@ -68,7 +68,8 @@ export function bare(address) {
   return /^ws:\/\/(\[[^\]]*\]|[^:/?#]+):\d/.test(plain) ? plain.slice('ws://'.length) : plain;
 }
 
-const PORTS = { ws: 80, wss: 443 }; // of a URL without a port (RFC 6455); a host alone has rosbridge's own
+/** @type {Record<string, number>} */
+const PORTS = { ws: 80, wss: 443, foxglove: 8765, 'foxglove+tls': 8765 }; // of a URL without a port (RFC 6455); a host alone has rosbridge's own
 const PORT = 9090;
 const MASTER_PORT = 11311; // of a ROS master, which is refused
 const LONGEST = 300; // letters
@@ -81,16 +82,16 @@ const HOST = /^(?=.{1,253}$)[a-z\d_]([\w-]{0,61}[a-z\d_])?(\.[a-z\d_]([\w-]{0,61
 export function dialled(typed) {
   const text = typed.trim();
   if ([...text].length > LONGEST || /[\p{C}\p{Z}]/u.test(text)) return '';
-  const [, scheme = '', after = text] = /^(wss?):\/\/(.*)$/i.exec(text) ?? [];
+  const [, scheme = '', after = text] = /^(wss?|foxglove(?:\+tls)?):\/\/(.*)$/i.exec(text) ?? [];
   const isIpv6 = scheme === '' && isHost(`[${text}]`);
   const parts = /^(\[[\da-f:.]+\]|[\w.-]+)(?::(\d*))?([/?][^#]*)?(?:#.*)?$/i.exec(isIpv6 ? `[${text}]` : after);
-  if (!parts || (scheme === '' && /:\/\/|^wss?:\/?(?=[^/\d]|\d+\.)/i.test(text))) return '';
+  if (!parts || (scheme === '' && /:\/\/|^(?:wss?|foxglove(?:\+tls)?):\/?(?=[^/\d]|\d+\.)/i.test(text))) return '';
   const [, host = '', written = '', path = ''] = parts;
   if (!isHost(host)) return '';
-  const secure = scheme.toLowerCase() === 'wss';
-  const port = written === '' ? (scheme === '' ? PORT : PORTS[secure ? 'wss' : 'ws']) : Number(written);
+  const dials = scheme.toLowerCase() || 'ws';
+  const port = written === '' ? (scheme === '' ? PORT : PORTS[dials]) : Number(written);
   if (port < 1 || port > 65535 || port === MASTER_PORT) return '';
-  return `${secure ? 'wss' : 'ws'}://${host.toLowerCase()}:${port}${sent(path)}`;
+  return `${dials}://${host.toLowerCase()}:${port}${sent(path)}`;
 }
 
 /** A path as it is sent. @param {string} path with its query */
@@ -110,7 +111,7 @@ function isHost(text) {
   }
 }
 
-/** Whether both are addresses of one rosbridge; the usual port may be left out. @param {string} one @param {string} other */
+/** Whether both are addresses of one server; the usual port may be left out. @param {string} one @param {string} other */
 export function isSameCar(one, other) {
   const [a, b] = [one, other].map((address) => dialled(address) || address.trim());
   return a === b;

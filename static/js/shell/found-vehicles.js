@@ -41,7 +41,7 @@ export class FoundVehicles {
     if (key === this.#drawn) return;
     this.#drawn = key;
     if (!this.#found?.length) {
-      const none = this.#found ? 'None found. Enter the address of the car’s rosbridge.' : 'The server sent no list.';
+      const none = this.#found ? 'None found. Enter the address of the car’s rosbridge or Foxglove server.' : 'The server sent no list.';
       this.list.replaceChildren(html('li', { class: 'none' }, html('span', { class: 'm' }, none)));
       return;
     }

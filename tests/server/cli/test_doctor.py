@@ -9,6 +9,7 @@ import pytest
 
 from server.rosbridge_server.server import RosBridge
 from tests.server.cars import driving
+from tests.server.vehicle.foxglove.peer import peer
 
 
 async def doctor(address: str) -> tuple[int, str, str]:
@@ -60,3 +61,15 @@ async def test_what_cannot_be_examined_is_one_sentence_and_exit_2() -> None:
             assert (code, out) == (2, "")
             assert word in err
             assert len(err.splitlines()) == 1
+
+
+async def test_a_car_with_a_foxglove_server_is_told_too() -> None:
+    with peer() as car:
+        car.offer("/odom", "nav_msgs/msg/Odometry", "cdr")
+        car.offer("/fix", "foxglove.LocationFix", "json")
+        code, out, err = await doctor(car.address)
+    assert (code, err) == (1, "")
+    assert f"Foxglove's server on 127.0.0.1:{car.port}: answers, ROS 2" in out
+    assert "ROS behind it" not in out
+    assert "Foxglove's server has no login" in out
+    assert "/odom" in out

@@ -39,6 +39,20 @@ class Topics:
         self.table.opened()
 
 
+def test_where_a_second_subscription_is_not_possible_none_is_expected_to_be_answered() -> None:
+    topics = Topics()
+    topics.opened()
+    topics.table.subscribe_by_name({})
+    rows = cast("Any", topics.table._link)
+    topics.now_s += 10.0
+    assert topics.table.probe(TOPIC)
+    assert topics.table.button == Asked(110.0, is_renewal=True)
+    rows.again = lambda topic: False
+    topics.now_s += 10.0
+    assert not topics.table.probe(TOPIC)
+    assert topics.table.button == Asked(110.0, is_renewal=True)
+
+
 def test_a_quiet_row_that_is_renewed_is_no_first_subscription() -> None:
     """Without rosapi: what comes after a renewal was never given on this connection."""
     topics = Topics()

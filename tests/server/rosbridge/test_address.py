@@ -48,6 +48,10 @@ DIALLED = {
     "spaces and a line end around": ("  car:9090 \n", "ws://car:9090"),
     "highest port": ("car:65535", "ws://car:65535"),
     "lowest port": ("car:1", "ws://car:1"),
+    "foxglove": ("foxglove://car", "foxglove://car:8765"),
+    "foxglove in capitals, with a port": ("Foxglove://Car:9000/", "foxglove://car:9000"),
+    "foxglove over TLS": ("foxglove+tls://car/x?y=1", "foxglove+tls://car:8765/x?y=1"),
+    "foxglove on IPv6": ("foxglove://[fd00::1]", "foxglove://[fd00::1]:8765"),
     "longest label": ("a" * 63, f"ws://{'a' * 63}:9090"),
 }
 
@@ -57,7 +61,13 @@ def test_is_dialled(typed: str, url: str) -> None:
     address = parse(typed)
     assert address.url == url
     assert parse(address.url) == address
-    assert parse_url(address.url)[1:3] == (address.host, address.port)  # what the transport makes of it
+    assert parse_url(address.websocket_url)[1:3] == (address.host, address.port)  # what the transport makes of it
+
+
+def test_a_foxglove_server_is_dialled_as_a_websocket() -> None:
+    assert parse("foxglove://car").websocket_url == "ws://car:8765"
+    assert parse("foxglove+tls://car").websocket_url == "wss://car:8765"
+    assert not parse("ws://car:8765").is_foxglove
 
 
 def test_shown_is_host_and_port() -> None:

@@ -150,3 +150,24 @@ def test_a_refused_port_that_was_not_typed_names_the_usual_one(typed: str, is_na
     problem = of_dial_error(system_error(errno.ECONNREFUSED), parse(typed))
     assert problem.code == "refused"
     assert problem.hint.endswith("rosbridge usually listens on 9090.") is is_named
+
+
+FOXGLOVE = parse("foxglove://car")
+
+
+@pytest.mark.parametrize(
+    ("problem", "words"),
+    [
+        (of_dial_error(system_error(errno.ECONNREFUSED), FOXGLOVE), "Start Foxglove's server on the car"),
+        (of_dial_error(system_error(errno.ECONNREFUSED), parse("foxglove://car:80")), "usually listens on 8765."),
+        (connection_errors.not_proved(FOXGLOVE, "", 0), "it is not a Foxglove server. It speaks WebSocket, but not"),
+        (connection_errors.not_proved(parse("ws://car:8765"), "", 0), "and is dialled with foxglove://"),
+        (connection_errors.closed_by_bridge(FOXGLOVE, ""), "Foxglove's server on car:8765 stopped"),
+        (connection_errors.bridge_silent(FOXGLOVE), "or Foxglove's server hangs"),
+        (of_handshake(FOXGLOVE, "", b"\x15\x03"), "Try foxglove+tls://car:8765."),
+        (of_dial_error(ssl.SSLError(1, "x"), parse("foxglove+tls://car")), "Try foxglove://car:8765 instead of"),
+        (of_dial_error(untrusted(), parse("foxglove+tls://car")), "or try foxglove://car:8765."),
+    ],
+)
+def test_a_foxglove_server_is_named_as_one(problem: Problem, words: str) -> None:
+    assert words in f"{problem.title} {problem.hint}"

@@ -11,7 +11,6 @@ import orjson
 import psutil
 import pytest
 
-from server.rosbridge import link as link_module
 from server.rosbridge.codec import MAX_CONTAINERS, MAX_DEPTH
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES, MAX_SKIPPED_BYTES
 from tests.server.ear import Ear, accept, answering, bridging, linked, text_frame, until
@@ -227,7 +226,7 @@ async def test_a_listener_that_stumbles_costs_one_message_and_is_told_once() -> 
     logged: list[logging.LogRecord] = []
     handler = logging.Handler()
     handler.emit = logged.append  # type: ignore[method-assign]
-    link_module.log.addHandler(handler)
+    logging.getLogger("catgraph.link").addHandler(handler)
     take = ear.message_received
 
     def stumble(topic: str, message: Any, note: str | None) -> None:
@@ -247,7 +246,7 @@ async def test_a_listener_that_stumbles_costs_one_message_and_is_told_once() -> 
             assert ear.all("closed") == []
             assert len(logged) == 1
     finally:
-        link_module.log.removeHandler(handler)
+        logging.getLogger("catgraph.link").removeHandler(handler)
 
 
 async def test_a_listener_that_stumbles_over_a_failed_dial_does_not_end_the_dialling() -> None:

@@ -16,7 +16,10 @@ import websockets
 from server.app.app import create_app
 from server.app.config import Config
 from server.protocol import commands, slowing_commands
+from server.rosbridge.outgoing import NotAllowed
 from server.rosbridge_server.server import RosBridge
+from server.vehicle.foxglove.commands import CLIENT_PUBLISH, Commands
+from server.vehicle.foxglove.protocol import ServerInfo
 from server.vehicle.vehicle import Vehicle
 from tests.http import http_client
 from tests.server.access.test_rules import all_routes
@@ -48,6 +51,8 @@ def test_one_file_makes_operations_that_publish() -> None:
                 found[name] = made
     assert found.pop(GATE) == {"publish", "advertise", "unadvertise"}
     calls, rows = "server/rosbridge/service_calls.py", "server/rosbridge/subscription.py"
+    foxglove = found.pop("server/vehicle/foxglove/protocol.py")
+    assert foxglove == {"subscribe", "unsubscribe", "subscribeConnectionGraph", "advertise", "unadvertise"}
     assert found == {calls: {"call_service"}, rows: {"?"}}  # subscribe, unsubscribe: see below
     sent = (PROJECT / "server/rosbridge/sent_rows.py").read_text(encoding="utf-8")
     assert {node.args[0].value for node in sent_rows(sent)} == {"subscribe", "unsubscribe"}
@@ -57,6 +62,28 @@ def sent_rows(source: str) -> Iterator[Any]:
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "_operate":
             yield node
+
+
+def test_to_a_foxglove_server_only_what_passed_the_gate_is_published() -> None:
+    speaks = {"advertise", "unadvertise", "message"}
+    users: dict[str, set[str]] = {}
+    for path in sorted((PROJECT / "server").rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and node.module == "server.vehicle.foxglove.protocol":
+                assert speaks.isdisjoint(one.name for one in node.names), path
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "protocol":
+                if node.attr in speaks:
+                    users.setdefault(path.relative_to(PROJECT).as_posix(), set()).add(node.attr)
+    assert users == {"server/vehicle/foxglove/commands.py": speaks}
+    info = ServerInfo(name="car", capabilities=frozenset({CLIENT_PUBLISH}), encodings=("json",), session="")
+    for operation in (
+        {"op": "advertise", "topic": "/other", "type": "std_msgs/Bool"},
+        {"op": "publish", "topic": "/other", "msg": {"data": True}},
+        {"op": "call_service", "service": "/reset", "args": {}},
+    ):
+        with pytest.raises(NotAllowed):
+            Commands(info).frames(operation, {"json"})
 
 
 def test_one_file_uses_the_gate() -> None:

@@ -21,6 +21,7 @@ class CarSource:
 
     frame_bytes, junk_count, unanswered, attempts = 100, 0, 0, 0
     server_software = ""
+    command_problem: str | None = None
 
     def __init__(self, car: SimulatedCar, others: Mapping[str, str] = {}) -> None:
         self.car = car
@@ -73,8 +74,8 @@ class CarSource:
     def renew(self, topic: str) -> None:
         pass
 
-    def again(self, topic: str) -> None:
-        pass
+    def again(self, topic: str) -> bool:
+        return False
 
     def ping(self) -> None:
         self.heard_s = self._now()

@@ -44,6 +44,7 @@ class KeepingBridge:
 
     frame_bytes, junk_count, unanswered, attempts = 100, 0, 0, 0
     server_software = ""
+    command_problem: str | None = None
 
     def __init__(self, topics: Mapping[str, Topic], *, clients: int = 0, has_rosapi: bool = True) -> None:
         self.topics = dict(topics)
@@ -145,8 +146,9 @@ class KeepingBridge:
         if self.connects_s:
             asyncio.get_running_loop().call_later(self.connects_s, self._rows.__setitem__, topic, row)
 
-    def again(self, topic: str) -> None:
+    def again(self, topic: str) -> bool:
         self._begin(self._rows[topic])
+        return True
 
     def ping(self) -> None:
         pass
