@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { heldWords } from '../../static/js/shell/connect-layout.js';
-import { asked, dayWords, joined, lowest, tookWords } from '../../static/js/alarms/log-layout.js';
+import { asked, dayWords, eventWords, joined, lowest, tookWords } from '../../static/js/alarms/log-layout.js';
 import { dialogWords, loadWords, snackWords, standingWords } from '../../static/js/alarms/standing.js';
 
 const ALARM = /** @type {any} */ ({ active: true, text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
@@ -108,4 +108,10 @@ test('a dialog tells how bad it was, where that is not what is measured now', ()
   assert.equal(dialogWords({ ...fast, measured: speed(12.81) }), 'Active for 3.5 s. Began 12:00:00. Brake.', 'what reads the same is not said twice');
   assert.equal(dialogWords({ ...fast, active: false, measured: speed(12.84) }), 'It has returned to normal. Began 12:00:00. Highest 12.8 m/s.');
   assert.match(dialogWords({ ...fast, worst: { ...speed(3.9), side: 'below' } }), /Lowest 3\.9 m\/s\./);
+});
+
+test('what a hand-over made of an alarm is said, and one that is unacknowledged again looks like a raise', () => {
+  const words = (/** @type {string} */ change) => eventWords(event(1, { change, by: 'Ben' }));
+  assert.deepEqual([words('handed_over').icon, words('handed_over').title, words('handed_over').text], ['ok', 'Speed above limit taken over', '12.6 m/s · by Ben']);
+  assert.deepEqual([words('unacknowledged').icon, words('unacknowledged').title], ['crit', 'Speed above limit unacknowledged again']);
 });

@@ -92,7 +92,7 @@ export function episodesOf(events) {
     if (event.change === 'raised') {
       found.push({ at_ms: event.at_ms, ended_ms: null, worst: null, unit: '', side: 'above', by: null, took_s: null });
     } else if (!standing && event.change !== 'acknowledged') continue;
-    if (event.change === 'raised' || event.change === 'recaused' || event.change === 'unshelved' || event.change === 'unacknowledged') announced_ms = event.at_ms;
+    if (event.change === 'raised' || event.change === 'recaused' || event.change === 'unshelved') announced_ms = event.at_ms;
     const one = found.at(-1);
     if (!one) continue;
     if (event.worst && event.worst.value !== null) Object.assign(one, { worst: event.worst.value, unit: event.worst.unit, side: event.worst.side });

@@ -37,25 +37,25 @@ export function mount(monitor, store, say) {
 export function openPlannedStop(store, say) {
   const title = html('h2', { id: 'planned-stop-title' });
   const text = html('p', { class: 'sub', id: 'planned-stop-words' });
-  const list = html('ul', { class: 'menu-list', 'aria-label': 'Reasons' });
+  const reasons = html('div', { class: 'pair', role: 'group', 'aria-label': 'Reason' });
   const end = html('button', { type: 'button', class: 'main', 'data-operator': '' }, 'End planned stop');
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-planned-stop', 'aria-labelledby': 'planned-stop-title', 'aria-describedby': 'planned-stop-words' },
-    html('div', { class: 'bd' }, title, text), list, html('div', { class: 'keys' }, end, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
+    html('div', { class: 'bd' }, title, text), html('div', { class: 'keys' }, reasons, end, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
   const act = async (/** @type {'planned_stop' | 'end_planned_stop'} */ kind, /** @type {{reason?: Reason}} */ fields) => {
     sheet.close(); // what is refused is said beneath it
     await order(store, say, kind, fields);
   };
-  list.append(...Object.entries(REASONS).map(([reason, words]) => {
-    const key = html('button', { type: 'button', 'data-reason': reason, 'data-operator': '' }, icon('clock'), words);
+  reasons.append(...Object.entries(REASONS).map(([reason, words]) => {
+    const key = html('button', { type: 'button', class: 'key', 'data-reason': reason, 'data-operator': '' }, words);
     key.addEventListener('click', () => void act('planned_stop', { reason: /** @type {Reason} */ (reason) }));
-    return html('li', {}, key);
+    return key;
   }));
   end.addEventListener('click', () => void act('end_planned_stop', {}));
   const draw = () => {
     const stop = store.frame?.session.planned_stop ?? null;
     setText(title, stop ? titleOf(stop.reason) : 'Planned stop');
     setWords(text, sheetWords(stop));
-    show(list, stop === null);
+    show(reasons, stop === null);
     show(end, stop !== null);
   };
   const stops = [store.on('draw', draw), addSheet(sheet)];
