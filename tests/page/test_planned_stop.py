@@ -85,3 +85,20 @@ async def test_a_refusal_is_said(phone: Phone, canned: Canned) -> None:
     await phone.page.locator("[data-f=planned-stop-end]").tap()
     await expect(phone.page.locator(".snack.note")).to_contain_text("The session is busy.")
     assert sent(canned, "end_planned_stop")
+
+
+async def test_on_a_low_phone_a_warning_leaves_the_speed_in_sight(phone: Phone, canned: Canned) -> None:
+    await phone.page.set_viewport_size({"width": 320, "height": 568})
+    canned.state["session"]["planned_stop"] = stop()
+    canned.state["alarms"] = [alarm("gps_drift", "GPS drift", sound="none", planned_stop=True)]
+    await opened(phone, canned)
+    snack, line = phone.page.locator(".snack[data-f=warning]"), phone.page.locator(LINE)
+    await expect(snack).to_be_visible()
+    await expect(line).to_contain_text("Planned stop: in the workshop")
+    await expect(line.locator("[data-f=planned-stop-end]")).to_be_hidden()  # also: its style sheet has come
+    speed, above, below = [await one.bounding_box() for one in (phone.page.locator(".gauge .speed"), line, snack)]
+    assert speed is not None
+    assert above is not None
+    assert below is not None
+    assert above["y"] + above["height"] <= speed["y"]
+    assert speed["y"] + speed["height"] <= below["y"]
