@@ -27,6 +27,7 @@ class EndPlannedStop(OfPlannedStop):
 
     needs: ClassVar[Needs] = "operator"  # alarms sound again by it
     http: ClassVar[str] = "End the planned stop"
+    has_body: ClassVar[bool] = False
     kind: Literal["end_planned_stop"]
 
 
