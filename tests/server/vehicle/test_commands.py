@@ -20,6 +20,7 @@ from server.vehicle.vehicle import Vehicle
 # What changes the car's monitoring for everybody. Slowing the car is not among it, letting it go is.
 NEEDS_CONTROL = {
     "connect", "retry", "disconnect", "pause", "resume", "record", "set", "import", "ride", "arm", "disarm", "release",
+    "planned_stop",
 }  # fmt: skip
 FIELDS = {  # of the commands whose required fields alone are no command
     "connect": {"address": "http://no.bridge"},

@@ -119,6 +119,29 @@ def test_which_car_was_monitored_and_was_it_paused(
         assert past.paused_s == pytest.approx(30.0)
 
 
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        (["planned_stop"], "workshop"),
+        (["planned_stop", "paused", "resumed"], "workshop"),
+        (["planned_stop", "planned_stop_ended"], None),
+        (["planned_stop", "planned_stop_ended", "planned_stop", "lost"], "workshop"),
+        (["planned_stop", "stopped"], None),
+        (["planned_stop", "started"], None),
+        ([], None),
+    ],
+)
+def test_which_planned_stop_was_in_force(changes: list[str], reason: str | None) -> None:
+    one = bus()
+    for change in ["started", *changes]:
+        note(one, change, address="ws://a", reason="workshop", since_ms=WALL_MS - 60_000)
+    past = read(one, now_s=50.0)
+    assert (past.planned_stop and past.planned_stop.reason) == reason
+    assert ("A planned stop was in force: in the workshop." in past.words()) is (reason is not None)
+    if past.planned_stop is not None:
+        assert past.planned_stop.since_s == pytest.approx(-10.0)
+
+
 def test_a_pause_that_outlasted_a_restart_is_counted_from_its_beginning() -> None:
     one = bus()
     note(one, "started", address="ws://a")
