@@ -90,7 +90,7 @@ async def test_a_refusal_is_said(phone: Phone, canned: Canned) -> None:
 async def test_on_a_low_phone_a_warning_leaves_the_speed_in_sight(phone: Phone, canned: Canned) -> None:
     await phone.page.set_viewport_size({"width": 320, "height": 568})
     canned.state["session"]["planned_stop"] = stop()
-    canned.state["alarms"] = [alarm("gps_drift", "GPS drift", sound="none", planned_stop=True)]
+    canned.state["alarms"] = [alarm("gps_drift", "GPS drift at standstill", sound="none", planned_stop=True)]
     await opened(phone, canned)
     snack, line = phone.page.locator(".snack[data-f=warning]"), phone.page.locator(LINE)
     await expect(snack).to_be_visible()

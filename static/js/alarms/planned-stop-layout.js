@@ -13,6 +13,7 @@ export const REASONS = /** @type {Record<Reason, string>} */ ({
 });
 const MEANING = 'Its alarms are marked, and recorded as ever. Only critical ones and those of catgraph itself sound.';
 const ENDS = 'It ends by itself when the car moves.';
+export const UNKNOWN = 'Speed not known: ends by hand only.';
 const NOT_KNOWN = 'Speed not known: it does not end by itself until it is.';
 
 /** "Planned stop: in the workshop". @param {Reason} reason one of another version is not named */
@@ -20,9 +21,9 @@ export function titleOf(reason) {
   return ['Planned stop', REASONS[reason]?.toLowerCase()].filter(Boolean).join(': ');
 }
 
-/** The line under the strip: since when, by whom, and that the speed is not known. @param {PlannedStop} stop */
-export function lineWords({ since_ms, by, is_speed_known }) {
-  return [`since ${timeOfDay(since_ms)}${by ? ` by ${by}` : ''}`, is_speed_known ? '' : 'Speed not known: ends by hand only.'].filter(Boolean).join('. ');
+/** The line under the strip: since when and by whom. @param {PlannedStop} stop */
+export function lineWords({ since_ms, by }) {
+  return `since ${timeOfDay(since_ms)}${by ? ` by ${by}` : ''}`;
 }
 
 /** What the sheet says. @param {PlannedStop | null} stop */

@@ -1,6 +1,6 @@
 // A planned stop: a line under the strip as long as it is in force, and the sheet in which it begins and ends.
 
-import { lineWords, REASONS, sheetWords, titleOf } from './planned-stop-layout.js';
+import { lineWords, REASONS, sheetWords, titleOf, UNKNOWN } from './planned-stop-layout.js';
 import { html, icon, need, setText, setWords, show } from '../core/dom.js';
 import { styled } from '../core/style-sheet.js';
 import { addSheet, openSheet } from '../shell/sheet.js';
@@ -16,9 +16,10 @@ export function mount(monitor, store, say) {
   void styled('planned-stop');
   const title = html('b');
   const text = html('span', { class: 'small sub' });
+  const unknown = html('span', { class: 'small' }, UNKNOWN);
   const end = html('button', { type: 'button', class: 'key', 'data-f': 'planned-stop-end', 'data-operator': '' }, 'End');
   end.setAttribute('aria-label', 'End the planned stop');
-  const line = html('section', { class: 'banner planned-stop', 'aria-label': 'Planned stop', 'data-f': 'planned-stop-line' }, icon('clock', 's'), html('span', { role: 'status' }, title, html('br'), text), end);
+  const line = html('section', { class: 'banner planned-stop', 'aria-label': 'Planned stop', 'data-f': 'planned-stop-line' }, icon('clock', 's'), html('span', { role: 'status' }, title, text, unknown), end);
   need(monitor, ':scope > .under').append(line);
   end.addEventListener('click', () => void order(store, say, 'end_planned_stop', {}));
   const draw = () => {
@@ -28,6 +29,7 @@ export function mount(monitor, store, say) {
     if (!stop) return;
     setWords(title, titleOf(stop.reason));
     setWords(text, lineWords(stop));
+    show(unknown, !stop.is_speed_known);
   };
   draw();
   return store.on('draw', draw);
