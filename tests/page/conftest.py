@@ -67,6 +67,11 @@ def canned(canned_server: Canned) -> Canned:
     return canned_server
 
 
+def words_of(said: ConsoleMessage) -> str:
+    """With the address, of what could not be loaded."""
+    return f"{said.text} {said.location['url']}" if said.text.startswith("Failed to load resource") else said.text
+
+
 def is_complaint(said: ConsoleMessage) -> bool:
     """Whether the page says on its console that something is wrong. It is not that these tests keep its worker away,
     that a page on a slow machine shows its first number some seconds after it preloaded the font, or that the browser
@@ -112,7 +117,7 @@ class Phone:
         self.stutter_s = 0.0
         self._handled: list[Locator] = []
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("console", lambda said: self.complaints.append(said.text) if is_complaint(said) else None)
+        page.on("console", lambda said: self.complaints.append(words_of(said)) if is_complaint(said) else None)
 
     @property
     def slack_s(self) -> float:

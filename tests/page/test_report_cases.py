@@ -53,6 +53,17 @@ async def a_phone_on_each_tab(browser: Browser, address: str) -> AsyncIterator[d
             await context.close()
 
 
+async def provoke(car: Process, fault: str, page: Page) -> None:
+    """Until its alarm is there. Where the machine stood still, a check that looks back begins anew, and the fault must
+    too: a position that has drifted already does not drift."""
+    for _ in range(2):
+        await car.type(fault)
+        with contextlib.suppress(AssertionError):
+            await expect(page.locator("#sheet-alarm")).to_be_visible(timeout=LONG)
+            return
+        await car.type("stop")
+
+
 async def dialog_on_each_tab(browser: Browser, drive: Drive, fault: str, title: str, words: str) -> None:
     """The dialog stands on every tab; one OK closes it on all, and each page is where it was.
 
@@ -60,7 +71,7 @@ async def dialog_on_each_tab(browser: Browser, drive: Drive, fault: str, title: 
     """
     car, watch = drive
     async with a_phone_on_each_tab(browser, watch.address) as pages:
-        await car.type(fault)
+        await provoke(car, fault, pages["home"])
         for page in pages.values():
             sheet = page.locator("#sheet-alarm")
             await expect(sheet).to_be_visible(timeout=LONG)
@@ -173,12 +184,12 @@ async def test_case_08_a_car_that_stands_is_told(phone: Phone, drive: Drive) -> 
 
 
 @pytest.mark.gate
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(240)
 async def test_case_09_and_19_and_20_an_obstacle_on_each_of_the_five_tabs(browser: Browser, drive: Drive) -> None:
     await dialog_on_each_tab(browser, drive, "near-object 240", "Object too near", r"3\.5")
 
 
 @pytest.mark.gate
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(240)
 async def test_case_15_and_16_an_errant_gps_on_each_of_the_five_tabs(browser: Browser, drive: Drive) -> None:
     await dialog_on_each_tab(browser, drive, "gps-drift 240", "GPS drift at standstill", r"Do not trust the position")

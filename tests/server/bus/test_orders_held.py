@@ -58,10 +58,7 @@ async def way(place: Place) -> AsyncIterator[Way]:
                 await until(lambda: set(page.vehicles) == set(VEHICLES))
                 match place:
                     case "broker":
-                        hold, let_go = (
-                            (lambda: os.kill(broker.pid, signal.SIGSTOP)),
-                            (lambda: os.kill(broker.pid, signal.SIGCONT)),
-                        )
+                        hold, let_go = (lambda: freeze(broker.pid)), (lambda: os.kill(broker.pid, signal.SIGCONT))
                     case "agent":
                         hold, let_go = open_.clear, open_.set
                     case _:
@@ -72,6 +69,12 @@ async def way(place: Place) -> AsyncIterator[Way]:
                 finally:
                     let_go()
                     await agent.stop()
+
+
+def freeze(pid: int) -> None:
+    """Stops all its threads: from now on nothing is carried."""
+    os.kill(pid, signal.SIGSTOP)
+    os.waitid(os.P_PID, pid, os.WSTOPPED)
 
 
 def nats(address: str) -> str:

@@ -7,6 +7,7 @@ import struct
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,11 @@ async def subscribed(source: FoxgloveSource, *topics: str) -> None:
     await until(lambda: source.unanswered == 0)
 
 
+def is_another(source: FoxgloveSource, before: set[int]) -> bool:
+    """Whether another channel is subscribed to than these."""
+    return bool({one.id for one in source._rows.channels.values()} - before)
+
+
 def came(ear: Ear, topic: str) -> list[Any]:
     return [message for name, message, _ in ear.all("message") if name == topic]
 
@@ -106,7 +112,9 @@ async def test_a_channel_that_comes_later_and_again_under_another_number_is_subs
             await ear.hears("opened")
             assert await source.call("/rosapi/topics") == {"topics": [], "types": []}
             for number in range(1, 4):
+                before = {one.id for one in source._rows.channels.values()}
                 car.offer("/odom", ODOMETRY, "cdr")  # in place of the one before
+                await until(partial(is_another, source, before))
                 await subscribed(source, "/odom")
                 car.publish("/odom", odometry(2, float(number), 1))
                 await ear.hears("message", number)
