@@ -273,6 +273,7 @@ class NatsAgent:
     def _check_time(self, vehicle: str, asked: wire.Ask) -> None:
         """Raises NotServed: the command may not be carried out any more."""
         if self._now() >= asked.not_after_s:
+            log.warning("command_too_late vehicle=%s kind=%s", vehicle, asked.command.get("kind"))
             raise NotServed(f"the command reached {vehicle} too late and was not carried out")
 
     async def _publish(self, vehicle: str, what: str, body: wire.Body) -> None:

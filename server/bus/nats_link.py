@@ -121,15 +121,15 @@ class BrokerLink:
         async def on_ended() -> None:
             ended.set()
 
-        async def on_again() -> None:
-            self._refused.clear()  # its rights may be others now
+        async def on_lost() -> None:
+            self._refused.clear()  # by the next connection its rights may be others
 
         await client.connect(
             self._broker.address,
             name=self._name,
             error_cb=self._on_error,
             closed_cb=on_ended,
-            disconnected_cb=on_again,
+            disconnected_cb=on_lost,
             nkeys_seed_str=self._seed,
             tls=self._context,
             inbox_prefix=f"_INBOX.{secrets.token_hex(8)}",

@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from server.protocol import signed_order
 from server.protocol.command_base import BaseCommand, Name, Needs, Number, PageName, Prompt
 from server.protocol.departure_commands import DepartureCommand
 from server.protocol.doc import doc
@@ -285,11 +286,23 @@ class NotUnderstood(ValueError):
 def comes_within_s(message: Mapping[str, Any]) -> float | None:
     """In what time a command must reach the session of its car [s]; None: it may take as long as its answer.
 
-    What a device signed with the time of its newest state says itself how old it is.
+    What a device signed with the time of its newest state needs no such time: the session finds its age from that, and
+    better than by the clock of an agent, which is known only to a whole round trip.
     """
-    says_itself = message.get("signed") is not None and message.get("heard_ms") is not None
     kind = message.get("kind")
-    return COMES_WITHIN_S.get(kind) if isinstance(kind, str) and not says_itself else None
+    within_s = COMES_WITHIN_S.get(kind) if isinstance(kind, str) else None
+    return None if within_s is None or _has_age(message.get("signed")) else within_s
+
+
+def _has_age(signed: object) -> bool:
+    """Whether a signed text, which only the agent can prove, has the time of a state."""
+    if signed is None:
+        return False
+    try:
+        text = signed_order.read_text(signed_order.read_envelope(signed).text)
+    except signed_order.NotReadable:
+        return False
+    return text.command.get("heard_ms") is not None
 
 
 def too_late(message: Mapping[str, Any], wall_ms: float) -> str | None:

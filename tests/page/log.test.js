@@ -92,6 +92,7 @@ test('an acknowledgement tells how long the alarm waited for it', () => {
 test('a dialog tells with what it began, and never speaks in the present of what is over or not checked', () => {
   const near = { ...ALARM, active: true, verdict: 'fault', text: '4.1 m', trip_text: '4.8 m', raised_ms: noon_ms, for_s: 3.5, advice: 'Brake.', measured: null, limit: null };
   assert.equal(dialogWords(near), '4.1 m. Active for 3.5 s. Began 12:00:00: 4.8 m. Brake.');
+  assert.match(dialogWords({ ...near, for_s: 725 }), / Active for 12:05\. /);
   assert.equal(dialogWords({ ...near, measured: {}, limit: {}, trip_text: '4.1 m' }), 'Active for 3.5 s. Began 12:00:00. Brake.');
   assert.match(dialogWords({ ...near, trip_text: 'Obstacle 3.5 m ahead' }), / Began 12:00:00: obstacle 3.5 m ahead\./);
   assert.match(dialogWords({ ...near, trip_text: 'GPS has no fix' }), / Began 12:00:00: GPS has no fix\./, 'an abbreviation');

@@ -1,6 +1,6 @@
 // How a standing alarm and the alarm load read: pure functions, no DOM.
 
-import { age, fixed, timeOfDay } from '../core/format.js';
+import { ageWords, fixed, timeOfDay } from '../core/format.js';
 
 /**
  * What is wrong, and who has said what to it.
@@ -37,7 +37,7 @@ export function dialogWords(alarm) {
   if (!alarm.active) return ['It has returned to normal.', began, worst, mark].filter(Boolean).join(' ');
   const isBlind = alarm.verdict === 'unknown';
   const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.verdict === 'ok' ? `Returning to normal: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
-  return [cause, `Active for ${age(alarm.for_s)} s.`, began, worst, mark, alarm.advice].filter(Boolean).join(' ');
+  return [cause, `Active for ${ageWords(alarm.for_s)}.`, began, worst, mark, alarm.advice].filter(Boolean).join(' ');
 }
 
 /** How bad it was, where that is not what is measured now. @param {import('../core/protocol-types.js').StandingAlarm} alarm */

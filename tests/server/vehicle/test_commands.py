@@ -8,12 +8,13 @@ from typing import Any
 
 import pytest
 
+from server.access.order_signer import OrderSigner
 from server.app.app import create_app
 from server.app.config import Config
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.protocol.command_base import OF_PAGE
-from server.protocol.commands import BY_KIND, COMES_WITHIN_S
+from server.protocol.commands import BY_KIND, COMES_WITHIN_S, comes_within_s
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
 
@@ -87,6 +88,24 @@ OF_MOMENT = {
 def test_what_is_for_the_moment_has_a_time() -> None:
     assert set(COMES_WITHIN_S) == OF_MOMENT
     assert {kind for kind, within_s in COMES_WITHIN_S.items() if within_s != 0.5} == {"slow_down"}
+
+
+def test_a_signed_command_that_has_the_time_of_a_state_needs_no_time_on_its_way() -> None:
+    """As a page signs it, all but the kind is in the signed text. Over a slow radio to the car it would be refused."""
+
+    def signed(**fields: Any) -> dict[str, Any]:
+        text = {"kind": "slow_down", **fields}
+        return {
+            "kind": "slow_down",
+            "id": "p1",
+            "vehicle": "car",
+            "signed": OrderSigner().sign(text, vehicle="car", by="Ann", challenge="1.a", page="page-of-ann"),
+        }
+
+    assert comes_within_s(signed(heard_ms=5.0, held_s=0.1)) is None
+    assert comes_within_s(signed()) == comes_within_s({"kind": "slow_down", "heard_ms": 5.0}) == 0.3
+    assert comes_within_s({"kind": "pause", "signed": "none"}) == 0.5
+    assert comes_within_s({"kind": "acknowledge"}) is None
 
 
 @pytest.mark.parametrize("kind", sorted(OF_MOMENT))
