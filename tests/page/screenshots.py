@@ -339,6 +339,45 @@ async def paused(server: Canned, page: Page) -> None:
     server.state = state
 
 
+def at_a_planned_stop(state: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """A state of a car in the workshop, with an alarm of it that bears the mark."""
+    stop = {"reason": "workshop", "by": "A. K. (Pixel 7)", "since_ms": at("13:58:02"), "is_speed_known": True}
+    state["session"]["planned_stop"] = stop | more
+    state["signals"]["speed"]["value"]["speed_mps"] = 0.0
+    state["signals"]["acceleration"]["value"]["acceleration_mps2"] = 0.0
+    state["alarms"] = [alarm("GPS drift", "GPS drift", text="6.3 m of 2.0 m", sound="none", planned_stop=True)]
+    return state
+
+
+@scene("planned-stop")
+async def planned_stop(server: Canned, page: Page) -> None:
+    server.state = at_a_planned_stop(live())
+
+
+@scene("planned-stop-critical")
+async def planned_stop_critical(server: Canned, page: Page) -> None:
+    server.state = at_a_planned_stop(live())
+    server.state["alarms"] = [one | {"planned_stop": True} for one in too_fast(live())["alarms"]]
+
+
+@scene("planned-stop-returned")
+async def planned_stop_returned(server: Canned, page: Page) -> None:
+    server.state = at_a_planned_stop(live())
+    for one in server.state["alarms"]:
+        one |= {"state": "RTN_UNACKED", "active": False, "needs_ack": True}
+
+
+@scene("planned-stop-stale")
+async def planned_stop_stale(server: Canned, page: Page) -> None:
+    server.state = silent_car(at_a_planned_stop(live(), is_speed_known=False))
+
+
+@scene("planned-stop-no-data")
+async def planned_stop_no_data(server: Canned, page: Page) -> None:
+    await no_messages(server, page)
+    server.state["session"]["planned_stop"] = at_a_planned_stop(live(), is_speed_known=False)["session"]["planned_stop"]
+
+
 @scene("scan")
 async def scan(server: Canned, page: Page) -> None:
     server.state = live()

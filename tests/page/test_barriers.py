@@ -12,6 +12,7 @@ from tests.page.screenshots import show, silent_car, too_fast
 STATES = {
     "home": ("home-lower", "chart", "home-fault", "home-warning", "paused"),
     "silence": ("home-stale", "server-silent", "link-lost", "no-messages"),
+    "planned-stop": tuple(f"planned-stop{state}" for state in ("", "-critical", "-returned", "-stale", "-no-data")),
     "slow-down": ("slow-down-arm", "slow-down-release", "slow-down-in-dialog", "countdown"),
     "map": ("map-tiles", "map-stale", "map-none"),
     "files": ("files", "files-menu", "mail", "outbox", "replay"),
