@@ -245,9 +245,7 @@ class CommandHandler:
                 parts.slow_down.obey(command, by=by)
                 self._actions.slow_down_ordered()
             case commands.Position():
-                if parts.connection.phase == "idle":
-                    raise Refused("No car is monitored: no position is needed.")
-                parts.judgement.state.receive_phone(phone_report(command, now_s, self._wall_ms(), by), now_s)
+                self._receive_position(command, now_s, by=by)
                 return None  # many phones may report every second; the next tick judges and puts a state
             case _:
                 assert_never(command)
@@ -276,6 +274,11 @@ class CommandHandler:
         speed_mps, phase = departure_seen.speed_of(self._parts, now_s), self._parts.connection.phase
         self._parts.planned_stop.obey(command, now_s, by=by, phase=phase, speed_mps=speed_mps)
         self._actions.attention_changed()  # the summary of the car shows it
+
+    def _receive_position(self, command: commands.Position, now_s: float, *, by: str) -> None:
+        if self._parts.connection.phase == "idle":
+            raise Refused("No car is monitored: no position is needed.")
+        self._parts.judgement.state.receive_phone(phone_report(command, now_s, self._wall_ms(), by), now_s)
 
     def _ride(self, phone_: str | None, now_s: float, *, by: str) -> None:
         judgement = self._parts.judgement
