@@ -68,6 +68,7 @@ class SlowProof:
     shown: Shown | None = None  # None: nothing that the order explains
     shown_s: float | None = None
     stood_before: bool = False  # the car stood when it was ordered: there was nothing to slow
+    is_before_known: bool = True  # False: too few speeds before the first command, so that none after it prove anything
 
 
 NOTHING_SHOWN = SlowProof()
@@ -100,7 +101,10 @@ class ProofFollower:
             return
         self._since_s, self._evaluated_s = facts.sending_s, -math.inf
         self._motion = _before(list(self._speeds), facts.sending_s)
-        if self.proof.shown is None and self._motion is not None:
+        if self.proof.shown is not None:
+            return
+        self.proof = replace(self.proof, is_before_known=self._motion is not None)
+        if self._motion is not None:
             self.proof = replace(self.proof, stood_before=abs(self._motion.level_mps) < STANDS_BELOW_MPS)
 
     def add(self, at_s: float, speed_mps: float) -> None:

@@ -32,6 +32,7 @@ from monitor.snapshot import Snapshot
 
 TILE = "Slow-down"
 STANDS_ALREADY = "The car was already standing: nothing to slow"
+BEFORE_UNKNOWN = "too few speeds were received before the order to prove that it slows the car"
 STANDS_UNPROVEN = "The car stands; its speed does not prove that the order stopped it"
 WITHIN_S = 1.0  # of the first command
 FOLLOWS_WITHIN_MPS = 0.5  # once it is shown to slow, a car so near the commanded speed follows it
@@ -125,8 +126,9 @@ def obeys(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Findi
     if proof.shown is None:
         if for_s < WITHIN_S:
             return unknown(f"{text}: ordered {for_s:.1f} s ago", short="waiting")
+        why = "its speed does not prove that the order slows it" if proof.is_before_known else BEFORE_UNKNOWN
         return fault(
-            f"NOT CONFIRMED: {text}, and its speed does not prove that the order slows it. Use the physical stop",
+            f"NOT CONFIRMED: {text}, and {why}. Use the physical stop",
             brief=f"{speed_mps:.1f} m/s",
             measured=measured,
             limit=limit,

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from monitor.check import Verdict
-from monitor.checks.slow_down import STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, obeys
+from monitor.checks.slow_down import BEFORE_UNKNOWN, STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, obeys
 from monitor.slowing import SlowingFacts
 from monitor.state import State
 from monitor.values import Twist
@@ -186,6 +186,18 @@ def test_of_a_car_that_brakes_to_rest_by_itself_no_more_is_claimed_than_that_it_
             is_ordered = True
         state.receive("speed", Twist(speed_mps=speed, yaw_rate_radps=None), ORDERED_S + at_s)
     assert judged(state, ORDERED_S + 6.4, 0.0) == (Verdict.OK, STANDS_UNPROVEN)
+
+
+def test_an_order_before_the_motion_is_known_says_why_nothing_proves_it() -> None:
+    state = State()
+    for n in range(5):  # 0.2 s of speeds
+        state.receive("speed", Twist(speed_mps=6.0, yaw_rate_radps=None), ORDERED_S - 0.2 + n * 0.05)
+    state.slow(order(ORDERED_S, 6.0))
+    for n in range(1, 41):
+        state.receive("speed", Twist(speed_mps=6.0 - 1.5 * n * 0.05, yaw_rate_radps=None), ORDERED_S + n * 0.05)
+    verdict, text = judged(state, ORDERED_S + 2.0, 3.0)
+    assert verdict is Verdict.FAULT
+    assert BEFORE_UNKNOWN in text
 
 
 def test_the_proof_of_one_order_is_not_that_of_the_next() -> None:

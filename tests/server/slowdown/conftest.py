@@ -18,6 +18,7 @@ from tests.http import http_client
 from tests.server.conftest import serving
 
 PATIENCE_S = 20.0
+SPEEDS_BEFORE = 20  # that the server has received before an order; the car reports 20 a second
 ASK_S = 0.1  # the server is asked so often
 LOOK_S = 0.02  # the car itself is looked at so often: that costs nothing
 
@@ -82,6 +83,8 @@ class Field:
         await self.until(lambda state: state["decelerate"]["state"] == "not_armed")
         await self.until(lambda state: state["decelerate"]["rivals"] is not None)
         await self.until_car(lambda: self.speed_mps >= speed_mps)
+        # An order is proven against the motion before it, which must be known for half a second.
+        await self.until(lambda state: state["signals"]["speed"]["count"] >= SPEEDS_BEFORE)
         assert (await self.post("arm")).status_code == 200
 
     async def events(self, change: str = "slow_down") -> list[dict[str, Any]]:
