@@ -73,7 +73,7 @@ class Resumed(TypedDict):
 
 
 class Events(TypedDict):
-    """Events of the log, at most 100."""
+    """Events of the log, at most 400."""
 
     kind: Literal["events"]
     events: list[LogEvent]

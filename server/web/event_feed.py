@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from server.bus.bus import NotServed, PageBus
 from server.bus.log_runs import Resumed
 
 AGAIN_S = 1.0
+LEAST_A_BATCH = 100  # events in one message
+MOST_A_BATCH = 400  # some 120 kB
+QUICK_S = 0.1  # a page that has a batch within this gets a larger one next
 
 
 class EventFeed:
-    """Of one page and vehicle. `on_read` is called when events that were not in memory have been read."""
+    """Of one page and vehicle. `on_read` is called when events that were not in memory have been read.
 
-    def __init__(self, bus: PageBus, vehicle: str, on_read: Callable[[], None]) -> None:
+    A page that has missed many gets them in batches that grow while it receives them quickly, so that a slow radio
+    carries small ones between its newest values, and a fast one catches up soon.
+    """
+
+    def __init__(self, bus: PageBus, vehicle: str, now: Callable[[], float], on_read: Callable[[], None]) -> None:
         self._bus = bus
         self._vehicle = vehicle
+        self._now = now
+        self._batch = LEAST_A_BATCH
+        self._sent_s = float("-inf")
+        self._is_catching_up = False  # more events wait than one message takes
         self._on_read = on_read
         self._reading: asyncio.Task[list[dict[str, Any]]] | None = None
         self._reading_after = 0
@@ -37,8 +48,23 @@ class EventFeed:
             else:
                 return then(found)
 
-    def after(self, n: int, limit: int) -> list[dict[str, Any]]:
-        """The events after number `n`; none yet where the disk must be read, for which `on_read` is called."""
+    def sent(self, events: Sequence[object]) -> None:
+        """These were sent to the page."""
+        self._sent_s = self._now()
+        self._is_catching_up = len(events) == self._batch
+
+    def acknowledged(self) -> bool:
+        """The page has them. Returns whether it is catching up: more of them wait."""
+        if not self._is_catching_up:
+            return False
+        self._is_catching_up = False
+        is_quick = self._now() - self._sent_s <= QUICK_S
+        self._batch = min(MOST_A_BATCH, 2 * self._batch) if is_quick else LEAST_A_BATCH
+        return True
+
+    def after(self, n: int) -> list[dict[str, Any]]:
+        """The next batch after number `n`; none yet where the disk must be read, for which `on_read` is called."""
+        limit = self._batch
         recent = self._bus.recent_events(self._vehicle, n, limit)
         if recent is not None:
             return recent
@@ -51,7 +77,7 @@ class EventFeed:
         if not reading.done():
             return []
         self._reading = None
-        return reading.result() if self._reading_after == n else self.after(n, limit)
+        return reading.result() if self._reading_after == n else self.after(n)
 
     def _read(self, reading: asyncio.Task[list[dict[str, Any]]]) -> None:
         if reading.cancelled():

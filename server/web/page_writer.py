@@ -24,7 +24,6 @@ from server.web import former_page
 from server.web.event_feed import EventFeed
 from server.web.fair_wakeup import FairWakeup
 
-EVENTS_A_BATCH = 100
 RESTARTED = 1012  # RFC 6455: the page dials again, and is greeted anew
 HELLO_WITHIN_S = 10.0  # until then no event is sent: the hello names the newest that the page has; it waits 8 s at most
 OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
@@ -71,10 +70,9 @@ class PageWriter:
         self._resumed: messages.Resumed | None = None  # to be sent with the next events
         self._is_greeted = False
         self._run = ""  # of the vehicle's session when the page was greeted
-        self._feed = EventFeed(bus, vehicle, on_read=lambda: self.on_new("events"))
+        self._feed = EventFeed(bus, vehicle, now, on_read=lambda: self.on_new("events"))
         self._are_events_due = False
         self._are_events_unanswered = False
-        self._is_catching_up = False  # more events wait than one message takes
         self._has_begun = False  # the page said hello
         self._is_former = False
         self.skipped = 0  # frames that were replaced by newer ones before the page took them
@@ -148,8 +146,7 @@ class PageWriter:
 
     def have_events(self) -> None:
         """The page has the events that were sent."""
-        if self._is_catching_up:
-            self._is_catching_up = False
+        if self._feed.acknowledged():
             asyncio.get_running_loop().call_later(BATCH_EVERY_S, self.have_events)
             return
         self._are_events_unanswered = False
@@ -233,10 +230,10 @@ class PageWriter:
 
     async def _send_events(self) -> None:
         self._are_events_due = False
-        events = self._feed.after(self._event, EVENTS_A_BATCH)
+        events = self._feed.after(self._event)
         if events or self._resumed:
             self._are_events_unanswered = True
-            self._is_catching_up = len(events) == EVENTS_A_BATCH
+            self._feed.sent(events)
             self._event = events[-1]["n"] if events else self._event
             last = self._bus.last_event(self._vehicle)
             message: messages.Events = {"kind": "events", "events": cast(list[LogEvent], events), "last": last}

@@ -726,7 +726,7 @@ export interface EndPlannedStopCommand {
   kind: "end_planned_stop";
 }
 
-/** Events of the log, at most 100. */
+/** Events of the log, at most 400. */
 export interface Events {
   kind: "events";
   events: Array<LogEvent>;

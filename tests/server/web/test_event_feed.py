@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from typing import Any, cast
 
 import pytest
@@ -36,9 +37,9 @@ async def test_what_an_agent_did_not_answer_is_asked_again(monkeypatch: pytest.M
     agent, found = Agent(), list[dict[str, Any]]()
 
     def look() -> None:
-        found.extend(feed.after(4, 100))
+        found.extend(feed.after(4))
 
-    feed = EventFeed(cast(PageBus, agent), "car", look)
+    feed = EventFeed(cast(PageBus, agent), "car", time.monotonic, look)
     look()
     await until(lambda: found)
     assert (found, agent.asked) == ([{"n": 5}], 2)
@@ -48,10 +49,31 @@ async def test_what_an_agent_did_not_answer_is_asked_again(monkeypatch: pytest.M
 async def test_a_page_that_has_left_asks_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(event_feed, "AGAIN_S", 0.01)
     agent, woken = Agent(), list[int]()
-    feed = EventFeed(cast(PageBus, agent), "car", lambda: woken.append(1))
-    feed.after(4, 100)
+    feed = EventFeed(cast(PageBus, agent), "car", time.monotonic, lambda: woken.append(1))
+    feed.after(4)
     await until(lambda: agent.asked)
     await asyncio.sleep(0)
     feed.close()
     await asyncio.sleep(0.05)
     assert woken == []
+
+
+class Long:
+    """A bus with a million events, all in memory."""
+
+    def recent_events(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
+        return [{"n": n + 1 + i} for i in range(limit)]
+
+
+async def test_batches_grow_while_a_page_has_them_quickly_and_a_slow_one_gets_small_ones() -> None:
+    feed, sizes, n = EventFeed(cast(PageBus, Long()), "car", time.monotonic, lambda: None), list[int](), 0
+    for delay_s in (0.0, 0.05, 0.09, 0.05, 0.2, 0.05, 3.0):
+        events = feed.after(n)
+        n = events[-1]["n"]
+        sizes.append(len(events))
+        feed.sent(events)
+        await asyncio.sleep(delay_s)
+        assert feed.acknowledged()
+        assert not feed.acknowledged(), "of one batch once"
+    sizes.append(len(feed.after(n)))
+    assert sizes == [100, 200, 400, 400, 400, 100, 200, 100]
