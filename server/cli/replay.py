@@ -18,9 +18,8 @@ from server.cli.replay_report import Report, say
 from server.judge.message import Message
 from server.judge.ros_names import BadName, canonical_name, canonical_type
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
-from server.rosbridge_server.player import play
+from server.rosbridge_server.player import moved, play
 from server.rosbridge_server.server import CannotListen, RosBridge
-from server.rosbridge_server.stamps import moved
 from server.system.memory_limit import TOO_LARGE, bounded_memory
 
 SETTLED_S = 1.0  # --wait: so long without a new subscription

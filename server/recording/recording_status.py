@@ -10,8 +10,7 @@ from server.recording.folder import id_of, part_id
 from server.recording.parts import RecordingParts
 from server.recording.recorded_topics import Missing
 from server.recording.recorder_thread import Status
-from server.recording.recording_session import ControllerState
-from server.recording.recording_settings import GB, RecordingSettings
+from server.recording.recording_session import GB, ControllerState, RecordingSettings
 
 NOWHERE = "This server stores nothing: it was started without a data folder."
 

@@ -25,7 +25,7 @@ from server.replay.gaps import EMPTY_S, behind_gap
 from server.replay.recorded_events import MOST, NOTHING, TimelineEvents
 from server.replay.timeline import Index
 from server.vehicle import queries
-from server.vehicle.check_detail import check_answer
+from server.vehicle.queries import check_answer
 
 RATES = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 WARM_UP_S = 25.0  # of the recording, before a moment that the time line has not come to: less than a second of work

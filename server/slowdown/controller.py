@@ -20,12 +20,9 @@ from server.slowdown.command_target import CommandTarget
 from server.slowdown.countdown import Countdown
 from server.slowdown.frame import facts, slow_down_frame
 from server.slowdown.guard_client import GuardClient
-from server.slowdown.measured_car import MeasuredCar
-from server.slowdown.note import never_raising, recording_safely
 from server.slowdown.order import BY_HAND, DESERTED_S, SlowDown
-from server.slowdown.order_log import OrderLog, commanded
-from server.slowdown.response import Response
-from server.slowdown.sender import Sender
+from server.slowdown.order_log import OrderLog, Response, commanded, never_raising, recording_safely
+from server.slowdown.sender import MeasuredCar, Sender
 
 log = logging.getLogger("catgraph.slowing")
 

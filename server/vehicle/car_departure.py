@@ -18,7 +18,7 @@ from server.protocol.alarm_state import Note
 from server.protocol.departure import DepartureAnswer, DepartureItem, DepartureSignature, DepartureState
 from server.storage.storage_thread import StorageThread
 from server.vehicle.departure_file import DepartureFile
-from server.vehicle.departure_past import DeparturePast
+from server.vehicle.restore import DeparturePast
 
 DRIVES_AFTER_S = 10.0  # moving for so long is a drive, not a push
 MOVES_MPS = 0.5

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, assert_never
 
-from monitor.alarm import Refused
+from monitor.alarm import Refused, Transition
+from monitor.runner import Monitor
 from server.control import display_name
 from server.control.acting import acting_as
 from server.control.authorization import Caller
@@ -29,9 +30,9 @@ from server.protocol.messages import Answer
 from server.protocol.state import LiveState
 from server.rosbridge.address import BadAddress
 from server.storage.storage_thread import StorageThread
-from server.vehicle import departure_seen, phone, queries, responses
-from server.vehicle.check_detail import check_answer
+from server.vehicle import departure_seen, phone, queries
 from server.vehicle.outcomes import Outcomes
+from server.vehicle.queries import check_answer
 from server.vehicle.session_parts import SessionActions, SessionParts
 from server.vehicle.settings_change import SettingsChange
 
@@ -221,7 +222,7 @@ class CommandHandler:
                 return None
             case commands.Acknowledge() | commands.Silence() | commands.Shelve() | commands.Unshelve():
                 judgement = parts.judgement
-                judgement.report(responses.respond(judgement.monitor, command, now_s, by))
+                judgement.report(respond(judgement.monitor, command, now_s, by))
             case commands.TakeControl():
                 parts.authorization.obey(command, caller, now_s)
                 self._actions.attention_changed()  # the queue shows who asks for control
@@ -282,3 +283,21 @@ class CommandHandler:
         judgement.ride(phone_, now_s)
         judgement.judge(now_s)
         self._parts.event_log.note("ride", phone.phone_in_car_text(judgement.snapshot(), phone_), by=by, phone=phone_)
+
+
+def respond(
+    monitor: Monitor,
+    command: commands.Acknowledge | commands.Silence | commands.Shelve | commands.Unshelve,
+    now_s: float,
+    by: str,
+) -> Collection[Transition]:
+    """What changed by it. Raises Refused."""
+    match command:
+        case commands.Acknowledge():
+            return monitor.acknowledge(command.alarm, command.occurrence, by=by, now_s=now_s)
+        case commands.Silence():
+            return monitor.silence(command.alarm, command.occurrence, by=by, now_s=now_s)
+        case commands.Shelve():
+            return monitor.shelve(command.alarm, command.occurrence, minutes=command.minutes, by=by, now_s=now_s)
+        case _:
+            return monitor.unshelve(command.alarm, by=by, now_s=now_s)

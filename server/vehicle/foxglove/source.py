@@ -18,12 +18,10 @@ from server.rosbridge.subscription import Subscription
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES, BridgeProtocol
 from server.system.clean_text import short_text
 from server.vehicle.foxglove import protocol
-from server.vehicle.foxglove.answers import Answers
 from server.vehicle.foxglove.channels import MAX_OFFERED
 from server.vehicle.foxglove.delay import Delay
-from server.vehicle.foxglove.reader_table import ReaderTable
-from server.vehicle.foxglove.server_state import ServerState
-from server.vehicle.foxglove.subscribed import Subscribed
+from server.vehicle.foxglove.readers import ReaderTable
+from server.vehicle.foxglove.server_state import Answers, ServerState, Subscribed
 
 LAST_WORD_S = 0.2
 
