@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from monitor.recorder import RecorderFacts
 from monitor.runner import Refused
+from monitor.shell_facts import RecorderFacts
 from server.judge.active_settings import ActiveSettings
 from server.protocol.recording_state import RecordingState
 from server.recording.delay import LinkDelay

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from monitor.recorder import RecorderFacts, RecorderState
+from monitor.shell_facts import RecorderFacts, RecorderState
 from server.protocol import serialize
 from server.protocol.recording_state import RecordingState
 from server.recording import space

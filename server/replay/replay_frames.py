@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from monitor.alarm import Alarm
-from monitor.alarm_order import standing
 from monitor.check import Verdict
+from monitor.inhibition import standing
 from server.judge.offline import OfflineRun
 from server.judge.run_state import RunState
-from server.judge.unit_questions import unit_questions
+from server.judge.unit_watch import unit_questions
 from server.protocol import serialize
 from server.protocol.state import RecordedState
 from server.vehicle.mode_shown import mode_shown

@@ -12,7 +12,7 @@ from websockets.exceptions import ConnectionClosed
 
 from server.judge.message import Json
 from server.judge.ros_names import BadName, canonical_name, canonical_type
-from server.rosbridge.message_bytes import Unencodable
+from server.rosbridge.codec import Unencodable
 from server.rosbridge_server import fields
 from server.rosbridge_server.calls import Calls, Providers
 from server.rosbridge_server.client_topics import Publications, Subscription, SubscriptionRequest

@@ -21,7 +21,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from server.judge.message import Json, RosVersion
-from server.rosbridge.message_bytes import cbor_bytes, json_bytes
+from server.rosbridge.codec import cbor_bytes, json_bytes
 from server.rosbridge_server.shape import (
     FLOATS,
     INTEGERS,

@@ -11,7 +11,7 @@ from typing_extensions import Unpack
 
 from monitor.check import Verdict
 from monitor.checks.slow_down import STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, obeys, proof_of
-from monitor.slowing import SlowingFacts
+from monitor.shell_facts import SlowingFacts
 from monitor.state import Snapshot
 from server.protocol import serialize
 from server.protocol.alarm_state import EventDetails, Note

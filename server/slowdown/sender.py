@@ -15,8 +15,7 @@ from dataclasses import replace
 from typing import Any
 
 from monitor.state import Reading, Snapshot
-from server.rosbridge.link_errors import LinkDown
-from server.rosbridge.live_source import CommandChannel
+from server.rosbridge.live_source import CommandChannel, LinkDown
 from server.rosbridge.outgoing import NotAllowed
 from server.slowdown.command_target import CommandTarget, twist_message
 from server.slowdown.order import Car, SlowDown

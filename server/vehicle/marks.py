@@ -9,10 +9,10 @@ from typing import Any
 
 from monitor.alarm import Refused
 from server.bus.bus import SessionBus
-from server.control.acting import acting_as
 from server.control.authorization import Caller
+from server.control.duty import acting_as
 from server.protocol.alarm_state import Note
-from server.protocol.mark_commands import MarkCommand, PlaceMark, RemoveMark
+from server.protocol.drive_commands import MarkCommand, PlaceMark, RemoveMark
 from server.protocol.marks import DriveMark, MarkList, MarkSource
 from server.recording.controller import SessionRecording
 from server.recording.marks.media import MediaName, name_of

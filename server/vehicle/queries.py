@@ -7,21 +7,20 @@ from typing import Any
 
 from monitor.catalog import AnyCheck
 from monitor.check import Finding
-from monitor.check_minute import CheckCourse, CheckMinute
 from monitor.runner import Monitor, Refused
 from monitor.signals import SIGNALS
 from monitor.state import Snapshot, TrackPoint
 from monitor.tiles import NOT_YET
-from monitor.trends import STEP_S, TRENDS
+from monitor.trends import STEP_S, TRENDS, CheckCourse, CheckMinute
 from server.control.lease import NotInControl
 from server.judge.reception_stats import Reception
 from server.judge.settings import BadSetting, Conflict
 from server.protocol import commands, serialize
 from server.protocol import drive_trends as drive
+from server.protocol.alarm_state import CheckAnswer, CheckEnd, CheckMinuteState, TileCheck
 from server.protocol.answers import SignalsAnswer, TrackPoints
-from server.protocol.check_state import CheckAnswer, CheckEnd, CheckMinuteState, TileCheck
 from server.protocol.messages import Answer
-from server.protocol.topic_offer import TopicOffer
+from server.protocol.questions import TopicOffer
 from server.rosbridge import connection_errors
 from server.rosbridge.address import BadAddress
 from server.vehicle.judgement import Judgement

@@ -26,14 +26,13 @@ from server.vehicle.car_attention import CarAttention
 from server.vehicle.car_departure import CarDeparture
 from server.vehicle.car_driving import CarDriving
 from server.vehicle.car_handover import CarHandover
-from server.vehicle.car_planned_stop import CarPlannedStop
 from server.vehicle.connection import Connection, ConnectionObserver
 from server.vehicle.departure_file import LIST_SUFFIX, DepartureFile
 from server.vehicle.event_log import EventLog
 from server.vehicle.judgement import Judgement
 from server.vehicle.marks import Marks, MarksPlace
 from server.vehicle.message_intake import MessageIntake
-from server.vehicle.pause import Pause
+from server.vehicle.pause import CarPlannedStop, Pause
 from server.vehicle.subscriptions import Subscriptions
 from server.vehicle.tick_parts import TickParts
 

@@ -8,15 +8,13 @@ from typing import Any, Protocol
 
 from monitor.signals import SIGNALS
 from server.judge import pipeline
-from server.judge.comparisons import comparison_sources
-from server.judge.offers import offers
+from server.judge.comparisons import comparison_sources, offers
 from server.judge.shapes import type_of
 from server.judge.sources.candidates import follow
 from server.judge.sources.choice import Choice, choose
 from server.judge.sources.evidence import Evidence, Place
 from server.judge.topics import COMMAND, Source
-from server.protocol.questions import Question
-from server.protocol.topic_offer import TopicOffer
+from server.protocol.questions import Question, TopicOffer
 
 ALL_CAME_S = 2.0  # after the first message: what is slower is no candidate at first
 MOST_TOPICS = 200

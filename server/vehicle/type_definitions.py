@@ -20,7 +20,7 @@ from rosbags.typesys import get_types_from_msg
 from server.judge.message import RosVersion
 from server.recording.read.definitions import bounded, demand_few_fields
 from server.recording.read.schemas import long_type, standard
-from server.rosbridge.link_errors import CallFailed, LinkDown
+from server.rosbridge.live_source import CallFailed, LinkDown
 from server.rosbridge.rosapi_client import Asks
 from server.vehicle import discovery
 

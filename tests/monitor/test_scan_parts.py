@@ -11,9 +11,9 @@ import pytest
 
 from monitor.check import Finding
 from monitor.instruments import ObstacleLimits
-from monitor.link import LinkFacts
-from monitor.mounting import Mounting
-from monitor.scan_parts import MOST, SWEEP_S
+from monitor.scan import Mounting
+from monitor.scan_shape import MOST, SWEEP_S
+from monitor.shell_facts import LinkFacts
 from monitor.state import State
 from monitor.values import LaserScan
 from tests.monitor.checks.known import check_of

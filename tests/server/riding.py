@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from monitor.catalog import CHECKS
-from monitor.link import LinkFacts
 from monitor.runner import Monitor
+from monitor.shell_facts import LinkFacts
 from monitor.state import State
 from server.judge import pipeline
 from server.judge.phone_report import phone_report

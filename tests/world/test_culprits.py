@@ -12,7 +12,7 @@ import pytest
 from server.rosbridge import connection_errors
 from server.rosbridge.diagnosis import SILENT_S, Diagnosis
 from server.rosbridge.link import RosLink
-from server.rosbridge.link_errors import CallFailed, LinkDown
+from server.rosbridge.live_source import CallFailed, LinkDown
 from server.rosbridge.rosapi_client import Questions
 from server.vehicle import discovery
 from server.vehicle.delivery import Delivery

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from server.judge.message import RosVersion
 from server.rosbridge.codec import Unreadable
-from server.rosbridge.fragments import Fragments, TooLarge, is_fragment
+from server.rosbridge.frame_reader import Fragments, TooLarge, is_fragment
 from server.rosbridge_server import encoding as bridge
 from tests.world.transcripts import names, needs_transcripts, read
 

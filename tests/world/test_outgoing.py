@@ -24,7 +24,7 @@ from server.judge.topics import Source
 from server.recording.read.schemas import standard
 from server.rosbridge.address import parse
 from server.rosbridge.link import RosLink
-from server.rosbridge.link_errors import LinkDown
+from server.rosbridge.live_source import LinkDown
 from server.rosbridge.outgoing import PUBLISHED, SERVICES, NotAllowed, Outgoing
 from server.rosbridge.subscription import Subscription
 from server.slowdown.command_target import target_of, twist_message

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from monitor.alarm import Transition
-from monitor.stamps import StampFollower
+from monitor.car_clock import StampFollower
 from server.cli.replay import Rounds
 from server.judge.drive import Drive
 from server.judge.message import Message

@@ -15,7 +15,7 @@ from typing import Any
 import lz4.frame
 import zstandard
 
-from server.system.memory_limit import free_bytes
+from server.system.process_limits import free_bytes
 
 MOST_BYTES = 1 << 30  # of one part, unpacked; recorders write 1 MB, and one message is hardly ever larger than 100 MB
 UNASKED_BYTES = 16 << 20  # below this size the free memory is not checked

@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, Protocol
 
-from server.rosbridge.link_errors import CallFailed, LinkDown
+from server.rosbridge.live_source import CallFailed, LinkDown
 from server.rosbridge.subscription import Subscription
 from server.vehicle.foxglove import protocol
 from server.vehicle.foxglove.channels import Offered

@@ -10,10 +10,9 @@ from server.rosbridge import connection_errors
 from server.rosbridge.address import Address
 from server.rosbridge.connection_errors import Problem
 from server.rosbridge.dialer import Dialer
-from server.rosbridge.link_errors import LinkDown, NoWebSocket
-from server.rosbridge.link_listener import NOTE, LinkListener, Marks
+from server.rosbridge.link_listener import NOTE, LinkListener, Marks, SafeCalls
+from server.rosbridge.live_source import LinkDown, NoWebSocket
 from server.rosbridge.raw_frame import RawFrame
-from server.rosbridge.safe_calls import SafeCalls
 from server.rosbridge.subscription import Subscription
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES, BridgeProtocol
 from server.system.clean_text import short_text

@@ -11,7 +11,7 @@ import pytest
 
 from server.cli import export, replay
 from server.recording.read import read, recognise, rosbag1_truncated
-from server.system.memory_limit import TOO_LARGE
+from server.system.process_limits import TOO_LARGE
 
 
 def too_large(*_: object) -> NoReturn:

@@ -9,7 +9,7 @@ import pytest
 
 from server.judge.active_settings import ActiveSettings
 from server.judge.settings import SettingsFile
-from server.protocol.mark_commands import PlaceMark
+from server.protocol.drive_commands import PlaceMark
 from server.recording.controller import SessionRecording
 from server.recording.folder import RecordingsFolder
 from server.recording.recorder_thread import Status

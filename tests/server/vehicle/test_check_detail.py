@@ -7,11 +7,10 @@ from typing import Any
 
 import orjson
 
-from monitor.check_minute import CheckMinute
 from monitor.runner import Monitor
-from monitor.trends import STEP_S
+from monitor.trends import STEP_S, CheckMinute
 from monitor.values import Twist
-from server.protocol.check_state import CheckAnswer
+from server.protocol.alarm_state import CheckAnswer
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.queries import check_answer
 from tests.frames import check_shape

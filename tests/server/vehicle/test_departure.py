@@ -15,7 +15,7 @@ from monitor.values import Effort, Twist
 from server.control.authorization import Caller
 from server.judge.active_settings import ActiveSettings
 from server.judge.settings import SettingsFile
-from server.protocol.departure_commands import SetDepartureList
+from server.protocol.drive_commands import SetDepartureList
 from server.recording.standing import EarlyEntries
 from server.storage.storage_thread import StorageThread
 from server.vehicle import restore

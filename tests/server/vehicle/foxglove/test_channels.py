@@ -8,7 +8,7 @@ from typing import Any
 import orjson
 import pytest
 
-from server.rosbridge.link_errors import CallFailed
+from server.rosbridge.live_source import CallFailed
 from server.vehicle import discovery
 from server.vehicle.foxglove import channels
 from server.vehicle.foxglove.channels import UNKNOWN_NODE, Offered

@@ -1,14 +1,18 @@
-"""What is known of the link to the vehicle; the shell fills it, the checks read it."""
+"""What the server knows and the checks read: the link, the recorder, whom an alarm reaches, an order to slow."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Literal
 
 from monitor.immutable import immutable
 
 Phase = Literal["idle", "connecting", "failed", "monitoring", "lost"]
+
+# off: nothing is to be recorded; held: the link is lost, and the session goes on when it returns soon; saving: what
+# was recorded is being completed; stopped: it was to record and cannot
+RecorderState = Literal["off", "recording", "saving", "held", "stopped"]
 
 
 @immutable
@@ -50,3 +54,39 @@ class LinkFacts:
         if self.phase != "monitoring":
             return None
         return self.since_s if self.connected_s is None else max(self.since_s, self.connected_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecorderFacts:
+    """The recorder at one moment; times on the clock of `received_s`."""
+
+    state: RecorderState = "off"
+    trouble: str | None = None  # why it stopped by itself, as a sentence
+    dropped: int = 0  # messages of this session that were not recorded, because the disk was too slow
+    dropped_s: float | None = None  # when the newest of them came
+    behind_s: float = 0.0  # how long the oldest message waits to be written
+    left_gb: float | None = None  # what may still be recorded before a limit stops it; None: not known yet
+    limit: str = ""  # which limit that is, in a few words
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReachFacts:
+    """The number of operators that can hear alarms now."""
+
+    can: int = 0  # operators who have a phone that would sound an alarm now
+    of: int = 0  # operators whose phones are known
+    why: str = ""  # why the others cannot, in short; "": no operator, or all can
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowingFacts:
+    """The order at one moment; times on the clock of `received_s`."""
+
+    is_armed: bool = False
+    topic: str = ""  # where commands go
+    rivals: tuple[str, ...] = ()  # who else publishes there, by the names of their nodes
+    ordered_s: float | None = None  # time of the active order; None: none is active
+    sending_s: float | None = None  # since when its commands go out without a gap; None: they do not
+    deceleration_mps2: float = 0.0
+    commanded_mps: float | None = None  # the newest command
+    ended_at_longest_s: float | None = None  # when an order ended because it stood as long as is allowed

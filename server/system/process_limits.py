@@ -1,8 +1,10 @@
-"""A memory limit for commands that read foreign files: a packed file can declare any size."""
+"""Limits of the process: memory for commands that read foreign files, and files and connections that it may open."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
 import re
 import resource
 from collections.abc import Iterator
@@ -10,6 +12,8 @@ from pathlib import Path
 
 PART = 0.8  # of what the machine has free
 TOO_LARGE = "a part of it, unpacked, is larger than this machine's memory."
+
+KEPT_FREE = 32  # for the log, a recording, an export: below this it is said
 
 
 @contextlib.contextmanager
@@ -37,3 +41,24 @@ def _bytes(file: str, name: str) -> int | None:
         found = re.search(rf"^{name}:\s+(\d+) kB", Path(file).read_text(encoding="utf-8"), re.MULTILINE)
         return int(found[1]) * 1024 if found else None
     return None
+
+
+class FilesExhausted(OSError):
+    """Too few file descriptors are left; `str()` has the number."""
+
+
+def demand_free() -> None:
+    """Raises FilesExhausted where fewer than KEPT_FREE files can be opened. Takes some microseconds.
+
+    The system gives the lowest number that is free: all below it are taken.
+    """
+    most, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    try:
+        number = os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError as error:
+        if error.errno not in (errno.EMFILE, errno.ENFILE):
+            raise
+        raise FilesExhausted(f"no file or connection can be opened: {most} are open, and no more are allowed") from None
+    os.close(number)
+    if most != resource.RLIM_INFINITY and number > most - KEPT_FREE:
+        raise FilesExhausted(f"{most - number} more files and connections can be opened, of {most} (ulimit -n)")
