@@ -11,7 +11,7 @@ LEARNED_FROM = 20  # scans
 WHOLE = 0.01  # steps: nearer to a whole number is that number; else the increment is rounded, and either side fits
 
 SWEEP_S = 1.0  # a slower laser is of no use for driving
-MOST = 64
+MOST_PARTS = 64
 
 _Key = tuple[int, float, float, str]  # beams, first angle, increment, frame
 
@@ -85,7 +85,7 @@ class ScanParts:
         if key != self._newest or len(parts) > 1:
             parts.pop(key, None)
             for old in list(parts):
-                if reading.received_s - parts[old].received_s <= SWEEP_S and len(parts) < MOST:
+                if reading.received_s - parts[old].received_s <= SWEEP_S and len(parts) < MOST_PARTS:
                     break
                 del parts[old]
             self._newest = key

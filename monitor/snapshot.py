@@ -35,7 +35,7 @@ from monitor.values import (
     Twist,
 )
 
-KEPT = 64  # changes; a topic that flickered with every message at 1000 Hz would need as many in a tick
+MODES_KEPT = 64  # changes; a topic that flickered with every message at 1000 Hz would need as many in a tick
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +59,7 @@ class HeardModes:
         if self.changes and self.changes[-1].value == value:
             return
         self._count += 1
-        self.changes = (*self.changes[-KEPT + 1 :], HeardMode(number=self._count, at_s=at_s, value=value))
+        self.changes = (*self.changes[-MODES_KEPT + 1 :], HeardMode(number=self._count, at_s=at_s, value=value))
 
     def forget(self) -> None:
         """The clock went back: what was heard before has no time any more."""

@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser, *, uploads: bool) -> None:
         )
 
 
-def read(args: argparse.Namespace, environment: Mapping[str, str]) -> Store | None:
+def read_options(args: argparse.Namespace, environment: Mapping[str, str]) -> Store | None:
     """None: no store is named. Raises ValueError with one sentence."""
     interface: str | None = getattr(args, "depot_interface", None)
     if args.store is None:

@@ -64,7 +64,7 @@ def common_config(args: argparse.Namespace) -> Config:
         keys=keys_from(os.environ),
         map_upstream=map_options.read(args),
         worker=not args.no_worker,
-        store=store.read(args, os.environ),
+        store=store.read_options(args, os.environ),
     )
 
 

@@ -110,7 +110,7 @@ class RecordedSlowDown:
         }
 
 
-def read(row: Mapping[str, Any]) -> SlowDownEvent | None:
+def read_slowdown(row: Mapping[str, Any]) -> SlowDownEvent | None:
     """The event from its row of the log; None: it is of something else."""
     if row.get("change") not in CHANGES:
         return None

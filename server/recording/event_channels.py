@@ -84,7 +84,7 @@ def _of_event(row: Mapping[str, Any], at_s: float, start_s: float) -> RecordedEv
     if change == "ride":
         phone = row.get("phone")
         return ChosenPhone(phone=phone if isinstance(phone, str) else None)
-    if (slow_down := recorded_events.read(row)) is not None:
+    if (slow_down := recorded_events.read_slowdown(row)) is not None:
         return slow_down
     if not isinstance(row.get("alarm"), str):
         return None

@@ -36,11 +36,12 @@ SPARE_M = 1.5
 CONE_RAD = 0.12  # the distance estimator looks ±0.1 rad ahead
 CORRIDOR_M = 1.6  # the corridor is ±1.2 m wide
 
+# Of the person at the wheel.
 PEDAL_PERCENT = 46.0
-BRAKING_MPS2 = 2.0
+HAND_BRAKING_MPS2 = 2.0
 CREEP_MPS = 2.2  # by hand the car goes on at a slow pace
 SWITCH_S = 0.2  # the by-wire unit turns to manual so long after the pedal
-KEPT = 20
+KEPT_TRUTHS = 20
 
 
 class Order(enum.StrEnum):
@@ -252,7 +253,7 @@ class SafetyDriver:
     def __init__(self) -> None:
         self.mode: Literal["autonomous", "manual"] = "autonomous"
         self.pedal_percent = 0.0
-        self.interventions: deque[Truth] = deque(maxlen=KEPT)
+        self.interventions: deque[Truth] = deque(maxlen=KEPT_TRUTHS)
         self._acts_since_s: float | None = None
         self._target_mps = 0.0
         self._now_s = 0.0
@@ -269,7 +270,7 @@ class SafetyDriver:
             if not takes_over:
                 self.interventions.append(Truth(at_s=now_s, kind_of="brake", speed_mps=motion.speed_mps))
         lowest_mps = CREEP_MPS if takes_over else 0.0
-        self._target_mps = max(lowest_mps, self._target_mps - BRAKING_MPS2 * passed_s)
+        self._target_mps = max(lowest_mps, self._target_mps - HAND_BRAKING_MPS2 * passed_s)
         self.pedal_percent = PEDAL_PERCENT if motion.speed_mps > lowest_mps + 0.3 or not takes_over else 0.0
         if takes_over and self.mode == "autonomous" and now_s - self._acts_since_s >= SWITCH_S - 1e-6:
             self.mode = "manual"

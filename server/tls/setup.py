@@ -30,10 +30,10 @@ from server.tls.authority import Authority
 from server.tls.steps import PLATFORMS, Platform, platform_of
 
 MEDIA_TYPE = "application/x-apple-aspen-config"
-_OURS = uuid.UUID("5a1d3c5e-60a5-4f0c-9a44-4a0f9fb1f7a5")  # under it the ids of all our profiles are made
+_OUR_PROFILES = uuid.UUID("5a1d3c5e-60a5-4f0c-9a44-4a0f9fb1f7a5")  # under it the ids of all our profiles are made
 
-PATH = "/trusted"
-_HEADERS = [(b"cross-origin-resource-policy", b"cross-origin"), (b"cache-control", b"no-store")]
+PROBE_PATH = "/trusted"
+_PROBE_HEADERS = [(b"cross-origin-resource-policy", b"cross-origin"), (b"cache-control", b"no-store")]
 
 CERTIFICATE = "application/x-x509-ca-cert"
 FONTS = ("catgraph-numerals-500.woff2", "catgraph-numerals-700.woff2")
@@ -47,7 +47,7 @@ def mobileconfig(authority: Authority) -> bytes:
         "PayloadType": "com.apple.security.root",
         "PayloadVersion": 1,
         "PayloadIdentifier": f"catgraph.{id[:16]}.authority",
-        "PayloadUUID": str(uuid.uuid5(_OURS, f"{id} authority")).upper(),
+        "PayloadUUID": str(uuid.uuid5(_OUR_PROFILES, f"{id} authority")).upper(),
         "PayloadDisplayName": authority.name,
         "PayloadDescription": "Lets this device trust the page of one catgraph server. Private addresses only.",
         "PayloadCertificateFileName": "catgraph-ca.crt",
@@ -57,7 +57,7 @@ def mobileconfig(authority: Authority) -> bytes:
         "PayloadType": "Configuration",
         "PayloadVersion": 1,
         "PayloadIdentifier": f"catgraph.{id[:16]}",
-        "PayloadUUID": str(uuid.uuid5(_OURS, f"{id} profile")).upper(),
+        "PayloadUUID": str(uuid.uuid5(_OUR_PROFILES, f"{id} profile")).upper(),
         "PayloadDisplayName": authority.name,
         "PayloadDescription": "Then switch it on in Settings, General, About, Certificate Trust Settings.",
         "PayloadRemovalDisallowed": False,
@@ -73,8 +73,8 @@ class Probe:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "http" and scope["path"] == PATH and scope["method"] in ("GET", "HEAD"):
-            await send({"type": "http.response.start", "status": 204, "headers": _HEADERS})
+        if scope["type"] == "http" and scope["path"] == PROBE_PATH and scope["method"] in ("GET", "HEAD"):
+            await send({"type": "http.response.start", "status": 204, "headers": _PROBE_HEADERS})
             await send({"type": "http.response.body"})
             return
         await self._app(scope, receive, send)

@@ -9,7 +9,7 @@ from server.judge.frame_words import looks
 from server.judge.signals import TOPICS
 from server.judge.sources import namespaces
 from server.judge.sources.evidence import Evidence
-from server.judge.sources.source import BY_SIGNAL, COMMAND, Source, plain_type, source_of
+from server.judge.sources.source import BY_SIGNAL, Source, plain_type, source_of
 from server.judge.topic import Topic
 from server.protocol.questions import Question
 
@@ -204,11 +204,6 @@ def what_is_known(one: Candidate, signal: str, evidence: Evidence) -> str:
     if known.frame:
         words.append(f"frame {known.frame}")
     return ", ".join(words)
-
-
-__all__ = [
-    "COMMAND", "Candidate", "Pools", "cars_of", "follow", "named_first", "pools_of", "to_compare", "what_is_known",
-]  # fmt: skip
 
 
 def counted(count: int, what: str) -> str:

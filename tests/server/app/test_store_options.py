@@ -27,11 +27,11 @@ def parsed(*arguments: str, uploads: bool = True) -> argparse.Namespace:
 
 
 def test_a_store_and_the_network_of_the_depot() -> None:
-    assert store.read(parsed(), LOGIN) is None
-    found = store.read(parsed("--store", "s3://b-1/x", "--depot-interface", "wlan0"), LOGIN)
+    assert store.read_options(parsed(), LOGIN) is None
+    found = store.read_options(parsed("--store", "s3://b-1/x", "--depot-interface", "wlan0"), LOGIN)
     assert found is not None
     assert (found.address.text, found.depot_interface) == ("s3://b-1/x", "wlan0")
-    node = store.read(parsed("--store", "s3://b-1", uploads=False), LOGIN)
+    node = store.read_options(parsed("--store", "s3://b-1", uploads=False), LOGIN)
     assert node is not None
     assert node.depot_interface is None
 
@@ -48,13 +48,13 @@ def test_a_store_and_the_network_of_the_depot() -> None:
 )
 def test_what_cannot_be_is_refused(arguments: tuple[str, ...], sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
-        store.read(parsed(*arguments), LOGIN)
+        store.read_options(parsed(*arguments), LOGIN)
 
 
 def test_the_client_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store, "find_spec", lambda name: None)
     with pytest.raises(ValueError, match=r"pip install 'catgraph\[store\]'"):
-        store.read(parsed("--store", "s3://b-1"), LOGIN)
+        store.read_options(parsed("--store", "s3://b-1"), LOGIN)
 
 
 def test_a_server_without_a_login_says_so(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
