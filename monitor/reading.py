@@ -75,7 +75,10 @@ class Extent:
 
 
 class ReadingHistory:
-    """The last second of one signal's readings; bounded by time and number."""
+    """The recent values of a signal, for the closing speed of an object.
+
+    The last second of one signal's readings; bounded by time and number.
+    """
 
     __slots__ = ("_readings", "before")
 
@@ -97,7 +100,10 @@ class ReadingHistory:
 
 
 class ReadingTable:
-    """Copies on write: what a snapshot shares is copied before the next change."""
+    """The newest readings and the ranges of all signals, which snapshots share without a copy.
+
+    Copies on write: what a snapshot shares is copied before the next change.
+    """
 
     __slots__ = ("_extents", "_extents_shared", "_readings_shared", "newest")
 

@@ -70,7 +70,10 @@ def habit_words(usual: frozenset[int] | None) -> str | None:
 
 
 class ScanParts:
-    """The newest message of each direction. Times are the receiver's, in seconds."""
+    """The parts of a sweep, where a laser sends them one by one: each message looks into another direction.
+
+    The newest message of each direction. Times are the receiver's, in seconds.
+    """
 
     __slots__ = ("_newest", "_parts")
 

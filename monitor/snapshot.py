@@ -48,7 +48,10 @@ class HeardMode:
 
 
 class HeardModes:
-    """Follows the messages of the mode; bounded."""
+    """Every change of what the car says of who drives, between one judgement and the next.
+
+    Follows the messages of the mode; bounded.
+    """
 
     def __init__(self) -> None:
         self.changes: tuple[HeardMode, ...] = ()

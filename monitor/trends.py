@@ -115,7 +115,10 @@ class _Ring:
 
 
 class CheckMinute:
-    """All times are seconds of one monotonic clock."""
+    """The last minute of every check: what it measured against which limit, and since when it answers as it does.
+
+    All times are seconds of one monotonic clock.
+    """
 
     def __init__(self) -> None:
         self._rings: dict[str, _Ring] = {}

@@ -79,7 +79,10 @@ class Cookies:
 
 
 class Tickets:
-    """Those not used yet."""
+    """One-shot tickets for the socket: issued to an authenticated request or socket, used up by the next socket.
+
+    Those not used yet.
+    """
 
     def __init__(self) -> None:
         self._open: OrderedDict[str, tuple[str, float]] = OrderedDict()  # ticket → whose, until when [s]

@@ -97,7 +97,10 @@ class _Tries:
 
 
 class PinThrottle:
-    """Counts wrong tries. A try is admitted and checked without an await between, so that parallel tries all count."""
+    """Growing waits after wrong PINs, per peer and for the whole server. Time is an argument.
+
+    Counts wrong tries. A try is admitted and checked without an await between, so that parallel tries all count.
+    """
 
     def __init__(self) -> None:
         self._all = _Tries()

@@ -33,7 +33,10 @@ class BadPeopleEntry(ValueError):
 
 
 class SharedPeople:
-    """Of one node."""
+    """What is shared about people and duties.
+
+    Of one node.
+    """
 
     def __init__(self, people: People) -> None:
         self._people = people
@@ -137,7 +140,10 @@ class BadEntry(ValueError):
 
 
 class SharedDevices:
-    """Of one node. `wall_ms`: its time of day in ms since 1970."""
+    """What is shared about paired devices, and with them about people.
+
+    Of one node. `wall_ms`: its time of day in ms since 1970.
+    """
 
     def __init__(self, access: Access, *, wall_ms: Callable[[], int], people: SharedPeople | None = None) -> None:
         """`people`: who is on duty at these devices is shared with them."""

@@ -186,7 +186,10 @@ def _flat(in_force: Mapping[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SettingsOverride:
-    """Settings of a file or a recording; everything else stays as the car's profile has it."""
+    """Settings that a recording is judged with, laid over the car's profile.
+
+    Settings of a file or a recording; everything else stays as the car's profile has it.
+    """
 
     name: str = ""  # of the file
     values: Mapping[str, float] = field(default_factory=dict)  # "speed_limit.max_mps": 9.0

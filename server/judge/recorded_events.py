@@ -52,7 +52,10 @@ class RecordedOrder:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedSlowDown:
-    """What is known of it at one moment."""
+    """The slow-down as the recording has it: armed, ordered, on its way, proven or not, released.
+
+    What is known of it at one moment.
+    """
 
     armed_by: str | None = None
     topic: str | None = None

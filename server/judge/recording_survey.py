@@ -39,7 +39,10 @@ class Rows(Protocol):
 
 
 class RecordedTransforms:
-    """A latched message is only at the beginning, and what it says holds for the whole drive."""
+    """The transforms of a recording: read before it is judged, wherever in it they are.
+
+    A latched message is only at the beginning, and what it says holds for the whole drive.
+    """
 
     def __init__(self, source: Rows, names: Mapping[str, str], types: Mapping[str, str]) -> None:
         """`names`: topic as the recording spells it → as a bridge would offer it; `types`: that → type."""
@@ -131,8 +134,11 @@ class _Progress:
 
 
 def survey(recording: UnitRows, epochs: Sequence[Surveyed]) -> dict[Key, Evidence]:
-    """The evidence of the whole drive, by signal and topic as a bridge spells it; nothing is read where nothing is in
-    doubt. What cannot be read ends it: the run that follows reports that."""
+    """Reads those topics of a recording whose unit the values decide.
+
+    The evidence of the whole drive, by signal and topic as a bridge spells it; nothing is read where nothing is in
+    doubt. What cannot be read ends it: the run that follows reports that.
+    """
     targets = _targets(epochs)
     if not targets:
         return {}

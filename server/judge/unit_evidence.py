@@ -46,7 +46,10 @@ class _Stretch:
 
 @dataclass(slots=True)
 class Ways:
-    """Of one speed topic against odometry and positions. Times are on the receiver's clock."""
+    """Compares the way that follows from a speed with the way of a pose or of positions.
+
+    Of one speed topic against odometry and positions. Times are on the receiver's clock.
+    """
 
     shown: frozenset[str] = frozenset()  # names of units that a stretch showed; more than one: they contradict
     moved: bool = False

@@ -248,8 +248,11 @@ def _steered(number: float, unit: Unit | None, basis: UnitBasis) -> Steering:
 
 
 def unit_questions(units: UnitWatch, sources: Mapping[str, Source], chosen: Mapping[str, str]) -> tuple[Question, ...]:
-    """One for each signal whose unit the values do not show, in the order of the signals. `chosen`: the operator's
-    answers, signal → name of the unit, which hold from the next value on."""
+    """What the operator is asked of units.
+
+    One for each signal whose unit the values do not show, in the order of the signals. `chosen`: the operator's
+    answers, signal → name of the unit, which hold from the next value on.
+    """
     found = []
     for signal, source in _asked(units, sources):
         decision = units.decision(signal, source.topic)

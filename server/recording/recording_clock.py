@@ -98,7 +98,10 @@ class Placed:
 
 
 class ClockHistory:
-    """Of one vehicle. `now` is a monotonic clock [s], `wall_ms` the time of day [ms since 1970]."""
+    """Which time of day a moment had, over all steps of the server's clock, and the clock of its recording.
+
+    Of one vehicle. `now` is a monotonic clock [s], `wall_ms` the time of day [ms since 1970].
+    """
 
     def __init__(self, now: Callable[[], float], wall_ms: Callable[[], int]) -> None:
         self._now = now

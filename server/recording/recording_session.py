@@ -17,7 +17,10 @@ GB = 1e9
 
 
 class RecordingSettings:
-    """Read each time, because settings change during a recording."""
+    """The active settings of the recorder, and all settings in the form that is recorded.
+
+    Read each time, because settings change during a recording.
+    """
 
     def __init__(self, tuning: ActiveSettings) -> None:
         self._tuning = tuning

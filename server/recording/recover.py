@@ -144,7 +144,10 @@ def _words(id: str, found: Contents, unread: int) -> str:
 
 
 class UnfinishedParts:
-    """Those of one recorder. Times are of a monotonic clock in seconds."""
+    """Parts that a full disk left cut: they are made whole when there is room again.
+
+    Those of one recorder. Times are of a monotonic clock in seconds.
+    """
 
     def __init__(self) -> None:
         self._due_s: dict[Path, float] = {}  # when each is tried next

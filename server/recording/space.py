@@ -98,7 +98,10 @@ def why(error: OSError) -> str:
 
 
 class SpaceWatch:
-    """Of the folder below `root`. `size`: bytes of the file that is being written, 0 where there is none."""
+    """Reads the free space of the disk often, and sums up the recordings' files rarely.
+
+    Of the folder below `root`. `size`: bytes of the file that is being written, 0 where there is none.
+    """
 
     def __init__(self, root: Path) -> None:
         self._root = root

@@ -107,7 +107,10 @@ def read_standing(metadata: Mapping[str, str]) -> list[dict[str, Any]]:
 
 
 class EarlyEntries:
-    """An entry that is written, or is too old to be, counts for the alarms that stand."""
+    """Entries of our own channels that came while no part was open, and the alarms that stand when the next begins.
+
+    An entry that is written, or is too old to be, counts for the alarms that stand.
+    """
 
     def __init__(self) -> None:
         self._entries: list[tuple[float, Own, Mapping[str, Any]]] = []

@@ -47,7 +47,10 @@ MOST_MARKS = 400  # more alarms than a person can view: the most urgent are kept
 
 
 class AlarmHistory:
-    """Times are seconds since the beginning of the recording."""
+    """The alarms of a recording by check: what had happened by the moment that is shown.
+
+    Times are seconds since the beginning of the recording.
+    """
 
     def __init__(self) -> None:
         self._of: defaultdict[str, list[tuple[float, Transition]]] = defaultdict(list)
@@ -71,7 +74,10 @@ class AlarmHistory:
 
 
 def save_checkpoint(run_state: RunState) -> bytes:
-    """A copy that later steps do not change; some 20 kB."""
+    """Keeps what a run knew at a moment as bytes, so that it can go on from there as often as somebody wants.
+
+    A copy that later steps do not change; some 20 kB.
+    """
     out = io.BytesIO()
     _Packer(out, protocol=5).dump(run_state)
     return zlib.compress(out.getvalue(), 1)

@@ -41,7 +41,10 @@ class TooLarge:
 
 @dataclass(slots=True)
 class Fragments:
-    """Of one connection: one message at a time."""
+    """Assembles fragmented messages of a bridge, within bounds.
+
+    Of one connection: one message at a time.
+    """
 
     most_bytes: int
     _id: bytes = b""

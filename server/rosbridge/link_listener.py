@@ -37,7 +37,10 @@ class LinkListener(Protocol):
 
 
 class SafeCalls:
-    """Of one link. `source`: its address, as it is logged."""
+    """Calls of a link's listener: a fault in one costs one message, and not the link.
+
+    Of one link. `source`: its address, as it is logged.
+    """
 
     def __init__(self, source: str) -> None:
         self._source = source

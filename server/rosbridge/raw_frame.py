@@ -92,8 +92,11 @@ def _in_cbor(payload: bytes) -> tuple[str, int] | None:
 
 
 def topic_of(head: bytes, tail: bytes, *, is_binary: bool) -> str | None:
-    """The topic of a publish operation; None if neither end has it. A bridge writes it before the message; if it is
-    behind, it is the last field of the frame."""
+    """Of a message that is too large to be read: which topic it came on, from its first and last bytes.
+
+    The topic of a publish operation; None if neither end has it. A bridge writes it before the message; if it is
+    behind, it is the last field of the frame.
+    """
     return _of_cbor(head) or _of_cbor(tail, last=True) if is_binary else _of_json(head) or _of_json(tail, last=True)
 
 

@@ -17,8 +17,11 @@ PAUSE_S = 0.02
 
 
 class Paced:
-    """`send(topic, is_renewed)` is called on the running loop, for each topic once, in the order in which they were
-    put."""
+    """What a bridge may refuse, a few at a time.
+
+    `send(topic, is_renewed)` is called on the running loop, for each topic once, in the order in which they were
+    put.
+    """
 
     def __init__(self, send: Callable[[str, bool], None]) -> None:
         self._send = send

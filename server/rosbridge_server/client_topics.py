@@ -28,7 +28,10 @@ class Say(Protocol):
 
 
 class Publications:
-    """The operations raise Refused, and what makes a message unfit to be sent."""
+    """What one client advertises and publishes.
+
+    The operations raise Refused, and what makes a message unfit to be sent.
+    """
 
     def __init__(self, bridge: ClientHost, say: Say) -> None:
         self._bridge = bridge
@@ -111,8 +114,11 @@ class SubscriptionRequest:
 
 
 class Subscription:
-    """A client can subscribe to a topic several times under several ids, and gets each message once, as from rosbridge:
-    with the highest requested rate and the shortest queue, in the first of STRONGEST that any request is for."""
+    """One client's subscription to one topic: which messages it gets, how often and in which encoding.
+
+    A client can subscribe to a topic several times under several ids, and gets each message once, as from rosbridge:
+    with the highest requested rate and the shortest queue, in the first of STRONGEST that any request is for.
+    """
 
     def __init__(
         self,

@@ -248,7 +248,10 @@ class Truth:
 
 
 class SafetyDriver:
-    """`step` first, then `mode`, `pedal_percent` and `hand` are those of this moment."""
+    """The person at the wheel: brakes and takes over when a scenario says so.
+
+    `step` first, then `mode`, `pedal_percent` and `hand` are those of this moment.
+    """
 
     def __init__(self) -> None:
         self.mode: Literal["autonomous", "manual"] = "autonomous"

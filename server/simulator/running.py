@@ -125,7 +125,10 @@ class Scenarios:
 
 
 class Stage:
-    """Of one car. `blocked_at_m`: the station on the lap where an obstacle stands; None: the way is free."""
+    """What the scenarios put around the car: the obstacle across its way, and the end of a hurry.
+
+    Of one car. `blocked_at_m`: the station on the lap where an obstacle stands; None: the way is free.
+    """
 
     def __init__(self, scenery: Scenery, scenarios: Scenarios) -> None:
         self.blocked_at_m: float | None = None

@@ -24,7 +24,10 @@ Stands = Literal["before", "unproven"]  # it stood when it was ordered; what sto
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ramp:
-    """`from_mps` may be negative: a car that rolls backwards is slowed too."""
+    """The ramp down: from a speed to zero with a constant deceleration, the wheels held as they are.
+
+    `from_mps` may be negative: a car that rolls backwards is slowed too.
+    """
 
     from_mps: float
     tyre_rad: float  # held all the way: zero would straighten the wheels

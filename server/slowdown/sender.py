@@ -33,7 +33,10 @@ STALL_S = 0.1  # a turn so late was our own fault: what the bridge sent meanwhil
 
 
 class MeasuredCar:
-    """`snapshot`: what is known of the car now."""
+    """Speed and steering of the car as measured now, for the next command.
+
+    `snapshot`: what is known of the car now.
+    """
 
     def __init__(self, snapshot: Callable[[], Snapshot]) -> None:
         self._snapshot = snapshot

@@ -24,7 +24,10 @@ LOOK_EVERY_S = 5.0  # a phone that waits for the laptop to join its network wait
 
 
 class LiveContext:
-    """`ssl` is given to the server once; `use` exchanges what new connections are shown."""
+    """A TLS context whose certificate can be exchanged while it serves.
+
+    `ssl` is given to the server once; `use` exchanges what new connections are shown.
+    """
 
     def __init__(self, cert: Path, key: Path | None = None) -> None:
         """Raises OSError, ssl.SSLError and ValueError as `use` does."""

@@ -116,7 +116,10 @@ def label_of(host: str) -> str:
 
 
 class HostAddresses:
-    """The addresses learnt, the newest first."""
+    """Addresses of a container's host machine, learned from requests.
+
+    The addresses learnt, the newest first.
+    """
 
     def __init__(self, known: Iterable[IpAddress], *, now: Callable[[], float]) -> None:
         """`known`: those the certificate of before was for."""

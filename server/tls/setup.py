@@ -40,8 +40,11 @@ FONTS = ("catgraph-numerals-500.woff2", "catgraph-numerals-700.woff2")
 
 
 def mobileconfig(authority: Authority) -> bytes:
-    """The profile, unsigned, because the signer would not be trusted yet. An authority always has the same ids, so that
-    a second installation replaces the first."""
+    """Our authority as a configuration profile.
+
+    The profile, unsigned, because the signer would not be trusted yet. An authority always has the same ids, so that
+    a second installation replaces the first.
+    """
     id = authority.fingerprint.replace(":", "").lower()
     root = {
         "PayloadType": "com.apple.security.root",
@@ -67,7 +70,10 @@ def mobileconfig(authority: Authority) -> bytes:
 
 
 class Probe:
-    """Around the whole application."""
+    """Answers the instruction page that HTTPS works.
+
+    Around the whole application.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

@@ -281,7 +281,10 @@ def respond(
     now_s: float,
     by: str,
 ) -> Collection[Transition]:
-    """What changed by it. Raises Refused."""
+    """Carries out what an operator does about an alarm.
+
+    What changed by it. Raises Refused.
+    """
     match command:
         case commands.Acknowledge():
             return monitor.acknowledge(command.alarm, command.occurrence, by=by, now_s=now_s)

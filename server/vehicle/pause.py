@@ -12,7 +12,10 @@ from server.vehicle.restore import RestoredState
 
 
 class Pause:
-    """At most one at a time. `since_s` is on the session's monotonic clock; None: monitoring is on."""
+    """The pause of a vehicle's monitoring.
+
+    At most one at a time. `since_s` is on the session's monotonic clock; None: monitoring is on.
+    """
 
     def __init__(self, logbook: EventLog) -> None:
         self._logbook = logbook
@@ -52,7 +55,10 @@ class Pause:
 
 
 class CarPlannedStop:
-    """At most one at a time; the session is the only writer. Times are on the session's monotonic clock, in seconds."""
+    """The planned stop of one car: begun and ended by commands, ended by motion, logged, and restored.
+
+    At most one at a time; the session is the only writer. Times are on the session's monotonic clock, in seconds.
+    """
 
     def __init__(self, event_log: EventLog) -> None:
         self._event_log = event_log

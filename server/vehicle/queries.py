@@ -117,7 +117,10 @@ def signals(
 
 
 def check_answer(monitor: Monitor, name: str, now_s: float, minute: CheckMinute) -> CheckAnswer | Answer:
-    """What is known of it, or why it is not."""
+    """One check in detail, for a page that opens it: of the live car or of a replay.
+
+    What is known of it, or why it is not.
+    """
     check = next((one for one in monitor.checks if one.id == name), None)
     if check is None:
         return {"ok": False, "reason": "There is no such check."}

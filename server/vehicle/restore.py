@@ -162,7 +162,10 @@ def _backwards(bus: SessionBus, vehicle: str, alarm: str | None) -> Iterator[dic
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeparturePast:
-    """What stood when the server ended."""
+    """The departure check of before this run.
+
+    What stood when the server ended.
+    """
 
     id: str | None = None  # None: no check stood
     by: str | None = None

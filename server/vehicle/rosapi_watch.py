@@ -23,7 +23,9 @@ MOST_NAMED = 20
 
 
 class RosWatch:
-    """Of one car, over any number of openings. `now` is a monotonic clock in seconds.
+    """Checks whether ROS behind the bridge is alive, and which other nodes publish commands.
+
+    Of one car, over any number of openings. `now` is a monotonic clock in seconds.
 
     `timed(asked_s, ros_s)`: the time of the call and the time of ROS.
     """
@@ -71,7 +73,9 @@ class RosWatch:
 
 
 class MissingWatch:
-    """Of one car's connection. `now` is a monotonic clock in seconds.
+    """Queries rosapi about topics without messages: publishers, and whether the bridge subscribes to them.
+
+    Of one car's connection. `now` is a monotonic clock in seconds.
 
     `renew(topic)` renews a subscription, `remap()` follows a change of publishers, `resubscribe()` one of the watch's
     own topics, `noted(text)` logs.

@@ -42,7 +42,10 @@ EVENTS_FIRST_S = 0.002  # a page's writer is woken some turns of the loop after 
 
 
 class StatePublisher:
-    """The states of one vehicle. `make` makes the frame; `now` is a monotonic clock in seconds."""
+    """Puts states on the bus for the pages: at once, or soon, so that events go out before.
+
+    The states of one vehicle. `make` makes the frame; `now` is a monotonic clock in seconds.
+    """
 
     def __init__(
         self, vehicle: str, bus: SessionBus, make: Callable[[], LiveState], *, now: Callable[[], float]

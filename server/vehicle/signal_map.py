@@ -24,7 +24,10 @@ SEEN_S, SETTLED_S = 1.0, 2.0  # with messages of all candidates, or without, the
 
 
 class TopicsByName:
-    """Of one car. Times are on a monotonic clock, in seconds."""
+    """The topics of a car whose bridge does not name them: those of the usual names of which messages come.
+
+    Of one car. Times are on a monotonic clock, in seconds.
+    """
 
     def __init__(self) -> None:
         self.found: dict[str, str] = {}  # topic → type, by the fields of its first message

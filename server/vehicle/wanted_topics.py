@@ -33,7 +33,10 @@ Compression = Callable[[str, bool], str]  # topic and whether its type is fit fo
 
 
 class CborUse:
-    """Of one car's bridge."""
+    """Whether a topic is subscribed to as CBOR: not where the bridge has none, nor where it did not arrive.
+
+    Of one car's bridge.
+    """
 
     def __init__(self) -> None:
         self._failed = False  # then everything comes as JSON
@@ -65,7 +68,10 @@ class CborUse:
 
 
 class LargeTopics:
-    """Of one car."""
+    """Topics whose messages are too large to be read: left after the second one, and named.
+
+    Of one car.
+    """
 
     def __init__(self) -> None:
         self._sizes: dict[str, list[int]] = {}  # topic → sizes of its messages that were too large
@@ -94,7 +100,10 @@ class LargeTopics:
 
 @dataclass(slots=True)
 class Probation:
-    """Of one car, over all openings of its link."""
+    """Recorded topics under suspicion of delaying the bridge: each is tried alone, and left if it delays it again.
+
+    Of one car, over all openings of its link.
+    """
 
     left: set[str] = field(default_factory=set)  # not tried any more
     _waiting: dict[str, int] = field(default_factory=dict)  # topic → how often the link fell silent with it alone

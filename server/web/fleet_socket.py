@@ -30,7 +30,10 @@ from server.web.page_writer import MAX_REPLIES
 
 
 class FleetWriter:
-    """Of one page; `wakeup` is shared by all pages, `wall_ms` is the time of day."""
+    """The writer of one page of all cars: offers of frames, at most one unanswered, replies, and what happened.
+
+    Of one page; `wakeup` is shared by all pages, `wall_ms` is the time of day.
+    """
 
     def __init__(
         self,

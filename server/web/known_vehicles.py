@@ -30,7 +30,10 @@ _OFF_FILE: TypeAdapter[dict[str, OffOnPurpose]] = TypeAdapter(dict[str, OffOnPur
 
 
 class KnownVehicles:
-    """Their names, in a file of the data folder."""
+    """Vehicles that a web node has heard.
+
+    Their names, in a file of the data folder.
+    """
 
     def __init__(self, folder: Path | None, storage: StorageThread, *, forget: Sequence[str] = ()) -> None:
         """`folder` None: they last as long as this run. `forget`: those that are not listed any more, until heard."""
@@ -61,7 +64,10 @@ class KnownVehicles:
 
 
 class OffVehicles:
-    """By their names, in a file of the data folder."""
+    """Cars of which a person said that they are off on purpose.
+
+    By their names, in a file of the data folder.
+    """
 
     def __init__(self, folder: Path | None, storage: StorageThread, *, wall_ms: Callable[[], int]) -> None:
         """`folder` None: they last as long as this run."""

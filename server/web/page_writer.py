@@ -35,7 +35,10 @@ MAX_REPLIES = 200  # waiting for a page that does not read
 
 
 def former_state(payload: str) -> str:
-    """A state with the former name of its slow-down's phase."""
+    """What a page of before a change of names gets: it may be open while the server is updated.
+
+    A state with the former name of its slow-down's phase.
+    """
     found = orjson.loads(payload)
     slow_down = found.get("decelerate")
     phase = slow_down.get("state") if isinstance(slow_down, dict) else None

@@ -28,8 +28,11 @@ POSES = "poses"  # of an odometry whose twist is not filled: they may be a recei
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
-    """The nearest usable range [m] in each of at most BINS equal parts of the view, in the laser's own frame; None:
-    nothing was measured there."""
+    """A coarse picture of a scan: by it an operator recognises a laser, and two topics of one laser are alike.
+
+    The nearest usable range [m] in each of at most BINS equal parts of the view, in the laser's own frame; None:
+    nothing was measured there.
+    """
 
     at_s: float
     stamp_s: float | None  # by its header

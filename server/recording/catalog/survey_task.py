@@ -36,7 +36,10 @@ LOOK_AGAIN_S = 20.0  # shortest interval of folder scans for requests of the lis
 
 
 class Surveyor:
-    """Ask for one file at a time. Never raises for what a file does to its reader."""
+    """Has files surveyed by a process of its own, one after the other; ends it when there is nothing to do.
+
+    Ask for one file at a time. Never raises for what a file does to its reader.
+    """
 
     def __init__(self) -> None:
         self._starting: asyncio.Task[asyncio.subprocess.Process] | None = None

@@ -189,6 +189,7 @@ class Written:
 
 
 def readme(drive: DecodedDrive, tables: Sequence[Written], notes: Sequence[str]) -> str:
+    """README.txt of the tables: their description for later readers of the zip."""
     recording, metadata = drive.recording, drive.recording.metadata
     lines = [
         f"A drive of {metadata.get('vehicle') or 'a car'}, as tables, made by catgraph {catgraph_version()}.",

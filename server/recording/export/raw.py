@@ -91,8 +91,11 @@ def _of_file(recording: Recording, number: int, wanted: Callable[[Channel], bool
 
 
 def later_messages(recording: Recording) -> list[Raw]:
-    """In the order of time. A mark has its own moment; within the span of the recording, so that a bag gets no longer
-    by it. A description has the last moment: its own is in its text."""
+    """What came after a recording was complete, as messages of catgraph's own channels.
+
+    In the order of time. A mark has its own moment; within the span of the recording, so that a bag gets no longer
+    by it. A description has the last moment: its own is in its text.
+    """
     first_ns, last_ns = span_ns(recording)
     found = [
         _raw(recording, _MARKS, min(max(at_ms * 1_000_000, first_ns), last_ns), orjson.dumps(body))

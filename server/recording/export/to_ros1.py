@@ -38,7 +38,10 @@ _LITTLE = b"\x00\x01"
 
 
 def md5sum(type: str, definition: str) -> str:
-    """Of "pkg/Type" with its full definition. Raises Undecodable where a nested type's definition is missing."""
+    """The md5sum of a ROS 1 message type, computed from its definition as genmsg does.
+
+    Of "pkg/Type" with its full definition. Raises Undecodable where a nested type's definition is missing.
+    """
     texts = _parts(type, definition)
     return _sum_of(type, texts, {}, 0)
 

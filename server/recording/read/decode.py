@@ -46,7 +46,9 @@ _DEEPEST = 32  # levels of messages in messages: a definition that contains itse
 
 
 def sifted(decode: Decode, topic: str, topics: Collection[str] | None) -> Decode:
-    """The decoder of a topic's messages where only `topics` are wanted (None: all); what is not is empty.
+    """Leaves out what is not wanted: decoding is most of the work of reading a recording.
+
+    The decoder of a topic's messages where only `topics` are wanted (None: all); what is not is empty.
 
     With `topics` as a mapping, those are wanted whose bytes hold one of the words of their topic (None: all); the words
     may change while they are read.

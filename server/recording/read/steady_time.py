@@ -56,7 +56,10 @@ _PART = re.compile(r"(.*)_(\d+)")
 
 
 class StampWitness:
-    """Of one file. `raw_at(place, channel)` is the message at a place; None: it cannot be read."""
+    """Compares log times with the stamps of sensors that have a clock of their own.
+
+    Of one file. `raw_at(place, channel)` is the message at a place; None: it cannot be read.
+    """
 
     def __init__(self, channels: Sequence[Channel], raw_at: Callable[[int, int], bytes | None]) -> None:
         self._encodings = {one.number: one.encoding for one in channels if _is_stamped(one)}

@@ -34,7 +34,10 @@ T = TypeVar("T")
 
 
 class Pace:
-    """`may_go_on` is called before each portion and raises where the transfer must end."""
+    """Holds a transfer to so many bytes a second, and ends it when it must end.
+
+    `may_go_on` is called before each portion and raises where the transfer must end.
+    """
 
     def __init__(
         self,

@@ -99,7 +99,10 @@ class StreamMarks:
 
 
 class Delay:
-    """Of one link, over all openings. `marks` None: nobody follows."""
+    """Reports which pings of a link are answered behind its messages to the part that follows how late the link is.
+
+    Of one link, over all openings. `marks` None: nobody follows.
+    """
 
     def __init__(self, marks: Marks | None, now: Callable[[], float]) -> None:
         self._marks = marks

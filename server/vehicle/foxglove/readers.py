@@ -101,7 +101,10 @@ def _named(text: str) -> str:
 
 
 class ReaderTable:
-    """`ready(topic)` follows each reader that was made, `note(text)` has the reason where there is none."""
+    """The readers of a server's channels, made one after the other in a thread, and kept over all openings.
+
+    `ready(topic)` follows each reader that was made, `note(text)` has the reason where there is none.
+    """
 
     def __init__(
         self, ready: Callable[[str], None], note: Callable[[str], None], *, used: Callable[[], Iterable[Channel]]

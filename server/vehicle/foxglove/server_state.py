@@ -25,7 +25,10 @@ class Asked(Protocol):
 
 
 class Answers:
-    """A `QuestionChannel` that is open as long as the source is: nothing is sent for a question."""
+    """Answers the questions of a session from what the server has listed.
+
+    A `QuestionChannel` that is open as long as the source is: nothing is sent for a question.
+    """
 
     unanswered = 0
 
@@ -50,7 +53,10 @@ class Answers:
 
 
 class Subscribed:
-    """Over all openings; the table is kept. `send(frame)` sends now; `sent(topic, number)` goes before each."""
+    """What is wanted of a server, topic by topic, and under which numbers it is subscribed to.
+
+    Over all openings; the table is kept. `send(frame)` sends now; `sent(topic, number)` goes before each.
+    """
 
     def __init__(self, send: Callable[[bytes], None], sent: Callable[[str, int], None]) -> None:
         self._send = send
