@@ -16,8 +16,8 @@ from server.judge.ros_names import BadName
 from server.rosbridge_server import fields
 from server.rosbridge_server.completion import Completion
 from server.rosbridge_server.fields import Refused
+from server.rosbridge_server.graph import Service, ServiceFailed, Services
 from server.rosbridge_server.interface import ServiceHost
-from server.rosbridge_server.services import Service, ServiceFailed, Services
 
 MOST_CALLS = 100  # without an answer yet
 _ROS2_NAME = re.compile(r"[A-Za-z0-9_~{}/]+", re.ASCII)
