@@ -9,10 +9,10 @@ from types import MappingProxyType
 from typing import Any
 
 from monitor.geo import offset_m
-from monitor.link import LinkFacts
 from monitor.pace import Pace, PlaceFollower, SourceClock, SpeedFollower
 from monitor.rates import RateMeter
 from monitor.reading import Reading
+from monitor.shell_facts import LinkFacts
 from monitor.values import GpsFix, Odometry, Twist
 
 MOST_OTHERS = 8  # of one signal

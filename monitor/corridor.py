@@ -12,8 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from monitor.mounting import within_half_turn
-from monitor.scan import usable
+from monitor.scan import usable, within_half_turn
 from monitor.values import LaserScan
 
 STRAIGHT_RAD = 0.0005  # a radius of more than five kilometres

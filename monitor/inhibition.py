@@ -1,10 +1,11 @@
-"""The cause table: which alarm explains which, so that one cause is one announcement."""
+"""The cause table: which alarm explains which, so that one cause is one announcement; and which alarms are shown."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
 from monitor.alarm import Alarm
+from monitor.check import Verdict
 
 GRACE_S = 3.0  # for the alarms which explain that messages are missing: the messages need a moment to come again
 
@@ -87,3 +88,32 @@ def table_of(alarms: Iterable[Alarm]) -> CauseTable:
     return CauseTable(
         {alarm.id: alarm.spec.inhibited_by for alarm in known}, {alarm.id: alarm.spec.grace_s for alarm in known}
     )
+
+
+def standing(alarms: Iterable[Alarm]) -> list[Alarm]:
+    """Alarms to show, most urgent first: active or unacknowledged, shelved ones last, suppressed ones not."""
+    shown = [
+        alarm
+        for alarm in alarms
+        if (alarm.is_standing or alarm.shelved_until_s is not None)
+        and not alarm.suppressed_by
+        and not alarm.out_of_service
+    ]
+    return sorted(
+        shown,
+        key=lambda alarm: (
+            alarm.shelved_until_s is not None,
+            alarm.spec.priority.rank,
+            -(alarm.announced_s or 0.0),
+        ),
+    )
+
+
+def suppressed(alarms: Iterable[Alarm]) -> list[Alarm]:
+    """Alarms that would stand if nothing explained them, most urgent first."""
+    hidden = [
+        alarm
+        for alarm in alarms
+        if alarm.suppressed_by and (alarm.is_standing or (alarm.finding and alarm.finding.verdict is Verdict.FAULT))
+    ]
+    return sorted(hidden, key=lambda alarm: (alarm.spec.priority.rank, alarm.id))

@@ -14,7 +14,7 @@ from typing import Literal
 
 from monitor.agreement import Pair, Tracks, correlate, gate_m, phone_sigma_m
 from monitor.geo import course_deg, offset_m
-from monitor.trail import Trail
+from monitor.tracks import Trail
 from monitor.values import GpsFix, PhoneFix
 
 WORST_ACCURACY_M = 50.0  # a worse one comes from masts and access points

@@ -1,13 +1,19 @@
-"""How many beams a scan has, against the number that its angles give, and how a driver usually counts them."""
+"""How many beams a scan has, against the number that its angles give; and the parts of a sweep sent one by one."""
 
 from __future__ import annotations
 
 import math
 
+from monitor.reading import Reading
 from monitor.values import LaserScan
 
 LEARNED_FROM = 20  # scans
 WHOLE = 0.01  # steps: nearer to a whole number is that number; else the increment is rounded, and either side fits
+
+SWEEP_S = 1.0  # a slower laser is of no use for driving
+MOST_PARTS = 64
+
+_Key = tuple[int, float, float, str]  # beams, first angle, increment, frame
 
 
 def steps(scan: LaserScan) -> float:
@@ -61,3 +67,56 @@ def habit_words(usual: frozenset[int] | None) -> str | None:
     if len(usual) == 1:
         return f"always one beam {'less' if -1 in usual else 'more'} than its angles give, as its driver counts"
     return "up to one beam more or less than its angles give, as its driver counts"
+
+
+class ScanParts:
+    """The parts of a sweep, where a laser sends them one by one: each message looks into another direction.
+
+    The newest message of each direction. Times are the receiver's, in seconds.
+    """
+
+    __slots__ = ("_newest", "_parts")
+
+    def __init__(self) -> None:
+        self._parts: dict[_Key, Reading[LaserScan]] = {}  # the oldest first
+        self._newest: _Key | None = None
+
+    def add(self, reading: Reading[LaserScan]) -> None:
+        """The newest scan."""
+        scan, parts = reading.value, self._parts
+        key = (scan.beams, scan.angle_min_rad, scan.angle_increment_rad, scan.frame_id)
+        if key != self._newest or len(parts) > 1:
+            parts.pop(key, None)
+            for old in list(parts):
+                if reading.received_s - parts[old].received_s <= SWEEP_S and len(parts) < MOST_PARTS:
+                    break
+                del parts[old]
+            self._newest = key
+        parts[key] = reading
+
+    def others(self, now_s: float) -> tuple[Reading[LaserScan], ...]:
+        """Beside the newest scan, those of the same sweep that look elsewhere; none of a laser that sends it whole."""
+        if len(self._parts) < 2:
+            return ()
+        return tuple(
+            part for key, part in self._parts.items() if key != self._newest and now_s - part.received_s <= SWEEP_S
+        )
+
+
+class Scans:
+    """What is kept of a laser's messages beside the newest one."""
+
+    __slots__ = ("habit", "parts")
+
+    def __init__(self) -> None:
+        self.habit = ScanHabit()
+        self.parts = ScanParts()
+
+    def add(self, reading: Reading[LaserScan]) -> None:
+        """The newest scan."""
+        self.habit.add(reading.value)
+        self.parts.add(reading)
+
+    def forget_times(self) -> None:
+        """The clock was set back: how old a part is, is not known."""
+        self.parts = ScanParts()

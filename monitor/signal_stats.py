@@ -7,13 +7,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from monitor.car_clock import StampFollower
 from monitor.freeze_detection import COMPARED, RepeatFollower, Wheels
 from monitor.rates import Rate, RateMeter
-from monitor.reading import Reading
-from monitor.reading_history import ReadingHistory
-from monitor.reading_table import ReadingTable
+from monitor.reading import Reading, ReadingHistory, ReadingTable
 from monitor.signals import Signal
-from monitor.stamps import StampFollower
 
 RATES_EVERY_S = 0.5  # a rate over 5 s does not change faster
 

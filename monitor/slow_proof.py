@@ -19,7 +19,7 @@ from typing import Literal
 import numpy as np
 
 from monitor.motion import STANDS_BELOW_MPS
-from monitor.slowing import SlowingFacts
+from monitor.shell_facts import SlowingFacts
 from monitor.speed_fit import BIN_S, Fit, Floats, Line, binned, least_chi2, line, quantum
 
 Shown = Literal["slows", "stopped"]

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, Literal, overload
 
+from monitor.car_clock import ClockJump
 from monitor.compared import NOTHING_COMPARED, Compared
 from monitor.gps_watch import GpsWatch
-from monitor.heard_modes import HeardMode
 from monitor.immutable import immutable
-from monitor.link import LinkFacts
 from monitor.phones import NO_PHONE, PhoneView
 from monitor.rates import Rate
-from monitor.reach import ReachFacts
 from monitor.reading import Extent, Reading
-from monitor.recorder import RecorderFacts
+from monitor.shell_facts import LinkFacts, ReachFacts, RecorderFacts, SlowingFacts
 from monitor.signals import SIGNALS
 from monitor.slow_proof import NOTHING_SHOWN, SlowProof
-from monitor.slowing import SlowingFacts
-from monitor.stamps import ClockJump
 from monitor.tracks import TrackPoint
 from monitor.unusable import Unusable
 from monitor.values import (
@@ -38,6 +34,39 @@ from monitor.values import (
     Steering,
     Twist,
 )
+
+MODES_KEPT = 64  # changes; a topic that flickered with every message at 1000 Hz would need as many in a tick
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeardMode:
+    """From this moment on the car said so."""
+
+    number: int  # counts the changes, from 1 on
+    at_s: float  # received
+    value: DriveMode
+
+
+class HeardModes:
+    """Every change of what the car says of who drives, between one judgement and the next.
+
+    Follows the messages of the mode; bounded.
+    """
+
+    def __init__(self) -> None:
+        self.changes: tuple[HeardMode, ...] = ()
+        self._count = 0
+
+    def add(self, at_s: float, value: DriveMode) -> None:
+        """One message. Only one that differs from the message before is kept."""
+        if self.changes and self.changes[-1].value == value:
+            return
+        self._count += 1
+        self.changes = (*self.changes[-MODES_KEPT + 1 :], HeardMode(number=self._count, at_s=at_s, value=value))
+
+    def forget(self) -> None:
+        """The clock went back: what was heard before has no time any more."""
+        self.changes = ()
 
 
 class NotFresh(Exception):

@@ -7,24 +7,18 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from monitor.car_clock import MANY_WRITERS, ClockJump, merged
 from monitor.components import Components
 from monitor.derived_signals import SOURCES, DerivedSignals, forget
 from monitor.freeze_detection import Wheels
-from monitor.heard_modes import HeardModes
-from monitor.link import LinkFacts, Phase
 from monitor.phones import PhoneReport, Phones
-from monitor.reach import ReachFacts
-from monitor.reading import Extent, Freshness, Reading
-from monitor.reading_history import ReadingHistory
-from monitor.reading_table import ReadingTable
-from monitor.recorder import RecorderFacts
-from monitor.scan_parts import Scans
+from monitor.reading import Extent, Freshness, Reading, ReadingHistory, ReadingTable
+from monitor.scan_shape import Scans
+from monitor.shell_facts import LinkFacts, Phase, ReachFacts, RecorderFacts, SlowingFacts
 from monitor.signal_stats import MeasuredRates, SignalStats, extend, keep
 from monitor.signals import SIGNALS
 from monitor.slow_proof import ProofFollower
-from monitor.slowing import SlowingFacts
-from monitor.snapshot import NotFresh, Snapshot
-from monitor.stamps import MANY_WRITERS, ClockJump, merged
+from monitor.snapshot import HeardModes, NotFresh, Snapshot
 from monitor.tracks import TrackPoint
 from monitor.unusable import Unusable, refused, without
 from monitor.values import Diagnostics, DriveMode, GpsFix, LaserScan, Twist, Value

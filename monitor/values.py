@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from monitor import scan as _scan
-from monitor.mounting import Mounting, within_half_turn
+from monitor.scan import Mounting, within_half_turn
 
 NO_FIX = -1  # sensor_msgs/NavSatStatus
 STATUS_UNSET = -2  # of ROS 2 since Kilted

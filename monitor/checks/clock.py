@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from monitor.car_clock import JUMP_S
 from monitor.check import (
     Action,
     AlarmSpec,
@@ -28,7 +29,6 @@ from monitor.check import (
 from monitor.reading import Reading
 from monitor.signals import SIGNALS
 from monitor.snapshot import Snapshot
-from monitor.stamps import JUMP_S
 
 REPORTED_S = 10.0  # a jump is instantaneous; it is reported for this time
 ANOTHER_TIME_S = 86_400.0

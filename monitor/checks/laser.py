@@ -28,8 +28,8 @@ from monitor.check import (
 )
 from monitor.corridor import Corridor
 from monitor.instruments import ObstacleLimits
-from monitor.mounting import Mounting
 from monitor.obstacle_view import sweep_ahead
+from monitor.scan import Mounting
 from monitor.scan_shape import difference, habit_words
 from monitor.snapshot import Snapshot
 

@@ -25,8 +25,8 @@ from monitor.check import (
 )
 from monitor.figures import beside
 from monitor.instruments import ObstacleLimits, stopping_m
-from monitor.mounting import within_half_turn
 from monitor.obstacle_view import corridor_ahead, is_blind, look_ahead, sweep_ahead, tyre_angle_rad, why_unseen
+from monitor.scan import within_half_turn
 from monitor.snapshot import NotFresh, Snapshot
 
 CLOSING_AT_LEAST_MPS = 0.3  # slower is noise of two distances

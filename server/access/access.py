@@ -14,14 +14,11 @@ from typing import Any, TypeVar
 
 from server.access import pending_invitations, secret_file
 from server.access.active_connections import ActiveConnections
-from server.access.cookie import Cookies
+from server.access.credentials import Cookies, Keys, Tickets
 from server.access.devices import Device, Devices
 from server.access.identity import LOCAL, Principal, Role
-from server.access.invitations import PIN_DIGITS, Invitation, Invitations
-from server.access.keys import Keys
+from server.access.invitations import PIN_DIGITS, Invitation, Invitations, PinThrottle
 from server.access.names import Names
-from server.access.pin_throttle import PinThrottle
-from server.access.tickets import Tickets
 from server.control import display_name
 from server.storage.storage_thread import StorageThread
 

@@ -18,7 +18,7 @@ from typing import Any
 from server.access import secret_file
 from server.access.identity import Role
 from server.control import display_name
-from server.storage.set_aside import set_aside
+from server.storage.durable_file import set_aside
 from server.storage.storage_thread import StorageThread
 
 log = logging.getLogger("catgraph.access")

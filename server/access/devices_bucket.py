@@ -15,7 +15,7 @@ from nats.js.api import KeyValueConfig
 from nats.js.errors import KeyWrongLastSequenceError
 from nats.js.kv import KeyValue
 
-from server.access.shared_devices import IDENTITY, BadEntry, SharedDevices
+from server.access.shared_access import IDENTITY, BadEntry, SharedDevices
 
 log = logging.getLogger("catgraph.access")
 

@@ -19,7 +19,7 @@ from monitor.runner import Refused
 from server.control import display_name
 from server.control.duty import MOST_DUTIES, MOST_PEOPLE, DutyBoard, DutyEntry, Person, person_name, role_of
 from server.storage import bounded_toml, durable_file
-from server.storage.set_aside import set_aside
+from server.storage.durable_file import set_aside
 
 log = logging.getLogger("catgraph.people")
 

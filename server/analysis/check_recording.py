@@ -18,13 +18,13 @@ from server.analysis.faults import CannotInject
 from server.analysis.rehearse import Extract, Rehearsed, rehearse
 from server.analysis.report import Report, to_choose
 from server.analysis.report_text import printable
+from server.judge.active_settings import SettingsOverride
 from server.judge.settings import BadSetting
-from server.judge.settings_override import SettingsOverride
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
 from server.recording.verification import of_files
 from server.simulator.scenarios import planned
-from server.system.memory_limit import TOO_LARGE, bounded_memory
 from server.system.page_files import AssetsMissing
+from server.system.process_limits import TOO_LARGE, bounded_memory
 
 NO_CRITICAL, CRITICAL, CANNOT = 0, 1, 2
 SWITCH_S = 0.0002

@@ -12,7 +12,7 @@ from server.analysis.page import page
 from server.analysis.recorded_log import read_recorded_log
 from server.analysis.rehearse import rehearse
 from server.analysis.report import Report
-from server.recording.export.outcome import Outcome
+from server.recording.export.export_format import Outcome
 from server.recording.read.read import Recording
 from server.recording.verification import of_files
 

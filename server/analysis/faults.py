@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from monitor.link import LinkFacts
+from monitor.shell_facts import LinkFacts
 from server.judge.message import Message
 from server.simulator.effects import Effect, Silence
 from server.simulator.scenario import Scenario

@@ -18,14 +18,13 @@ from server.analysis.episodes import Diary, Episode
 from server.analysis.faults import Faults, Laid
 from server.analysis.simulated_slowdown import SimulatedOrder, SimulatedSlowDown
 from server.analysis.traces import Traces
-from server.judge.active_settings import ActiveSettings
+from server.judge.active_settings import ActiveSettings, SettingsOverride
 from server.judge.drive import Drive, MessageSource, Row, SettingsEpoch
 from server.judge.offline import Observer, OfflineRun
 from server.judge.pipeline import TICK_S
 from server.judge.reception_stats import Reception
-from server.judge.settings_override import SettingsOverride
 from server.judge.topics import Source
-from server.judge.unit_questions import unit_sentences
+from server.judge.unit_watch import unit_sentences
 from server.protocol.questions import Question
 from server.recording.delay import recorded_delay
 from server.recording.event_channels import read_recorded_events

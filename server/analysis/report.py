@@ -14,7 +14,7 @@ from server.analysis.compare import Change, compare
 from server.analysis.recorded_log import RecordedLog
 from server.analysis.rehearse import Rehearsed
 from server.analysis.report_text import printable
-from server.judge.settings_override import SettingsOverride
+from server.judge.active_settings import SettingsOverride
 from server.protocol.questions import Question
 from server.recording.read.read import Recording
 from server.recording.verification import Verification

@@ -10,9 +10,9 @@ from typing import Any
 from monitor import catalog
 from monitor.signals import SIGNALS
 from server.judge import profiles
+from server.judge.active_settings import SettingsOverride
 from server.judge.profiles import GENERIC
 from server.judge.settings import AUTO, BadSetting, Settings, change
-from server.judge.settings_override import SettingsOverride
 from server.storage import bounded_toml
 
 _SECTIONS = ("version", "profile", "topics", "units", "limits")

@@ -13,8 +13,7 @@ from server.access.access import FOLDER as ACCESS_FOLDER
 from server.access.access import Access
 from server.access.order_keys import KnownDevices, OrderKeys
 from server.access.people import People
-from server.access.shared_devices import SharedDevices
-from server.access.shared_people import SharedPeople
+from server.access.shared_access import SharedDevices, SharedPeople
 from server.access.signed_orders import SignedOrders
 from server.app import store
 from server.app.config import Config
@@ -41,9 +40,9 @@ from server.web.agents.at_agent import AtAgent, scope_of
 from server.web.assets.bundle import find
 from server.web.assets.service_worker import build_of
 from server.web.hub import Hub
+from server.web.known_vehicles import OffVehicles
 from server.web.maps.layers import MapLayers
 from server.web.maps.tile_proxy import Upstream
-from server.web.off_vehicles import OffVehicles
 from server.web.services import Link, Services
 
 if TYPE_CHECKING:  # without a broker nats-py need not be installed

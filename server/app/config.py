@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from server.access.keys import Keys
+from server.access.credentials import Keys
 from server.bus.broker import Broker
 from server.protocol.rate_limit import Limits
 from server.recording.store.address import StoreAddress

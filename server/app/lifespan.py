@@ -12,14 +12,12 @@ from pathlib import Path
 from server.bus.journal import Journal
 from server.mail.drive_reports import DriveReports
 from server.recording.folder import RecordingsFolder
-from server.recording.recover import Recovered
-from server.recording.recovery import recover_left
+from server.recording.recover import Recovered, recover_left
 from server.storage.storage_thread import StorageThread
 from server.system import log_context
 from server.web.services import Services
 
 log = logging.getLogger("catgraph.app")
-
 
 STOPS_WITHIN_S = 30.0  # a slow disk is given time for what is not written yet; a disk that hangs is not waited for
 _AT_LEAST_S = 0.5  # for each part, also of a server that has no time left

@@ -20,7 +20,7 @@ import ifaddr
 import uvicorn
 
 from server.access.invitations import LASTS_S
-from server.app import store_options, tls_options
+from server.app import store, tls_process
 from server.app.app import create_app
 from server.app.banner import Announcement, Pairing, addresses, invitation, lines, pair_command
 from server.app.config import Config, Tls, default_data
@@ -28,8 +28,7 @@ from server.app.tls_process import Secured, Server, secure, serve_secured
 from server.storage.data_folder import DataFolderRefused
 from server.system.page_files import AssetsMissing
 from server.tls.authority import TlsRefused
-from server.tls.probe import Probe
-from server.tls.setup import SetupAddresses
+from server.tls.setup import Probe, SetupAddresses
 from server.web.maps import map_options
 from server.web.maps.mbtiles import MapRefused
 from server.web.middleware import http_protocol
@@ -57,7 +56,7 @@ def add_common_arguments(parser: argparse.ArgumentParser, *, has_cars: bool = Tr
         default=[],
         help="another name of this server: a host, or https://HOST of a proxy; can be repeated",
     )
-    tls_options.add_arguments(parser)
+    tls_process.add_arguments(parser)
     parser.add_argument(
         "--map",
         type=Path,
@@ -73,7 +72,7 @@ def add_common_arguments(parser: argparse.ArgumentParser, *, has_cars: bool = Tr
         help="an image of the site above the maps; FILE.toml has its corners (docs/guide/map.md)",
     )
     map_options.add_arguments(parser)
-    store_options.add_arguments(parser, uploads=has_cars)
+    store.add_arguments(parser, uploads=has_cars)
     parser.add_argument(
         "--no-worker",
         action="store_true",

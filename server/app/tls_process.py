@@ -1,7 +1,8 @@
-"""HTTPS of one running server: its certificate looked after, its port for TLS and plain, the page that explains."""
+"""HTTPS of one running server: its options, its certificate looked after, its port for TLS and plain, the page."""
 
 from __future__ import annotations
 
+import argparse
 import asyncio
 import datetime as dt
 import functools
@@ -12,6 +13,7 @@ import time
 from collections.abc import Callable, Coroutine
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import uvicorn
@@ -23,13 +25,44 @@ from server.app.config import Config, Tls
 from server.tls import server_certificate
 from server.tls.authority import Authority, TlsRefused
 from server.tls.certificate_renewal import OwnCertificate, ProvidedCertificateRenewal, keep
-from server.tls.host_addresses import HostAddresses
-from server.tls.names import Names, addresses_now, host_now, names_of
+from server.tls.names import HostAddresses, Names, addresses_now, host_now, names_of
 from server.tls.setup import SetupAddresses, explaining, leading
 from server.tls.tls_sniffer import Factory, TlsSniffer
 from server.web.middleware import http_protocol
 
 log = logging.getLogger("catgraph.tls")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--tls",
+        nargs="+",
+        metavar=("auto|off|CERT", "KEY"),
+        help="auto: HTTPS by an authority of the server's own; off: plain HTTP; CERT KEY: HTTPS by these files (PEM), "
+        "read again when they change (default: off on loopback, else auto)",
+    )
+    parser.add_argument(
+        "--setup-port",
+        type=int,
+        metavar="PORT",
+        help="port of the plain page with instructions for phones (default: after --port)",
+    )
+
+
+def read_options(args: argparse.Namespace) -> Tls | None:
+    """The parsed options; None: none given. Raises ValueError with one sentence."""
+    match args.tls, args.setup_port:
+        case None, None:
+            return None
+        case None | ["auto"], port:
+            return Tls(mode="auto", setup_port=port)
+        case ["off"], None:
+            return Tls(mode="off")
+        case ["off"], _:
+            raise ValueError("--setup-port has no effect with --tls off.")
+        case [cert, key], port:
+            return Tls(mode="files", cert=Path(cert), key=Path(key), setup_port=port)
+    raise ValueError("--tls takes auto, off, or two files: the certificate and its key.")
 
 
 def utc_now() -> dt.datetime:

@@ -14,7 +14,7 @@ import orjson
 
 from server.bus.log_runs import LogRuns, Run
 from server.storage import durable_file
-from server.storage.set_aside import free_name
+from server.storage.durable_file import free_name
 
 log = logging.getLogger("catgraph.journal")
 

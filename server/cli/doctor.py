@@ -22,9 +22,8 @@ from server.judge.unit_watch import UnitBasis
 from server.rosbridge.address import Address, BadAddress, parse
 from server.rosbridge.connection_errors import LOGIN_WANTED, ROSAPI_ENDED, ROSAPI_MISSING, Problem, not_proved
 from server.rosbridge.diagnosis import SILENT_S, Diagnosis
-from server.rosbridge.link_errors import LinkDown
 from server.rosbridge.link_listener import NOTE
-from server.rosbridge.live_source import LiveSource
+from server.rosbridge.live_source import LinkDown, LiveSource
 from server.rosbridge.rosapi_client import Questions
 from server.rosbridge.subscription import Subscription
 from server.vehicle import discovery

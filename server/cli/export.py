@@ -27,13 +27,13 @@ import orjson
 from server.cli.progress import Progress
 from server.recording.export.bag_file import COMPRESSIONS
 from server.recording.export.clip import AFTER_S, BEFORE_S, LONGEST_S, Window, first_raised_ns, write_clip
+from server.recording.export.export_format import ExportRefused, NothingRecorded, Outcome
 from server.recording.export.formats import CLIP, FORMATS
-from server.recording.export.outcome import ExportRefused, NothingRecorded, Outcome
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
 from server.recording.space import amount, free_at
 from server.storage.output_file import Output, output_of, writing
-from server.system.memory_limit import TOO_LARGE, bounded_memory
 from server.system.page_files import AssetsMissing
+from server.system.process_limits import TOO_LARGE, bounded_memory
 
 WHOLE, NOT_ALL, CANNOT = 0, 1, 2
 _NICENESS = 10

@@ -8,8 +8,8 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 
-from server.access.keys import keys_from
-from server.app import store_options, tls_options
+from server.access.credentials import keys_from
+from server.app import store, tls_process
 from server.app.config import Config
 from server.app.process import CannotServe, add_common_arguments, serve
 from server.app.process import run as run_server
@@ -59,12 +59,12 @@ def common_config(args: argparse.Namespace) -> Config:
         port=args.port,
         maps=tuple(args.map),
         site_image=args.site_image,
-        tls=tls_options.read(args),
+        tls=tls_process.read_options(args),
         names=tuple(args.name),
         keys=keys_from(os.environ),
         map_upstream=map_options.read(args),
         worker=not args.no_worker,
-        store=store_options.read(args, os.environ),
+        store=store.read_options(args, os.environ),
     )
 
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from monitor.reach import ReachFacts
+from monitor.shell_facts import ReachFacts
 from server.control.lease import Operator
 from server.protocol import serialize
 from server.protocol.operator_state import ReachState, ReaderEnded, Ready

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from monitor.reach import ReachFacts
 from monitor.runner import Refused
+from monitor.shell_facts import ReachFacts
 from server.control import display_name
 from server.control.alarm_reach import AlarmReach, Present
 from server.control.duty import OnDuty, person_name, role_of

@@ -7,6 +7,9 @@ alarm or a hand-over goes to one place. Signing on elsewhere moves the duty, and
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 
 from monitor.runner import Refused
@@ -218,3 +221,17 @@ def role_of(role: object) -> DutyRole:
         if role == known:
             return known
     raise Refused(f"A role is one of {', '.join(ROLES.values())}.")
+
+
+# The name by which it is logged, and who is on duty there; None: nobody is.
+acting: ContextVar[tuple[str, OnDuty] | None] = ContextVar("acting", default=None)
+
+
+@contextmanager
+def acting_as(name: str, person: OnDuty | None) -> Iterator[None]:
+    """What is logged under `name` in this block bears this person."""
+    before = acting.set(None if person is None else (name, person))
+    try:
+        yield
+    finally:
+        acting.reset(before)

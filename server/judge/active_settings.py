@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
 from monitor import catalog
 from monitor.catalog import AllLimits
 from server.judge import profiles
+from server.judge.message import RosVersion
 from server.judge.profiles import GENERIC, Profile
-from server.judge.settings import AUTO, Conflict, Settings, SettingsFile, change, differences, from_toml, to_toml
+from server.judge.settings import (
+    AUTO,
+    BadSetting,
+    Conflict,
+    Settings,
+    SettingsFile,
+    change,
+    differences,
+    from_toml,
+    salvage,
+    to_toml,
+)
 from server.judge.units import UNITS
 from server.protocol.answers import SettingField, SettingsAnswer
 
 PERCENT_A_RAD = -1 / 0.00536  # the CATVehicle's steering: measured on its recordings, negative percent = left
+
+MOST_LEFT_OUT = 10  # sentences of one file
 
 
 class ActiveSettings:
@@ -168,3 +182,46 @@ class ActiveSettings:
 def _flat(in_force: Mapping[str, Any]) -> dict[str, Any]:
     chosen = {f"{part}.{signal}": name for part in ("topics", "units") for signal, name in in_force[part].items()}
     return {name: value for name, value in in_force.items() if name not in ("topics", "units")} | chosen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SettingsOverride:
+    """Settings that a recording is judged with, laid over the car's profile.
+
+    Settings of a file or a recording; everything else stays as the car's profile has it.
+    """
+
+    name: str = ""  # of the file
+    values: Mapping[str, float] = field(default_factory=dict)  # "speed_limit.max_mps": 9.0
+    topics: Mapping[str, str] = field(default_factory=dict)  # signal → topic
+    units: Mapping[str, str] = field(default_factory=dict)  # signal → name of its unit
+    profile: str = AUTO
+
+
+NO_CHOICES = SettingsOverride()
+
+
+def recorded_override(toml: str) -> tuple[SettingsOverride, list[str]]:
+    """What can be used of the settings in a recording, and a sentence for each that cannot."""
+    left_out: list[str] = []
+    try:
+        read = from_toml(toml)
+    except BadSetting:
+        read, found = salvage(toml, profiles.load())
+        left_out = [f"The settings cannot be used as they are: {why}" for why in found[:MOST_LEFT_OUT]]
+    override = SettingsOverride(
+        name="as recorded", values=read.values, topics=read.topics, units=read.units, profile=read.profile
+    )
+    return override, left_out
+
+
+def tuning_for(override: SettingsOverride, topics: Mapping[str, str], ros: RosVersion) -> ActiveSettings:
+    """How a car with these topics is judged: its profile as live recognises it, then the override."""
+    tuning = ActiveSettings(SettingsFile(None))
+    tuning.recognise(topics, ros)
+    if override.topics or override.units or override.profile != AUTO:
+        topics, units = dict(override.topics), dict(override.units)
+        tuning.change(values={}, topics=topics, units=units, profile=override.profile, version=None)
+    if override.values:  # after the profile: what is kept of them is what differs from its defaults
+        tuning.change(values=dict(override.values), topics={}, profile=None, version=None)
+    return tuning

@@ -1,4 +1,4 @@
-"""Which further topics of a car are watched to compare them with the source of a signal. Pure."""
+"""Which topics of a car can carry each signal, and which are watched to compare them with the source of one. Pure."""
 
 from __future__ import annotations
 
@@ -8,19 +8,40 @@ from typing import Any
 
 from monitor.values import Odometry, Twist
 from server.judge.message_fields import NotMeasured, finite, inner, number
-from server.judge.plausible import FASTEST_KMH, plausible_speed
 from server.judge.signals.odometry import odometry
 from server.judge.signals.position import nav_sat_fix
 from server.judge.sources.candidates import cars_of, pools_of
+from server.judge.sources.evidence import Evidence
 from server.judge.sources.motion import is_lost
 from server.judge.sources.namespaces import is_of_another_robot, namespace_of
 from server.judge.topic import Decode
-from server.judge.topics import BY_SIGNAL, Source, plain_type
+from server.judge.topics import BY_SIGNAL, Source, candidates, plain_type
+from server.judge.units import FASTEST_KMH, plausible_speed
+from server.protocol.questions import TopicOffer
+
+Reasons = Mapping[str, Mapping[str, str]]  # signal → topic → what speaks for it and against it
 
 MOST = 4  # further topics of one signal
 FIX, ODOMETRY = "sensor_msgs/NavSatFix", "nav_msgs/Odometry"
 TWISTS = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
 VELOCITY_OF_A_RECEIVER = "vel"  # beside its NavSatFix, as the drivers of receivers name it
+
+
+def offers(offered: Mapping[str, str], reasons: Reasons, evidence: Evidence) -> dict[str, list[TopicOffer]]:
+    """Signal → its candidates among the topics of a car (topic → type)."""
+    found = candidates(offered)
+    for signal, rows in found.items():
+        for row in rows:
+            known, why = evidence.of(row["topic"]), reasons.get(signal, {}).get(row["topic"])
+            if why:
+                row["why"] = why
+            if known.count:
+                row["frame"] = known.frame
+            if signal == "scan" and known.picture is not None:
+                row["ranges_m"] = list(known.picture.ranges_m)
+                row["angle_min_rad"] = known.picture.angle_min_rad
+                row["angle_increment_rad"] = known.picture.angle_increment_rad
+    return found
 
 
 def size_of_twist(message: Any) -> Twist:

@@ -8,15 +8,13 @@ from functools import cached_property
 from typing import Protocol
 
 from server.judge import pipeline
-from server.judge.active_settings import ActiveSettings
-from server.judge.comparisons import comparison_sources
+from server.judge.active_settings import NO_CHOICES, ActiveSettings, SettingsOverride, recorded_override, tuning_for
+from server.judge.comparisons import comparison_sources, offers
 from server.judge.message import Json, RosVersion
-from server.judge.offers import offers
 from server.judge.recorded_events import NewSettings, RecordedEvents
-from server.judge.recorded_transforms import RecordedTransforms
+from server.judge.recording_survey import RecordedTransforms, Surveyed, survey
 from server.judge.ros_names import BadName, canonical_name
 from server.judge.settings import BadSetting
-from server.judge.settings_override import NO_CHOICES, SettingsOverride, recorded_override, tuning_for
 from server.judge.sources import survey as source_survey
 from server.judge.sources.candidates import follow
 from server.judge.sources.choice import Choice, choose
@@ -24,10 +22,8 @@ from server.judge.sources.evidence import Evidence
 from server.judge.stamp_steps import ClockStep
 from server.judge.topics import Source
 from server.judge.unit_evidence import Evidence as UnitEvidence
-from server.judge.unit_survey import Surveyed, survey
 from server.judge.unit_watch import Key, UnitBasis
-from server.protocol.questions import Question
-from server.protocol.topic_offer import TopicOffer
+from server.protocol.questions import Question, TopicOffer
 
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, message
 

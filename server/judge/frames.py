@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from monitor.catalog import AllLimits
-from monitor.mounting import Mounting
+from monitor.scan import Mounting
 from monitor.values import LaserScan
 from server.judge.signals.scan import LOOKS_AHEAD
 from server.judge.topics import plain_type

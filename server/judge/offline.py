@@ -20,8 +20,7 @@ from server.judge import pipeline
 from server.judge.drive import Drive, MessageSource, Row, SettingsEpoch
 from server.judge.pipeline import TICK_S
 from server.judge.reception_stats import Reception
-from server.judge.recorded_events import ChosenPhone, NewSettings, Pause, StopChange
-from server.judge.recorded_slowdown import SlowDownEvent
+from server.judge.recorded_events import ChosenPhone, NewSettings, Pause, SlowDownEvent, StopChange
 from server.judge.run_state import RunState
 from server.judge.unit_watch import UnitWatch
 from server.judge.units import Unit

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from monitor.alarm import Alarm
-from monitor.check_minute import CheckMinute
 from monitor.load import RecentLoad
 from monitor.planned_stop import PlannedStop
 from monitor.runner import Monitor
 from monitor.state import State
-from monitor.trends import Trends
+from monitor.trends import CheckMinute, Trends
 from server.judge.frames import Frames
 from server.judge.reception_stats import Reception
-from server.judge.recorded_events import Pause
-from server.judge.recorded_slowdown import RecordedSlowDown
+from server.judge.recorded_events import Pause, RecordedSlowDown
 from server.judge.stamp_steps import StampSteps
 
 

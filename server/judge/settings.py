@@ -22,7 +22,7 @@ from server.judge import profiles
 from server.judge.profiles import GENERIC, Profile
 from server.judge.units import UNITS
 from server.storage import bounded_toml, durable_file
-from server.storage.set_aside import set_aside
+from server.storage.durable_file import set_aside
 
 log = logging.getLogger("catgraph.settings")
 

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from server.judge.signals import TOPICS
 from server.judge.sources.choice import choose
 from server.judge.sources.source import BY_SIGNAL, COMMAND, Source, plain_type
-from server.protocol.topic_offer import TopicOffer
+from server.protocol.questions import TopicOffer
 
 __all__ = ["BY_SIGNAL", "COMMAND", "Source", "candidates", "could_carry", "map_signals", "plain_type", "ros_version"]
 

@@ -1,4 +1,4 @@
-"""The unit of every signal of one drive: decided once by all values so far, and applied to each value."""
+"""The unit of every signal of one drive: decided once by all values so far, applied to each value, or asked for."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+from monitor.signals import SIGNALS
 from monitor.values import Effort, GpsFix, Level, Odometry, Steering, Twist
 from server.judge.active_settings import PERCENT_A_RAD
 from server.judge.message_fields import NotMeasured, Rejected
-from server.judge.plausible import FASTEST_MPS, TOO_FAST
 from server.judge.profiles import Profile
 from server.judge.topics import Source, plain_type
 from server.judge.unit_evidence import Decision, Evidence, decide, new_evidence
-from server.judge.units import BY_RATIO, LITRES, Unit, UnitRule, rule_for, unit_named
+from server.judge.units import BY_RATIO, FASTEST_MPS, LITRES, TOO_FAST, Unit, UnitRule, rule_for, unit_named
+from server.protocol.questions import Question
 
 PLACES = (Odometry, GpsFix)
 MOVES_MPS = 1.0
@@ -29,6 +30,8 @@ _NUMBERS: Mapping[type, Callable[[Any], float]] = {
     Steering: lambda value: value.percent,
     Twist: lambda value: value.speed_mps,
 }
+
+NOT_EVALUATED = "It is not evaluated."
 
 
 def number_of(value: Any) -> float | None:
@@ -242,3 +245,58 @@ def _steered(number: float, unit: Unit | None, basis: UnitBasis) -> Steering:
     if tyre_rad is None:
         raise UnitUnknown("the tyre angle per unit of steering is not set, and the values are of the steering wheel")
     return Steering(percent=tyre_rad * PERCENT_A_RAD, tyre_rad=tyre_rad)
+
+
+def unit_questions(units: UnitWatch, sources: Mapping[str, Source], chosen: Mapping[str, str]) -> tuple[Question, ...]:
+    """What the operator is asked of units.
+
+    One for each signal whose unit the values do not show, in the order of the signals. `chosen`: the operator's
+    answers, signal → name of the unit, which hold from the next value on.
+    """
+    found = []
+    for signal, source in _asked(units, sources):
+        decision = units.decision(signal, source.topic)
+        assert decision is not None
+        if chosen.get(signal) in [unit.name for unit in decision.fits]:
+            continue
+        highest = units.highest(signal, source.topic)
+        fits = decision.fits
+        question: Question = {
+            "signal": signal,
+            "kind": "unit",
+            "words": f"{SIGNALS[signal].label}: in which unit is {source.topic}?",
+            "options": [{"value": unit.name, "label": unit.label, "why": _why(unit, highest)} for unit in fits],
+            "options_count": len(fits),
+        }
+        found.append(question)
+    return tuple(found)
+
+
+def unit_sentences(units: UnitWatch, sources: Mapping[str, Source]) -> list[str]:
+    """Of each signal of unknown unit: why, and how to choose one."""
+    asked = {signal for signal, _ in _asked(units, sources)}
+    found = []
+    for signal, source in sources.items():
+        decision = units.decision(signal, source.topic)
+        if decision is not None and decision.unit is not None and not decision.unit.converts:
+            found.append(f"{SIGNALS[signal].label} ({source.topic}): {cannot_convert(decision.unit)}. {NOT_EVALUATED}")
+        if decision is None or decision.unit is not None or decision.is_rest:
+            continue
+        words = f"{SIGNALS[signal].label} ({source.topic}): {decision.why}. {NOT_EVALUATED}"
+        if signal in asked:
+            names = " or ".join(f'"{unit.name}"' for unit in decision.fits)
+            words += f" Choose it in the file for --settings: [units] {signal} = {names}."
+        found.append(words)
+    return found
+
+
+def _asked(units: UnitWatch, sources: Mapping[str, Source]) -> list[tuple[str, Source]]:
+    return [(name, sources[name]) for name in SIGNALS if name in sources and units.is_to_ask(name, sources[name].topic)]
+
+
+def _why(unit: Unit, highest: float) -> str:
+    """What the values would mean."""
+    if unit.factor is None:
+        return f"its numbers are at most {highest:.3g}"
+    most = highest * unit.factor
+    return f"highest so far {most:.3g} {'l' if unit.name == 'litres' else '%'} ({highest:.3g} as published)"

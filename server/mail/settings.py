@@ -18,7 +18,7 @@ import tomli_w
 from server.mail import address
 from server.mail.header_text import is_one_line
 from server.storage import bounded_toml, durable_file
-from server.storage.set_aside import set_aside
+from server.storage.durable_file import set_aside
 
 Security = Literal["starttls", "tls", "none"]
 USUAL_PORT: Mapping[str, int] = {"starttls": 587, "tls": 465, "none": 25}

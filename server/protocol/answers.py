@@ -8,16 +8,15 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from monitor.alarm_spec import Priority
-from server.protocol.check_state import CheckAnswer
+from server.protocol.alarm_state import CheckAnswer
 from server.protocol.departure import DepartureAnswer
 from server.protocol.doc import doc
-from server.protocol.drive_course import Course
 from server.protocol.drive_trends import DriveTrendsAnswer
 from server.protocol.driving_state import DrivingAnswer, InterventionAnswer
-from server.protocol.logbook import LogbookAnswer
+from server.protocol.logbook import Course, LogbookAnswer
 from server.protocol.marks import DriveMark, MarkList
 from server.protocol.people import PeopleList
-from server.protocol.topic_offer import TopicOffer
+from server.protocol.questions import TopicOffer
 
 ExportState = Literal["waiting", "working", "done", "failed", "cancelled"]
 

@@ -8,9 +8,8 @@ from typing_extensions import TypedDict
 
 from monitor.alarm import AlarmState
 from monitor.alarm_spec import Priority, Sound
-from monitor.link import Phase
 from monitor.planned_stop import StopReason
-from monitor.recorder import RecorderState
+from monitor.shell_facts import Phase, RecorderState
 from server.protocol.doc import doc
 from server.protocol.signal_state import SignalFreshness
 from server.protocol.slow_down_state import SlowDownPhase

@@ -13,14 +13,15 @@ from pydantic_core import PydanticCustomError
 
 from server.protocol import signed_order
 from server.protocol.command_base import BaseCommand, Name, Needs, Number, PageName, Prompt
-from server.protocol.departure_commands import DepartureCommand
 from server.protocol.doc import doc
-from server.protocol.handover_commands import HandoverCommand
-from server.protocol.item_commands import ItemCommand
-from server.protocol.mark_commands import MarkCommand
-from server.protocol.mode_commands import DescribeIntervention
-from server.protocol.planned_stop_commands import PlannedStopCommand
-from server.protocol.slowing_commands import SlowingCommand
+from server.protocol.drive_commands import (
+    DepartureCommand,
+    DescribeIntervention,
+    MarkCommand,
+    PlannedStopCommand,
+    SlowingCommand,
+)
+from server.protocol.handover_commands import HandoverCommand, ItemCommand
 
 MAX_COMMAND_BYTES = 16 * 1024
 

@@ -1,4 +1,4 @@
-"""The logbook of a car: its drives, weeks and totals."""
+"""The logbook of a car: its drives, weeks and totals, and the course of a drive, to compare two of them."""
 
 from __future__ import annotations
 
@@ -110,3 +110,37 @@ class LogbookAnswer(TypedDict):
     people: Annotated[list[str], doc("to choose among")]
     checks: Annotated[list[LogbookCheck], doc("of each car, over all its drives")]
     unread: Annotated[int, doc("recordings that are yet to be read: their drives are missing")]
+
+
+class CoursePoints(TypedDict):
+    """Numbers at evenly spaced places or moments; null: not known there."""
+
+    t: Annotated[list[float], doc("s since the recording began")]
+    m: Annotated[list[float | None], doc("distance driven")]
+    speed: Annotated[list[float | None], doc("m/s")]
+    steering: Annotated[list[float | None], doc("%, negative = left")]
+    lat: list[float | None]
+    lon: list[float | None]
+
+
+class CourseEvent(TypedDict):
+    """An alarm, a mark or an intervention."""
+
+    t: float
+    m: float | None
+    kind: Annotated[str, doc("critical · warning · advisory · mark · intervention")]
+    text: str
+
+
+class Course(TypedDict):
+    """`GET /api/recordings/{id}/course`."""
+
+    start_ms: int
+    length_s: float
+    length_m: Annotated[float | None, doc("null: not known; then `way` is empty")]
+    step_m: Annotated[float, doc("between two points of `way`")]
+    step_s: Annotated[float, doc("between two points of `time`")]
+    way: CoursePoints
+    time: CoursePoints
+    events: list[CourseEvent]
+    limit_mps: Annotated[float | None, doc("the speed limit at the beginning; null: not recorded")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -25,3 +25,18 @@ class Question(TypedDict):
     words: Annotated[str, doc("*Two lasers: which looks ahead?*")]
     options: Annotated[list[Option], doc("the most probable first, at most 12")]
     options_count: Annotated[int, doc("how many there are, those left out included")]
+
+
+class TopicOffer(TypedDict):
+    topic: str
+    type: str
+    frame: NotRequired[Annotated[str | None, doc("that its messages name; null: none, or not known")]]
+    why: NotRequired[Annotated[str, doc("evidence for and against it, in few words")]]
+    ranges_m: NotRequired[
+        Annotated[
+            list[float | None],
+            doc("of a laser that is compared: the nearest range in each of at most 72 parts of its newest scan"),
+        ]
+    ]
+    angle_min_rad: NotRequired[Annotated[float, doc("of the middle of the first part, in the laser's own frame")]]
+    angle_increment_rad: NotRequired[Annotated[float, doc("from one part to the next")]]

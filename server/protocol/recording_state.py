@@ -6,7 +6,7 @@ from typing import Annotated, NotRequired
 
 from typing_extensions import TypedDict
 
-from monitor.recorder import RecorderState
+from monitor.shell_facts import RecorderState
 from server.protocol.doc import doc
 
 

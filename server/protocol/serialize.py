@@ -15,11 +15,10 @@ from monitor.alarm import Alarm, Transition
 from monitor.alarm_spec import Sound
 from monitor.check import Finding, Quantity, Verdict
 from monitor.load import AlarmLoad
-from monitor.mounting import Mounting, within_half_turn
 from monitor.obstacle_view import ANGLE_STEP_RAD
 from monitor.planned_stop import StopReason
 from monitor.runner import Tile
-from monitor.scan import usable
+from monitor.scan import Mounting, usable, within_half_turn
 from monitor.trends import STEP_S, Piece
 from server.protocol.alarm_state import AlarmLoad as LoadState
 from server.protocol.alarm_state import NewEvent, StandingAlarm, SuppressedAlarm, Worst

@@ -6,8 +6,8 @@ from typing import Annotated, Literal, NotRequired
 
 from typing_extensions import TypeAliasType, TypedDict
 
-from monitor.link import Phase
 from monitor.planned_stop import StopReason
+from monitor.shell_facts import Phase
 from server.protocol.alarm_state import AlarmLoad, StandingAlarm, SuppressedAlarm, Tile
 from server.protocol.departure import DepartureState
 from server.protocol.doc import doc

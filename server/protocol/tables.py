@@ -1,23 +1,58 @@
-"""The tables of docs/protocol.md, made from the types of the protocol.
-
-A page says where they stand: between `<!-- types: SessionState LinkState -->` and `<!-- end -->` is a table for each
-named type; `signals`, `commands` and `replay` are one table each.
-"""
+"""The named types of the protocol as JSON schema, and the tables of docs/protocol.md made from them."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, get_args
+from functools import cache
+from typing import Any, Literal, get_args
+
+import orjson
+from pydantic import TypeAdapter
 
 from monitor.signals import SIGNALS
+from server.protocol import commands
+from server.protocol.answers import Answers
 from server.protocol.command_base import OF_PAGE, Prompt
 from server.protocol.commands import BY_KIND
+from server.protocol.messages import Message
+from server.protocol.page_messages import PageMessage
 from server.protocol.replay_commands import ReplayOrder
-from server.protocol.shapes import command_name, definitions
+from server.protocol.signal_state import SignalState
+
+COMMAND = "Command"  # ends the names of commands here: `Record` and `Set` have another meaning in TypeScript
 
 _BLOCK = re.compile(r"(<!-- (types|signals|commands|replay): ([^>]*?)-->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+@cache
+def definitions() -> Mapping[str, Any]:
+    """The JSON schema of each named type, by its name."""
+    return {
+        **_named("SignalState", SignalState, "serialization"),
+        **_named("Message", Message, "serialization"),
+        **_named("PageMessage", PageMessage, "validation"),
+        **_named("Answers", Answers, "serialization"),
+    }
+
+
+def command_name(command: type[commands.Command]) -> str:
+    return f"{command.__name__}{COMMAND}"
+
+
+def _named(name: str, shape: Any, mode: Literal["serialization", "validation"]) -> dict[str, Any]:
+    """A type and all that it is made of."""
+    schema = TypeAdapter(shape).json_schema(mode=mode)
+    parts: dict[str, Any] = schema.pop("$defs", {})
+    # Only what a page sends names commands: a type of what the server sends may be called as one of them.
+    ordered = {one.__name__ for one in commands.BY_KIND.values()} & parts.keys() if shape is PageMessage else set()
+    found = {name: schema, **{f"{part}{COMMAND}" if part in ordered else part: of for part, of in parts.items()}}
+    if not ordered:
+        return found
+    text = re.sub(rf'"#/\$defs/({"|".join(ordered)})"', rf'"#/$defs/\1{COMMAND}"', orjson.dumps(found).decode())
+    renamed: dict[str, Any] = orjson.loads(text)
+    return renamed
 
 
 def filled(page: str) -> str:

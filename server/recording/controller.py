@@ -11,19 +11,18 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from monitor.recorder import RecorderFacts
 from monitor.runner import Refused
+from monitor.shell_facts import RecorderFacts
 from server.judge.active_settings import ActiveSettings
 from server.protocol.recording_state import RecordingState
-from server.recording.clock_history import ClockHistory
 from server.recording.delay import LinkDelay
 from server.recording.folder import RecordingsFolder
 from server.recording.own import Own
 from server.recording.parts import RecordingParts
 from server.recording.recorded_topics import Also, Missing
 from server.recording.recorder_queue import Attachment
-from server.recording.recording_session import ControllerState
-from server.recording.recording_settings import RecordingSettings
+from server.recording.recording_clock import ClockHistory
+from server.recording.recording_session import ControllerState, RecordingSettings
 from server.recording.recording_status import NOWHERE, RecordingStatus
 from server.rosbridge.address import without_login
 

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from monitor.phones import PhoneReport
 from monitor.planned_stop import PlannedStop, reason_of
-from server.judge import recorded_slowdown
+from server.judge import recorded_events
 from server.judge.logged_transition import number_of, text_of, transition_of
 from server.judge.phone_report import phone_report
 from server.judge.recorded_events import ChosenPhone, NewSettings, Pause, RecordedEvent, RecordedEvents, StopChange
@@ -84,7 +84,7 @@ def _of_event(row: Mapping[str, Any], at_s: float, start_s: float) -> RecordedEv
     if change == "ride":
         phone = row.get("phone")
         return ChosenPhone(phone=phone if isinstance(phone, str) else None)
-    if (slow_down := recorded_slowdown.read(row)) is not None:
+    if (slow_down := recorded_events.read_slowdown(row)) is not None:
         return slow_down
     if not isinstance(row.get("alarm"), str):
         return None

@@ -11,8 +11,7 @@ from server.recording.mcap.write import PartFile
 from server.recording.own import PREFIX, Own, own_schema
 from server.recording.read.encode import TypeMismatch
 from server.recording.read.schemas import Schema, TypeBook
-from server.rosbridge.codec import TooManyParts
-from server.rosbridge.message_bytes import Unencodable, json_bytes
+from server.rosbridge.codec import TooManyParts, Unencodable, json_bytes
 from server.rosbridge.raw_frame import RawFrame
 
 

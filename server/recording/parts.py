@@ -12,18 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from server.judge.message import RosVersion
-from server.recording.clock_history import ClockHistory
 from server.recording.delay import DelayWriter, LinkDelay
-from server.recording.early_entries import EarlyEntries
 from server.recording.folder import RecordingsFolder, id_of, part_id
 from server.recording.own import Own
 from server.recording.recorded_topics import Missing
 from server.recording.recorder import Recorder
 from server.recording.recorder_queue import Attachment, Part
 from server.recording.recorder_thread import Status
-from server.recording.recording_clock import RecordingClock
-from server.recording.recording_session import ControllerState, RecordingSession
-from server.recording.recording_settings import RecordingSettings
+from server.recording.recording_clock import ClockHistory, RecordingClock
+from server.recording.recording_session import ControllerState, RecordingSession, RecordingSettings
+from server.recording.standing import EarlyEntries
 from server.version import catgraph_version
 
 EARLY_S = 10.0  # entries from before a session began are kept, if it was not long before: how it came to be connected

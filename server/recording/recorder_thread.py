@@ -32,9 +32,8 @@ from server.recording.recorder_queue import (
     RecorderQueue,
     Stop,
 )
-from server.recording.space import Allowance, Space
-from server.recording.space_watch import SpaceWatch
-from server.recording.unfinished import UnfinishedParts
+from server.recording.recover import UnfinishedParts
+from server.recording.space import Allowance, Space, SpaceWatch
 from server.rosbridge.codec import Unreadable
 
 log = logging.getLogger("catgraph.recorder")

@@ -1,13 +1,47 @@
-"""One session of recording and its parts, and what else the controller of a vehicle's recording knows."""
+"""One session of recording and its parts, the settings of the recorder, what else its controller knows."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
+from monitor.check import Limits
+from server.judge.active_settings import ActiveSettings
 from server.recording.delay import DelayWriter
 from server.recording.recorded_topics import Missing
 from server.recording.recorder_queue import Part
+from server.recording.space import Allowance
+
+GB = 1e9
+
+
+class RecordingSettings:
+    """The active settings of the recorder, and all settings in the form that is recorded.
+
+    Read each time, because settings change during a recording.
+    """
+
+    def __init__(self, tuning: ActiveSettings) -> None:
+        self._tuning = tuning
+
+    def value(self, name: str) -> float:
+        """One setting of recording, in SI."""
+        limits: Limits = self._tuning.limits.recording
+        return float(getattr(limits, name))
+
+    def allowance(self) -> Allowance:
+        """What recordings may take of the disk."""
+        return Allowance(quota=round(self.value("quota_gb") * GB), min_free=round(self.value("min_free_gb") * GB))
+
+    def as_entry(self) -> dict[str, Any]:
+        """All settings in force, for the channel of settings."""
+        return {
+            "version": self._tuning.settings.version,
+            "profile": self._tuning.profile.name,
+            "toml": self._tuning.as_toml(),
+            "in_force": self._tuning.in_force(),
+        }
 
 
 @dataclass(slots=True)

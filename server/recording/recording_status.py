@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from monitor.recorder import RecorderFacts, RecorderState
+from monitor.shell_facts import RecorderFacts, RecorderState
 from server.protocol import serialize
 from server.protocol.recording_state import RecordingState
 from server.recording import space
@@ -10,8 +10,7 @@ from server.recording.folder import id_of, part_id
 from server.recording.parts import RecordingParts
 from server.recording.recorded_topics import Missing
 from server.recording.recorder_thread import Status
-from server.recording.recording_session import ControllerState
-from server.recording.recording_settings import GB, RecordingSettings
+from server.recording.recording_session import GB, ControllerState, RecordingSettings
 
 NOWHERE = "This server stores nothing: it was started without a data folder."
 

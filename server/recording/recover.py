@@ -3,16 +3,21 @@
 The new file begins with the bytes of the old one, up to the last record of its hash chain, and the chain continues in
 it; whatever was changed before shows in the chain as it did. Where a chunk is damaged, or there is no chain, the chunks
 that are whole are copied, and the new file has no chain. The new file gets its name only when the disk has it; only
-then what was left goes. Nothing that might still be of use is removed: what could not be read is kept
-aside under another name, and said.
+then what was left goes. Nothing that might still be of use is removed: what could not be read is kept aside under
+another name, and said.
+
+What the last run left is recovered at the start of a server, while monitoring runs; what a full disk left, when there
+is room again.
 """
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import fcntl
+import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +27,11 @@ from server.recording.mcap.chunks import MAGIC, Walk
 from server.recording.mcap.recovered_file import Contents, write_recovered
 from server.storage.durable_file import sync_folder
 
+log = logging.getLogger("catgraph.recording")
+
 _TORN = 1024 * 1024  # bytes at the end that a kill may have left half-written; more of them are kept aside
+
+TRY_AGAIN_S = 10.0  # what could not be completed on a full disk is tried again so often
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,3 +141,43 @@ def _words(id: str, found: Contents, unread: int) -> str:
     return f"{id} is truncated: {span_s:.1f} s with {found.messages} messages are whole.{bad} " + (
         f"The last {space.amount(unread)} were only partly written." if unread else "Nothing was partly written."
     )
+
+
+class UnfinishedParts:
+    """Parts that a full disk left cut: they are made whole when there is room again.
+
+    Those of one recorder. Times are of a monotonic clock in seconds.
+    """
+
+    def __init__(self) -> None:
+        self._due_s: dict[Path, float] = {}  # when each is tried next
+
+    @property
+    def wait_s(self) -> float | None:
+        """How long to wait before `complete` is called; None: there is nothing to complete."""
+        return TRY_AGAIN_S if self._due_s else None
+
+    def add(self, path: Path, now_s: float) -> None:
+        self._due_s[path] = now_s + TRY_AGAIN_S
+
+    def complete(self, now_s: float) -> list[Path]:
+        """Tries those that are due; returns the parts that are finished now."""
+        finished: list[Path] = []
+        for path, due_s in list(self._due_s.items()):
+            if now_s >= due_s:
+                done = recover(path)
+                if done.is_settled:
+                    del self._due_s[path]
+                    if done.path is not None:
+                        finished.append(done.path)
+                else:
+                    self._due_s[path] = now_s + TRY_AGAIN_S
+        return finished
+
+
+async def recover_left(left: Sequence[Path], *, on_recovered: Callable[[Path, Recovered], None]) -> None:
+    """Recovers each of the files, off the loop; `on_recovered(path, what became of it)` is called on the loop."""
+    for path in left:
+        found = await asyncio.to_thread(recover, path)
+        log.warning("%s", found.sentence)
+        on_recovered(path, found)

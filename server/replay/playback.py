@@ -11,9 +11,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from server.judge.active_settings import NO_CHOICES, SettingsOverride
 from server.judge.drive import Drive
 from server.judge.offline import OfflineRun
-from server.judge.settings_override import NO_CHOICES, SettingsOverride
 from server.protocol import drive_trends, serialize
 from server.protocol.messages import Timeline
 from server.protocol.state import RecordedState, ReplayPosition
@@ -21,11 +21,10 @@ from server.recording.delay import recorded_delay
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, RecordingUnreadable
 from server.replay import replay_frames
-from server.replay.gaps import EMPTY_S, behind_gap
 from server.replay.recorded_events import MOST, NOTHING, TimelineEvents
-from server.replay.timeline import Index
+from server.replay.timeline import EMPTY_S, Index, behind_gap
 from server.vehicle import queries
-from server.vehicle.check_detail import check_answer
+from server.vehicle.queries import check_answer
 
 RATES = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 WARM_UP_S = 25.0  # of the recording, before a moment that the time line has not come to: less than a second of work

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO
 
 import orjson
 
-from server.judge.settings_override import SettingsOverride
+from server.judge.active_settings import SettingsOverride
 from server.recording.read.read import RecordingUnreadable, open_recording
 from server.replay.playback import Playback
 from server.replay.protocol import Kind, record

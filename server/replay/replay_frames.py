@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from monitor.alarm import Alarm
-from monitor.alarm_order import standing
 from monitor.check import Verdict
+from monitor.driving_mode import meaning
+from monitor.inhibition import standing
+from monitor.reading import Reading
+from monitor.values import DriveMode, Mode
 from server.judge.offline import OfflineRun
 from server.judge.run_state import RunState
-from server.judge.unit_questions import unit_questions
+from server.judge.topics import Source
+from server.judge.unit_watch import unit_questions
 from server.protocol import serialize
+from server.protocol.driving_state import ModeState, WhyUnknown
 from server.protocol.state import RecordedState
-from server.vehicle.mode_shown import mode_shown
 from server.vehicle.scan_feed import judged
 from server.vehicle.state_frame import Facts, silent_at, state_frame
 
@@ -58,7 +63,7 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
         track_number=track_number,
         recording={"state": "off", "for_s": None},
         decelerate=run_state.slow_down.as_json(now_s, run.drive.start_s, epoch.tuning.limits.slow_down),
-        mode=mode_shown(
+        mode=_mode_shown(
             run_state.state.get("mode"), epoch.sources.get("mode"), run_state.monitor.limits.driving, now_s
         ),
         operators={"control": {"holder": None}, "reach": None},  # not applicable to a recording
@@ -111,3 +116,20 @@ def _recorded_standing(run_state: RunState) -> list[Alarm]:
         else alarm
         for alarm in standing(run_state.recorded_alarms.values())
     ]
+
+
+def _mode_shown(reading: Reading[DriveMode] | None, source: Source | None, limits: Any, now_s: float) -> ModeState:
+    """The mode where only one moment is known. `limits`: of the group `driving`; times on the reading's clock."""
+    mode: Mode = "unknown"
+    why: WhyUnknown | None = "no_source" if source is None else "silent"
+    if reading is not None and (reading.is_fresh(now_s) or 0.0 <= now_s - reading.received_s <= limits.holds_s):
+        mode = meaning(reading.value, limits)
+        why = "unclear" if mode == "unknown" else None
+    return {
+        "mode": mode,
+        "why": why,
+        "since_ms": None,
+        "way_m": None,
+        "source": source.topic if source is not None else "",
+        "open": [],
+    }

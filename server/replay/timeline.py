@@ -5,12 +5,19 @@ Built in one pass over the recording, in small portions, while it is already vie
 
 from __future__ import annotations
 
+import io
 import math
+import pickle
+import zlib
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import Callable, Sequence
+from types import MappingProxyType
+from typing import Any, cast
 
 from monitor.alarm import Transition
 from monitor.alarm_marks import AlarmMarks
+from monitor.catalog import CHECKS
 from monitor.drive_trends import DriveTrends
 from monitor.state import State
 from server.judge.drive import Drive
@@ -22,14 +29,91 @@ from server.protocol import serialize
 from server.protocol.messages import IndexedTimeline, Mark
 from server.recording.read.read import Recording
 from server.recording.read.spans import span
-from server.replay.alarm_history import AlarmHistory
-from server.replay.checkpoint import restore, save
+
+MOST_TRANSITIONS = 20_000  # transitions of all alarms: days of a car in trouble
+MOST_SHOWN = 300  # of one alarm, the newest
+
+_BY_ID = {check.id: check for check in CHECKS}
+_IDS = {id(check): check.id for check in CHECKS}
+
+EMPTY_S = 60.0  # a gap without any message that is passed over; a shorter one is played
+SHOWN_S, LEAD_S = 10.0, 2.0  # of its beginning and of its end
 
 GAP_S = 1.0  # nothing at all was recorded for longer: a gap
 KEYFRAMES = 240  # of some 20 kB each
 LEAST_KEYFRAME_S = 10.0
 MOST_NAMED = 5  # gaps in a sentence each
 MOST_MARKS = 400  # more alarms than a person can view: the most urgent are kept
+
+
+class AlarmHistory:
+    """The alarms of a recording by check: what had happened by the moment that is shown.
+
+    Times are seconds since the beginning of the recording.
+    """
+
+    def __init__(self) -> None:
+        self._of: defaultdict[str, list[tuple[float, Transition]]] = defaultdict(list)
+        self._count = 0
+        self._full_s: float | None = None  # from here on transitions are missing
+
+    def add(self, transition: Transition, at_s: float) -> None:
+        """Keep it. `at_s`: when it became known; what stood before the recording is older than that."""
+        if self._count >= MOST_TRANSITIONS:
+            if self._full_s is None:
+                self._full_s = at_s
+            return
+        self._count += 1
+        self._of[transition.alarm_id].append((at_s, transition))
+
+    def until(self, alarm: str, at_s: float) -> list[Transition] | None:
+        """The transitions of one alarm up to a moment, the oldest first; None: some of them are missing."""
+        if self._full_s is not None and at_s >= self._full_s:
+            return None
+        return [transition for known_s, transition in self._of[alarm] if known_s <= at_s][-MOST_SHOWN:]
+
+
+def save_checkpoint(run_state: RunState) -> bytes:
+    """Keeps what a run knew at a moment as bytes, so that it can go on from there as often as somebody wants.
+
+    A copy that later steps do not change; some 20 kB.
+    """
+    out = io.BytesIO()
+    _Packer(out, protocol=5).dump(run_state)
+    return zlib.compress(out.getvalue(), 1)
+
+
+def restore_checkpoint(saved: bytes) -> RunState:
+    """Restore the state of a run, a new object each time. Only for bytes that this process saved."""
+    return cast(RunState, _Unpacker(io.BytesIO(zlib.decompress(saved))).load())
+
+
+class _Packer(pickle.Pickler):
+    def persistent_id(self, obj: Any) -> str | None:
+        """Checks are no part of what is known: there is one of each."""
+        return _IDS.get(id(obj))
+
+    def reducer_override(self, obj: Any) -> Any:
+        if type(obj) is MappingProxyType:
+            return (_view, (dict(obj),))
+        return NotImplemented
+
+
+class _Unpacker(pickle.Unpickler):
+    def persistent_load(self, pid: Any) -> Any:
+        return _BY_ID[pid]
+
+
+def _view(mapping: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    return MappingProxyType(mapping)
+
+
+def behind_gap(run: OfflineRun, length_s: float) -> float | None:
+    """Where playing goes on [s since the beginning], in the middle of a gap; None: it is in none."""
+    last_s = run.run_state.last_message_s
+    is_shown = run.at_s - (0.0 if last_s is None else last_s) >= SHOWN_S
+    next_s = min(run.next_s, length_s)
+    return next_s - LEAD_S if is_shown and next_s - run.at_s > EMPTY_S - SHOWN_S else None
 
 
 class Index(Observer):
@@ -79,7 +163,7 @@ class Index(Observer):
                 return
             if due_s <= self._drive.length_s:
                 self._kept_s.append(due_s)
-                self._kept.append(save(self._run.run_state))
+                self._kept.append(save_checkpoint(self._run.run_state))
             else:
                 self.finish()
 
@@ -92,7 +176,7 @@ class Index(Observer):
     def before(self, at_s: float) -> tuple[float, Callable[[], RunState]] | None:
         """The newest moment kept that is not later, and how to get what was known then."""
         place = bisect_right(self._kept_s, at_s) - 1
-        return (self._kept_s[place], lambda: restore(self._kept[place])) if place >= 0 else None
+        return (self._kept_s[place], lambda: restore_checkpoint(self._kept[place])) if place >= 0 else None
 
     def history(self, alarm: str, at_s: float) -> list[Transition] | None:
         """The transitions of an alarm up to a moment; None: it has not been read so far, or is too long."""

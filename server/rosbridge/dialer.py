@@ -19,7 +19,7 @@ import roslibpy
 from roslibpy.comm.comm_asyncio import AsyncioRosBridgeClientFactory
 
 from server.rosbridge.address import Address, BadAddress, refuse_forbidden
-from server.rosbridge.link_errors import NoWebSocket
+from server.rosbridge.live_source import NoWebSocket
 from server.rosbridge.websocket import BridgeProtocol
 from server.system.supervision import Supervisor
 

@@ -1,15 +1,121 @@
-"""Turns the frames of one connection into what they hold: a message, an answer, a status, or why they hold nothing."""
+"""Turns the frames of one connection into what they hold: a message, an answer, a status, or why they hold nothing.
+
+ROS 2's rosbridge, and ROS 1's with a max_message_size, fragments longer messages unasked: text, in order, the id 0 for
+every message of a topic, a fractional `total`. A fragment is not parsed: its head and tail identify it, and its JSON
+escapes are those of the whole. They are put together within bounds.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import orjson
+
 from server.rosbridge import codec
-from server.rosbridge.fragments import Fragments, TooLarge, is_fragment
-from server.rosbridge.raw_frame import RawFrame, raw_frame
+from server.rosbridge.codec import Unreadable
+from server.rosbridge.raw_frame import ENDS_BYTES, RawFrame, raw_frame, topic_of
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES
 from server.system.clean_text import short_text
+
+_HEAD = re.compile(
+    rb'[ \t\r\n]*+\{[ \t\r\n]*+"op"[ \t\r\n]*+:[ \t\r\n]*+"fragment"[ \t\r\n]*+,[ \t\r\n]*+"id"[ \t\r\n]*+:[ \t\r\n]*+'
+    rb'([^",{}\[\]]{1,40}|"(?:[^"\\]|\\.){0,200}+")[ \t\r\n]*+,[ \t\r\n]*+"data"[ \t\r\n]*+:[ \t\r\n]*+"'
+)
+_TAIL = re.compile(
+    rb'"[ \t\r\n]*+,[ \t\r\n]*+"num"[ \t\r\n]*+:[ \t\r\n]*+(\d{1,9})[ \t\r\n]*+,[ \t\r\n]*+"total"[ \t\r\n]*+:'
+    rb"[ \t\r\n]*+(\d{1,9}(?:\.\d{0,30})?)[ \t\r\n]*+\}[ \t\r\n]*+\Z"
+)
+_TAIL_BYTES = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TooLarge:
+    """A message that is not put together."""
+
+    topic: str | None  # None: not in its head
+    size: int  # bytes, as it is escaped
+
+
+@dataclass(slots=True)
+class Fragments:
+    """Assembles fragmented messages of a bridge, within bounds.
+
+    Of one connection: one message at a time.
+    """
+
+    most_bytes: int
+    _id: bytes = b""
+    _next: int = 0  # 0: none is under way
+    _is_skipped: bool = False
+    _pieces: list[bytes] = field(default_factory=list)
+    _size: int = 0
+
+    def add(self, payload: bytes) -> bytes | TooLarge | None:
+        """The whole message with its last piece, once a TooLarge of one beyond the bound, else None. Raises
+        Unreadable."""
+        head, tail = _HEAD.match(payload), _TAIL.search(payload, max(0, len(payload) - _TAIL_BYTES))
+        if head is None or tail is None or tail.start() < head.end():
+            self._forget()
+            raise Unreadable("a fragment without a valid header")
+        data, id, number, total = payload[head.end() : tail.start()], head[1], int(tail[1]), float(tail[2])
+        size = 0  # of the whole
+        if number == 0:
+            self._forget()
+            self._id = id
+            size = round((total - 1.0) * len(data)) + 1 if total > int(total) else round(total * len(data))
+            if size > self.most_bytes:
+                self._is_skipped = True
+        elif not self._next or number != self._next or id != self._id:
+            self._forget()
+            raise Unreadable("a fragment that does not fit the one before")
+        self._next = number + 1
+        self._size += len(data)
+        found: bytes | TooLarge | None = None
+        if number == 0 and self._is_skipped:
+            found = TooLarge(topic=_topic(data), size=size)
+        elif not self._is_skipped:
+            if self._size > self.most_bytes:  # it said that it would be shorter
+                found = TooLarge(topic=_topic(self._pieces[0] if self._pieces else data), size=self._size)
+                self._is_skipped = True
+                self._pieces.clear()
+            else:
+                self._pieces.append(data)
+        if self._next >= int(total):
+            whole, is_skipped = b"".join(self._pieces), self._is_skipped
+            self._forget()
+            return found if is_skipped else _unescaped(whole)
+        return found
+
+    def _forget(self) -> None:
+        self._id, self._next, self._is_skipped, self._size = b"", 0, False, 0
+        self._pieces.clear()
+
+
+def is_fragment(payload: bytes, is_binary: bool) -> bool:
+    """Whether a frame begins as a fragment does."""
+    return not is_binary and _HEAD.match(payload, 0, 400) is not None
+
+
+def _unescaped(data: bytes) -> bytes:
+    try:
+        text = orjson.loads(b'"' + data + b'"')
+    except orjson.JSONDecodeError:
+        raise Unreadable("fragments that are no text") from None
+    return bytes(text.encode())
+
+
+def _topic(data: bytes) -> str | None:
+    """From the first piece; it may be cut within an escape."""
+    begin = data[:ENDS_BYTES]
+    for less in range(6):
+        try:
+            return topic_of(_unescaped(begin[: len(begin) - less]), b"", is_binary=False)
+        except Unreadable:
+            continue
+    return None
 
 
 class Publish(NamedTuple):

@@ -18,14 +18,11 @@ from server.rosbridge import connection_errors
 from server.rosbridge.address import Address
 from server.rosbridge.connection_errors import Problem
 from server.rosbridge.dialer import RosClient
-from server.rosbridge.fragments import TooLarge
-from server.rosbridge.frame_reader import Answer, FrameReader, InvalidFrame, Publish, Status
-from server.rosbridge.large_message import topic_of
-from server.rosbridge.link_errors import LinkDown, NoWebSocket
-from server.rosbridge.link_listener import LinkListener, Marks
+from server.rosbridge.frame_reader import Answer, FrameReader, InvalidFrame, Publish, Status, TooLarge
+from server.rosbridge.link_listener import LinkListener, Marks, SafeCalls
+from server.rosbridge.live_source import LinkDown, NoWebSocket
 from server.rosbridge.outgoing import NotAllowed, Outgoing
-from server.rosbridge.raw_frame import RawFrame
-from server.rosbridge.safe_calls import SafeCalls
+from server.rosbridge.raw_frame import RawFrame, topic_of
 from server.rosbridge.sent_rows import SentRows
 from server.rosbridge.service_calls import ServiceCalls
 from server.rosbridge.subscription import Subscription, operation_of

@@ -14,8 +14,7 @@ from typing import Any, Protocol
 
 from server.rosbridge.connection_errors import LOGIN_WANTED, Problem
 from server.rosbridge.diagnosis import Diagnosis
-from server.rosbridge.link_errors import CallFailed, LinkDown, Refusal
-from server.rosbridge.live_source import LiveSource, QuestionChannel
+from server.rosbridge.live_source import CallFailed, LinkDown, LiveSource, QuestionChannel, Refusal
 
 GIVE_UP_S = 6.0  # a quick question that is so old will not be answered on this connection
 GIVE_UP_LONG_S = 30.0  # the same of a question with a long answer, which a slow link takes long to carry

@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Callable
 from typing import Any
 
-from server.rosbridge.link_errors import CallFailed, LinkDown, Refusal
+from server.rosbridge.live_source import CallFailed, LinkDown, Refusal
 from server.rosbridge.outgoing import NotAllowed
 from server.system.clean_text import short_text
 

@@ -17,7 +17,7 @@ from typing import Protocol
 
 from roslibpy.comm.comm_asyncio import AsyncioRosBridgeProtocol
 
-from server.rosbridge.large_message import ENDS_BYTES
+from server.rosbridge.raw_frame import ENDS_BYTES
 
 for _name in ("autobahn", "txaio", "roslibpy"):  # they log each dropped connection; we report it to the operator
     logging.getLogger(_name).addHandler(logging.NullHandler())

@@ -12,19 +12,16 @@ from websockets.exceptions import ConnectionClosed
 
 from server.judge.message import Json
 from server.judge.ros_names import BadName, canonical_name, canonical_type
-from server.rosbridge.message_bytes import Unencodable
+from server.rosbridge.codec import Unencodable
 from server.rosbridge_server import fields
-from server.rosbridge_server.calls import Calls
+from server.rosbridge_server.calls import Calls, Providers
+from server.rosbridge_server.client_topics import Publications, Subscription, SubscriptionRequest
 from server.rosbridge_server.connection import Connection
 from server.rosbridge_server.encoding import Encoding, json_frames
-from server.rosbridge_server.fields import Refused
-from server.rosbridge_server.fragments import Fragments
+from server.rosbridge_server.fields import Fragments, Refused
 from server.rosbridge_server.graph import Topic
 from server.rosbridge_server.interface import ClientHost
 from server.rosbridge_server.outbox import Outbox
-from server.rosbridge_server.provider import Providers
-from server.rosbridge_server.publications import Publications
-from server.rosbridge_server.subscription import Subscription, SubscriptionRequest
 
 _log = logging.getLogger("catgraph.bridge")
 

@@ -20,10 +20,12 @@ from server.rosbridge_server.shape import (
     TIMES,
     Field,
     fields,
+    items,
     shown,
+    stamp,
+    time_of,
     zero,
 )
-from server.rosbridge_server.values import items, stamp, time_of
 
 _PYTHON = {"bool": ("bool",), "int": tuple(INTEGERS), "float": tuple(FLOATS), "str": ("string",)}
 

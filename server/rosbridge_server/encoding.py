@@ -1,23 +1,126 @@
-"""One outgoing message, encoded at most once in each encoding, however many clients want it."""
+"""One outgoing message, encoded at most once in each encoding, however many clients want it.
+
+The encodings are JSON, its text as a picture or in fragments, CBOR, and the bytes that ROS sends between nodes.
+
+"""
 
 from __future__ import annotations
 
-from typing import Literal
+import base64
+import math
+import struct
+import zlib
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any, Literal
 
 import cbor2
+import numpy as np
 import orjson
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
 
-from server.judge.message import Json
-from server.rosbridge.message_bytes import cbor_bytes, json_bytes
-from server.rosbridge_server.raw import raw_bytes
-from server.rosbridge_server.shape import Lost
-from server.rosbridge_server.text import fragments, png
+from server.judge.message import Json, RosVersion
+from server.rosbridge.codec import cbor_bytes, json_bytes
+from server.rosbridge_server.shape import (
+    FLOATS,
+    INTEGERS,
+    PLACEHOLDER,
+    TIMES,
+    Field,
+    Lost,
+    bytes_of,
+    fields,
+    items,
+    primitive,
+    stamp,
+    time_of,
+)
 from server.rosbridge_server.types import RosContext
-from server.rosbridge_server.values import stamp
+
+MOST_FRAGMENTS = 10_000  # of one message: shorter ones than that takes are not sent
 
 Encoding = Literal["json", "cbor", "cbor-raw", "png"]
 
 _TEXT, _BINARY = 0x1, 0x2
+
+
+def raw_bytes(type: str, definitions: dict[str, Any], version: RosVersion, message: Any) -> bytes:
+    """The message of a type that is spelled as rosbags does. Raises Lost."""
+    store = _store(version, tuple(sorted(definitions)), type)
+    missing = {name: definition for name, definition in definitions.items() if name not in store.fielddefs}
+    try:
+        if missing:
+            store.register(missing)
+        made = _instance(store, type, definitions, version, message)
+        data = store.serialize_ros1(made, type) if version == 1 else store.serialize_cdr(made, type)
+    except Exception as error:  # the typestore has many ways to refuse
+        raise Lost(str(error)) from None
+    return bytes(data) if version == 1 else bytes(data) + bytes(-len(data) % 4)  # as DDS sends it
+
+
+@lru_cache(maxsize=32)
+def _store(version: RosVersion, names: tuple[str, ...], type: str) -> Typestore:
+    return get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
+
+
+def _instance(store: Typestore, type: str, definitions: dict[str, Any], version: RosVersion, message: Any) -> Any:
+    given: Mapping[str, Any] = message if isinstance(message, Mapping) else {}
+    made = {}
+    for field in fields(type, definitions):
+        made[field.name] = _value(store, field, definitions, version, given.get(field.name))
+    if not made and any(name == PLACEHOLDER for name, _ in definitions[type][1]):
+        made[PLACEHOLDER] = 0
+    return store.types[type](**made)
+
+
+def _value(store: Typestore, field: Field, definitions: dict[str, Any], version: RosVersion, value: Any) -> Any:
+    if not field.array:
+        return _item(store, field, definitions, version, value)
+    if field.is_bytes:
+        return np.frombuffer(bytes_of(field, value), dtype=np.uint8)
+    code = FLOATS.get(field.type) or INTEGERS.get(field.type) or ("?" if field.type == "bool" else None)
+    if code is not None and isinstance(value, np.ndarray):
+        with np.errstate(over="ignore"):
+            return np.asarray(value, dtype=code)
+    values = items(field, value)
+    if code is not None:
+        return np.array(values, dtype=code)
+    return [_item(store, field.item(), definitions, version, item) for item in values]
+
+
+def _item(store: Typestore, field: Field, definitions: dict[str, Any], version: RosVersion, value: Any) -> Any:
+    if field.type in TIMES:
+        return store.types[field.type](**time_of(value, 2))
+    if field.is_message:
+        return _instance(store, field.type, definitions, version, value)
+    return primitive(field, value)
+
+
+def png(data: bytes) -> str:
+    """A JSON text as pixels of a nearly square RGB picture, padded with line ends, in base64."""
+    width = math.floor(math.sqrt(len(data) / 3.0))
+    height = math.ceil((len(data) / 3.0) / width)
+    data = data.ljust(width * height * 3, b"\n")
+    rows = b"".join(b"\0" + data[at : at + width * 3] for at in range(0, len(data), width * 3))
+    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    picture = b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", head) + _chunk(b"IDAT", zlib.compress(rows)) + _chunk(b"IEND", b"")
+    return base64.b64encode(picture).decode("ascii")
+
+
+def fragments(text: str, size: int, id: object) -> list[dict[str, Any]]:
+    """The pieces of a text that is longer than `size`. `total` is a fraction, as rosbridge divides."""
+    size = max(size, math.ceil(len(text) / MOST_FRAGMENTS))
+    total = (len(text) - 1) / size + 1
+    starts = range(0, len(text), size)
+    return [
+        {"op": "fragment", "id": id, "data": text[at : at + size], "num": number, "total": total}
+        for number, at in enumerate(starts)
+    ]
+
+
+def _chunk(name: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
 
 
 def frame(opcode: int, payload: bytes) -> bytes:

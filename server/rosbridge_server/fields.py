@@ -1,4 +1,4 @@
-"""Reads the fields of a client's operation; errors are one sentence."""
+"""Reads a client's operation: its fields, and fragments put together, within bounds; errors are one sentence."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from typing import Any
 import orjson
 
 LONGEST_ID = 1_000  # letters; an id is echoed in every answer, and the longest real ones have 60
+
+MOST_MESSAGES = 8  # incomplete, for one client
+MOST_FRAGMENTS = 10_000
 
 
 class Refused(Exception):
@@ -89,3 +92,44 @@ def _kind(value: Any) -> str:
             return "a list"
         case _:
             return "an object"
+
+
+class Fragments:
+    """The unfinished messages of one client. The oldest gives way when a ninth begins."""
+
+    def __init__(self, *, limit_bytes: int) -> None:
+        self._limit_bytes = limit_bytes
+        self._unfinished: dict[object, dict[int, str]] = {}
+        self._totals: dict[object, int] = {}
+        self._sizes: dict[object, int] = {}
+
+    def add(self, operation: dict[str, Any]) -> bytes | None:
+        """The whole message when this fragment was its last one, else None. Raises Refused."""
+        key = id_of(operation)
+        if key is None:
+            raise Refused("a fragment needs an id")
+        data = text(operation, "data")
+        number, total = whole_number(operation, "num"), whole_number(operation, "total")
+        if not 1 <= total <= MOST_FRAGMENTS or number >= total:
+            raise Refused(f"fragment {number} of {total} is invalid")
+        if key not in self._unfinished:
+            while len(self._unfinished) >= MOST_MESSAGES:
+                self._forget(next(iter(self._unfinished)))
+            self._unfinished[key], self._totals[key], self._sizes[key] = {}, total, 0
+        parts = self._unfinished[key]
+        if total != self._totals[key] or number in parts:
+            self._forget(key)
+            raise Refused(f"fragment {number} of {total} does not fit those before it")
+        parts[number] = data
+        self._sizes[key] += len(data)
+        if sum(self._sizes.values()) > self._limit_bytes:
+            self._forget(key)
+            raise Refused(f"fragments of more than {self._limit_bytes} bytes are not kept")
+        if len(parts) < total:
+            return None
+        self._forget(key)
+        return "".join(parts[at] for at in range(total)).encode("utf-8", "replace")
+
+    def _forget(self, key: object) -> None:
+        for table in (self._unfinished, self._totals, self._sizes):
+            table.pop(key, None)

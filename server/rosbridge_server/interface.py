@@ -6,9 +6,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 from server.judge.message import Json
-from server.rosbridge_server.graph import Graph
+from server.rosbridge_server.graph import Graph, Handler, Services
 from server.rosbridge_server.outbox import Counters
-from server.rosbridge_server.services import Handler, Services
 from server.rosbridge_server.types import RosContext
 
 

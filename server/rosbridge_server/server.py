@@ -11,11 +11,10 @@ from server.judge.ros_names import canonical_name, canonical_type
 from server.rosbridge_server.client import Client
 from server.rosbridge_server.connection import Connection
 from server.rosbridge_server.encoding import Outgoing
-from server.rosbridge_server.graph import SOURCE, Graph
+from server.rosbridge_server.graph import SOURCE, Graph, Handler, Service, ServiceFailed, Services
 from server.rosbridge_server.listener import CannotListen, Listener
 from server.rosbridge_server.outbox import Counters
 from server.rosbridge_server.rosapi import add_rosapi
-from server.rosbridge_server.services import Handler, Service, ServiceFailed, Services
 from server.rosbridge_server.types import MessageTypes
 
 __all__ = ["CannotListen", "RosBridge", "ServiceFailed"]

@@ -1,4 +1,4 @@
-"""Describes message types as the message_details service of rosapi does."""
+"""Loads message types by name, with the errors of rosbridge's loader, and describes them as message_details does."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from server.judge.message import Json, RosVersion
+from server.judge.ros_names import BadName, canonical_type
+from server.rosbridge_server.interface import TypeSource
 from server.rosbridge_server.shape import DEEPEST, DEFAULTS, FLOATS, INTEGERS, TIMES, Field, fields, shown, zero
 
 TIME_TYPEDEF = {
@@ -23,6 +25,31 @@ _CODES = {
     "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
 _FIRST_ADDRESS = 0x7F0000000000
+
+
+class Malformed(Exception):
+    """No name of a type."""
+
+
+class Unknown(Exception):
+    """A package or a type that is not installed."""
+
+
+def load(bridge: TypeSource, name: str) -> str:
+    """The type as the graph has it. Raises Malformed and Unknown, with the texts of rosbridge."""
+    try:
+        type = canonical_type(name, bridge.ros_version)
+    except BadName:
+        raise Malformed(f"{name} is not a valid type string") from None
+    if bridge.types.definitions(type) is None and type not in bridge.advertised_types():
+        package, kind = name.partition("/")[0], name.rpartition("/")[2]
+        if not bridge.types.has_package(package):
+            raise Unknown(f"Unable to load the manifest for package {package}. Caused by: {package}")
+        raise Unknown(
+            f"Unable to import msg class {kind} from package {package}. "
+            f"Caused by module '{package}.msg' has no attribute '{kind}'"
+        )
+    return type
 
 
 def describe(type: str, definitions: dict[str, Any], version: RosVersion) -> list[Json]:

@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 
 from server.judge.message import Json, Message, RosVersion
-from server.simulator import place
-from server.simulator.beams import DENSE_HZ, INTERLACED, SICK_HZ, Beams, dense
-from server.simulator.driver import Driver, Order
-from server.simulator.lap import lap
-from server.simulator.laser import Laser, nearest
+from server.simulator.driver import Driver, Order, SafetyDriver
+from server.simulator.lap import ALT_M, lap, lat_lon_deg, utm12_m
+from server.simulator.laser import DENSE_HZ, INTERLACED, SICK_HZ, Beams, Laser, Scenery, dense, nearest
 from server.simulator.messages import (
     ACCELERATOR,
     ANGLE,
@@ -28,15 +26,20 @@ from server.simulator.messages import (
     Published,
     Writer,
 )
-from server.simulator.running import Scenarios
-from server.simulator.safety_driver import SafetyDriver
+from server.simulator.running import Scenarios, Stage
 from server.simulator.scenario import BridgeFault, Scenario
 from server.simulator.scenarios import Planned
-from server.simulator.scenery import Scenery
-from server.simulator.sensors import GpsError, effort_percent, steering_percent, wheel_speed_mps
-from server.simulator.stack import Stack
-from server.simulator.stage import Stage
-from server.simulator.vehicle import Motion, MotionCommand, drive, pedals
+from server.simulator.vehicle import (
+    GpsError,
+    Motion,
+    MotionCommand,
+    Stack,
+    drive,
+    effort_percent,
+    pedals,
+    steering_percent,
+    wheel_speed_mps,
+)
 
 START_S = 1_790_000_000.0  # seconds since 1970, when nobody says otherwise
 START_STATION_M = 300.0  # half a minute before the bends and the stop
@@ -166,7 +169,7 @@ class SimulatedCar:
 
     def state(self) -> dict[str, Any]:
         """The scenarios and the truth about the car, which its sensors only come near."""
-        lat_deg, lon_deg = place.lat_lon_deg(self.motion.x_m, self.motion.y_m)
+        lat_deg, lon_deg = lat_lon_deg(self.motion.x_m, self.motion.y_m)
         return {
             "elapsed_s": round(self._elapsed_s, 3),
             "truth": {
@@ -292,9 +295,9 @@ class SimulatedCar:
         then = now.after(-GPS_LATENCY_S)
         at_s, stamp_s = self.now_s, self.now_s - GPS_LATENCY_S
         east_m, north_m, up_m = self._gps_error.next_m(1 / GPS_HZ)
-        lat_deg, lon_deg = place.lat_lon_deg(then.x_m + east_m, then.y_m + north_m)
-        alt_m = place.ALT_M + up_m
-        utm_x_m, utm_y_m = place.utm12_m(lat_deg, lon_deg)
+        lat_deg, lon_deg = lat_lon_deg(then.x_m + east_m, then.y_m + north_m)
+        alt_m = ALT_M + up_m
+        utm_x_m, utm_y_m = utm12_m(lat_deg, lon_deg)
         velocity = (then.speed_mps * math.cos(then.yaw_rad), then.speed_mps * math.sin(then.yaw_rad), 0.0)
         return [
             self._writer.fix(at_s, stamp_s, lat_deg, lon_deg, alt_m),

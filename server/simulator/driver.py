@@ -1,19 +1,20 @@
-"""Whoever drives the simulated car round its lap: where to steer, how fast to go, when to stop."""
+"""Whoever drives the simulated car: the driver round its lap, and the person at the wheel who brakes and takes over."""
 
 from __future__ import annotations
 
 import enum
 import math
+from collections import deque
 from collections.abc import Set
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from server.simulator.beams import fan
 from server.simulator.lap import LENGTH_M, STEP_M, STOP_M, lap
-from server.simulator.scenery import Scenery
+from server.simulator.laser import Scenery, fan
 from server.simulator.vehicle import LASER_AHEAD_M, WHEELBASE_M, Motion, MotionCommand
 
 Floats = npt.NDArray[np.float64]
@@ -34,6 +35,13 @@ SPARE_M = 1.5
 
 CONE_RAD = 0.12  # the distance estimator looks ±0.1 rad ahead
 CORRIDOR_M = 1.6  # the corridor is ±1.2 m wide
+
+# Of the person at the wheel.
+PEDAL_PERCENT = 46.0
+HAND_BRAKING_MPS2 = 2.0
+CREEP_MPS = 2.2  # by hand the car goes on at a slow pace
+SWITCH_S = 0.2  # the by-wire unit turns to manual so long after the pedal
+KEPT_TRUTHS = 20
 
 
 class Order(enum.StrEnum):
@@ -219,3 +227,60 @@ class Driver:
 def _approach_mps(left_m: float, braking_mps2: float) -> float:
     """The speed from which braking comes to a stop in the way that is left."""
     return math.sqrt(2 * braking_mps2 * left_m) if left_m > 0.02 else 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """An intervention as it truly was."""
+
+    at_s: float  # of the drive
+    kind_of: Literal["to_manual", "brake"]
+    speed_mps: float
+
+    def as_json(self, zero_s: float) -> dict[str, Any]:
+        """`zero_s`: the car's clock at the beginning of the drive."""
+        return {
+            "at_s": round(self.at_s, 3),
+            "at_ms": round((zero_s + self.at_s) * 1000),
+            "kind_of": self.kind_of,
+            "speed_mps": round(self.speed_mps, 2),
+        }
+
+
+class SafetyDriver:
+    """The person at the wheel: brakes and takes over when a scenario says so.
+
+    `step` first, then `mode`, `pedal_percent` and `hand` are those of this moment.
+    """
+
+    def __init__(self) -> None:
+        self.mode: Literal["autonomous", "manual"] = "autonomous"
+        self.pedal_percent = 0.0
+        self.interventions: deque[Truth] = deque(maxlen=KEPT_TRUTHS)
+        self._acts_since_s: float | None = None
+        self._target_mps = 0.0
+        self._now_s = 0.0
+
+    def step(self, orders: Set[Order], now_s: float, motion: Motion) -> None:
+        """Time has passed."""
+        passed_s, self._now_s = now_s - self._now_s, now_s
+        takes_over = Order.TAKE_OVER in orders
+        if not takes_over and Order.BRAKE not in orders:
+            self._acts_since_s, self.pedal_percent, self.mode = None, 0.0, "autonomous"
+            return
+        if self._acts_since_s is None:
+            self._acts_since_s, self._target_mps = now_s, motion.speed_mps
+            if not takes_over:
+                self.interventions.append(Truth(at_s=now_s, kind_of="brake", speed_mps=motion.speed_mps))
+        lowest_mps = CREEP_MPS if takes_over else 0.0
+        self._target_mps = max(lowest_mps, self._target_mps - HAND_BRAKING_MPS2 * passed_s)
+        self.pedal_percent = PEDAL_PERCENT if motion.speed_mps > lowest_mps + 0.3 or not takes_over else 0.0
+        if takes_over and self.mode == "autonomous" and now_s - self._acts_since_s >= SWITCH_S - 1e-6:
+            self.mode = "manual"
+            self.interventions.append(Truth(at_s=now_s, kind_of="to_manual", speed_mps=motion.speed_mps))
+
+    def hand(self, tyre_rad: float) -> MotionCommand | None:
+        """What wheel and pedal are made to do; None: they are let alone. `tyre_rad`: as the way goes."""
+        if self._acts_since_s is None:
+            return None
+        return MotionCommand(speed_mps=self._target_mps, tyre_rad=tyre_rad)

@@ -14,7 +14,7 @@ import numpy as np
 
 from server.judge.message import Message
 from server.simulator.fields import EFFORT_PATHS, SPEED_PATHS, changed, number_at, with_fields, with_number
-from server.simulator.place import metres_per_degree
+from server.simulator.lap import metres_per_degree
 
 
 class Effect:

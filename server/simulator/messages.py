@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from server.judge.message import Json, Message, RosVersion
-from server.simulator.beams import Beams
-from server.simulator.laser import RANGE_MAX_M
+from server.simulator.laser import RANGE_MAX_M, Beams
 
 Vector = tuple[float, float, float]
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from server.judge.message import Message
+from server.simulator import faults
 from server.simulator.driver import Order
 from server.simulator.effects import (
     BlindLaser,
@@ -21,13 +22,9 @@ from server.simulator.effects import (
     SlowRate,
     Speeding,
 )
-from server.simulator.mode_faults import FlickeringMode
-from server.simulator.other_clock import OtherClock
 from server.simulator.scenario import Scenario
-from server.simulator.sensor_faults import FrozenPosition, FrozenScan, NearObject, NoFix, TruncatedScan
 
 LONGEST_S = 3600.0
-
 
 _SCENARIOS = (
     Scenario(
@@ -58,7 +55,7 @@ _SCENARIOS = (
         sentence="The distance estimator reports an object 3.5 m ahead; the laser sees none.",
         duration_s=5.0,
         alarm="nearest object",
-        effect=NearObject,
+        effect=faults.NearObject,
     ),
     Scenario(
         name="command-ignored",
@@ -123,7 +120,7 @@ _SCENARIOS = (
         sentence="The receiver reports no fix; its coordinates continue.",
         duration_s=10.0,
         alarm="GPS no fix",
-        effect=NoFix,
+        effect=faults.NoFix,
     ),
     Scenario(
         name="silent-scan",
@@ -154,7 +151,7 @@ _SCENARIOS = (
         sentence="Each scan lacks ten of the beams that its angles declare.",
         duration_s=6.0,
         alarm="scan inconsistent",
-        effect=TruncatedScan,
+        effect=faults.TruncatedScan,
     ),
     Scenario(
         name="frozen-position",
@@ -162,7 +159,7 @@ _SCENARIOS = (
         duration_s=10.0,
         alarm="signal frozen: position",
         consequences=("phone and car disagree", "GPS drift at standstill"),  # it ends with a leap
-        effect=FrozenPosition,
+        effect=faults.FrozenPosition,
     ),
     Scenario(
         name="frozen-scan",
@@ -170,7 +167,7 @@ _SCENARIOS = (
         duration_s=8.0,
         alarm="signal frozen: scan",
         consequences=("obstacle in corridor",),
-        effect=FrozenScan,
+        effect=faults.FrozenScan,
         order=Order.STEADY,  # faster, and the way seen free would be too short
     ),
     Scenario(
@@ -192,14 +189,14 @@ _SCENARIOS = (
         sentence="The car's clock is set back by half a minute, then corrected after some seconds.",
         duration_s=5.0,
         alarm="clock jump",
-        effect=lambda: OtherClock(step_s=-30.0),
+        effect=lambda: faults.OtherClock(step_s=-30.0),
     ),
     Scenario(
         name="clock-slow",
         sentence="The car's clock loses a second every four, up to 4 s, as if messages came ever later.",
         duration_s=20.0,
         alarm="stamp offset",
-        effect=lambda: OtherClock(pace=-0.25, most_s=4.0),
+        effect=lambda: faults.OtherClock(pace=-0.25, most_s=4.0),
     ),
     Scenario(
         name="diagnostics-error",
@@ -266,7 +263,7 @@ _SCENARIOS = (
         sentence="The mode topic flickers between autonomous and manual; the car drives itself on.",
         duration_s=8.0,
         alarm="",
-        effect=FlickeringMode,
+        effect=faults.FlickeringMode,
     ),
 )
 

@@ -10,9 +10,9 @@ from typing import Any
 
 from monitor.alarm import Alarm, Refused
 from monitor.checks.slow_down import SlowDownLimits
-from monitor.slowing import SlowingFacts
+from monitor.shell_facts import SlowingFacts
 from monitor.state import Snapshot
-from server.protocol import slowing_commands
+from server.protocol import drive_commands
 from server.protocol.alarm_state import Note
 from server.protocol.slow_down_state import SlowDownState
 from server.rosbridge.live_source import CommandChannel
@@ -20,12 +20,9 @@ from server.slowdown.command_target import CommandTarget
 from server.slowdown.countdown import Countdown
 from server.slowdown.frame import facts, slow_down_frame
 from server.slowdown.guard_client import GuardClient
-from server.slowdown.measured_car import MeasuredCar
-from server.slowdown.note import never_raising, recording_safely
 from server.slowdown.order import BY_HAND, DESERTED_S, SlowDown
-from server.slowdown.order_log import OrderLog, commanded
-from server.slowdown.response import Response
-from server.slowdown.sender import Sender
+from server.slowdown.order_log import OrderLog, Response, commanded, never_raising, recording_safely
+from server.slowdown.sender import MeasuredCar, Sender
 
 log = logging.getLogger("catgraph.slowing")
 
@@ -197,29 +194,29 @@ class SlowDownController:
 
     # -- orders ------------------------------------------------------------------------------------------------------
 
-    def obey(self, command: slowing_commands.SlowingCommand, *, by: str) -> None:
+    def obey(self, command: drive_commands.SlowingCommand, *, by: str) -> None:
         """Execute an operator's command. Raises Refused; the refusal of a slow-down is logged."""
         match command:
-            case slowing_commands.Arm():
+            case drive_commands.Arm():
                 if self._life.arm(self.sender.target, by):
                     self.sender.announce()
                     text = (
                         f"Slow-down armed on {self.sender.target.topic}.{_competitors_text(self.competing_publishers)}"
                     )
                     self._note("armed", text, by=by)
-            case slowing_commands.Disarm():
+            case drive_commands.Disarm():
                 if self._life.disarm():
                     self._countdown.stop()
                     self.sender.publisher.unadvertise_all()
                     self._note("disarmed", "Slow-down disarmed.", by=by)
-            case slowing_commands.Decelerate():
+            case drive_commands.Decelerate():
                 self._order_by_hand(command, by)
-            case slowing_commands.Release():
+            case drive_commands.Release():
                 self._release(command.number, by)
-            case slowing_commands.Veto():
+            case drive_commands.Veto():
                 self._countdown.veto(command.trigger, by=by)
 
-    def _order_by_hand(self, command: slowing_commands.Decelerate, by: str) -> None:
+    def _order_by_hand(self, command: drive_commands.Decelerate, by: str) -> None:
         now_s = self._now()
         late_s = command.late_s(self._wall_ms())
         try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from monitor.checks.slow_down import SlowDownLimits
-from monitor.slowing import SlowingFacts
+from monitor.shell_facts import SlowingFacts
 from server.protocol import serialize
 from server.protocol.slow_down_state import SlowDownOrder, SlowDownSummary
 from server.slowdown.command_target import CommandTarget

@@ -6,7 +6,7 @@ import json
 from typing import Any, get_args
 
 from server.protocol.slow_down_state import GuardPhase, GuardState
-from server.rosbridge.link_errors import LinkDown
+from server.rosbridge.live_source import LinkDown
 from server.rosbridge.outgoing import NotAllowed
 from server.slowdown.command_target import GUARD_HEARTBEAT, GUARD_RELEASE, GUARD_STATE
 from server.slowdown.publisher import CommandPublisher

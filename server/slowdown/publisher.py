@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from server.rosbridge.link_errors import LinkDown
-from server.rosbridge.live_source import CommandChannel
+from server.rosbridge.live_source import CommandChannel, LinkDown
 from server.rosbridge.outgoing import NotAllowed
 
 ADVERTISE_ID = "catgraph:slow-down"

@@ -14,15 +14,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from server.rosbridge.link_errors import LinkDown
-from server.rosbridge.live_source import CommandChannel
+from monitor.state import Reading, Snapshot
+from server.rosbridge.live_source import CommandChannel, LinkDown
 from server.rosbridge.outgoing import NotAllowed
-from server.slowdown.command_target import CommandTarget
-from server.slowdown.measured_car import MeasuredCar
+from server.slowdown.command_target import CommandTarget, twist_message
 from server.slowdown.order import Car, SlowDown
 from server.slowdown.order_log import OrderLog, commanded
 from server.slowdown.publisher import CommandPublisher
-from server.slowdown.twist import message
 
 log = logging.getLogger("catgraph.slowing")
 
@@ -32,6 +30,52 @@ DOUBT_S = 0.3
 FIRST_SPEED_S = 0.5
 MOST_UNANSWERED = 2  # pings; where the bridge freezes, no more commands arrive late
 STALL_S = 0.1  # a turn so late was our own fault: what the bridge sent meanwhile is still unread
+
+
+class MeasuredCar:
+    """Speed and steering of the car as measured now, for the next command.
+
+    `snapshot`: what is known of the car now.
+    """
+
+    def __init__(self, snapshot: Callable[[], Snapshot]) -> None:
+        self._snapshot = snapshot
+        self.opened_s = 0.0  # the newest opening of the link; a reading from before it does not count
+        self.is_steering_known = False  # whether an angle of the tyres follows from the steering signal
+        self.tyre_rad: float | None = None  # the last known angle, in rad, positive to the left
+
+    def now(self) -> Car:
+        """The measured motion; unknown after an error, and an order continues without it."""
+        try:
+            return self._measured()
+        except Exception:
+            log.exception("speed and steering of the car cannot be read")
+            return Car(speed_mps=None, tyre_rad=None)
+
+    def update(self) -> bool:
+        """Keeps the tyre angle; whether it is measured now."""
+        measured_rad = self.now().tyre_rad
+        if measured_rad is not None:
+            self.tyre_rad = measured_rad
+        return measured_rad is not None
+
+    def _measured(self) -> Car:
+        snapshot = self._snapshot()
+        speed, steering, ordered = snapshot.get("speed"), snapshot.get("steering"), snapshot.get("command")
+        now_s = snapshot.now_s
+        tyre_rad = None
+        if not self.is_steering_known:
+            tyre_rad = None
+        elif steering is not None and self._is_of_now(steering, now_s):
+            tyre_rad = steering.value.tyre_rad
+        elif ordered is not None and self._is_of_now(ordered, now_s):
+            tyre_rad = ordered.value.tyre_angle_rad
+        is_known = speed is not None and self._is_of_now(speed, now_s)
+        return Car(speed_mps=speed.value.speed_mps if speed is not None and is_known else None, tyre_rad=tyre_rad)
+
+    def _is_of_now(self, reading: Reading[Any], now_s: float) -> bool:
+        """Fresh, and not from before the link was lost: meanwhile the car may have done anything."""
+        return reading.is_fresh(now_s) and reading.received_s >= self.opened_s
 
 
 class Sender:
@@ -179,7 +223,7 @@ class Sender:
         if command is None:
             self._cut("the tyre angle that is to be held is not known")
             return
-        twist = message(
+        twist = twist_message(
             target.kind,
             command.speed_mps,
             command.tyre_rad,

@@ -14,7 +14,7 @@ from pathlib import Path
 import orjson
 
 from server.storage import durable_file
-from server.storage.set_aside import set_aside
+from server.storage.durable_file import set_aside
 from server.version import catgraph_version
 
 log = logging.getLogger("catgraph.storage")

@@ -1,4 +1,7 @@
-"""Writes a small file whole or not at all: after a loss of power it holds either the old content or the new."""
+"""Writes a small file whole or not at all, or sets it aside under a free name.
+
+After a loss of power a file holds either the old content or the new, and what cannot be read is never overwritten.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,8 @@ import secrets
 from pathlib import Path
 
 _LONGEST_NAME = 100  # bytes of the name that the new file's own name repeats: 255 are possible
+
+_MOST = 1000
 
 
 def write(path: Path, content: bytes, *, mode: int | None = None) -> None:
@@ -69,3 +74,20 @@ def _write_new(path: Path, content: bytes, mode: int | None) -> Path:
 def _remove(new: Path) -> None:
     with contextlib.suppress(OSError):
         new.unlink()
+
+
+def free_name(path: Path, word: str = "unusable") -> Path:
+    """`settings.toml` → `settings.unusable.toml`, then `settings.unusable-2.toml`, the first that does not exist."""
+    first = path.with_name(f"{path.stem}.{word}{path.suffix}")
+    others = (path.with_name(f"{path.stem}.{word}-{number}{path.suffix}") for number in range(2, _MOST))
+    for name in (first, *others):
+        if not os.path.lexists(name):
+            return name
+    raise FileExistsError(17, f"{_MOST} files beside {path.name} are set aside already")
+
+
+def set_aside(path: Path, word: str = "unusable") -> Path:
+    """Renames the file; its new name. Raises OSError: the file is where it was then."""
+    aside = free_name(path, word)
+    os.rename(path, aside)
+    return aside

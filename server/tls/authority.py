@@ -1,7 +1,7 @@
 """The authority of one server: made once, kept in the data folder, trusted by the phones of the crew.
 
 Key and certificate are one file, so that there is never one without the other. It is P-256, which every phone knows,
-and may sign for private names only; see ranges.py.
+and may sign for private names only; see names.py.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
 from server.storage import durable_file
-from server.tls.ranges import DOMAINS, RANGES
+from server.tls.names import DOMAINS, RANGES
 
 log = logging.getLogger("catgraph.tls")
 

@@ -1,20 +1,55 @@
-"""What this machine is called by who wants its page: its addresses, its name in mDNS, localhost, given names."""
+"""What this machine is called by who wants its page: its addresses, its name in mDNS, localhost, given names.
+
+Our own authority may sign for private names only: a stolen key of a trusted authority could impersonate any site. The
+name constraints of ours (RFC 5280 4.2.1.10) limit it to these names, and browsers enforce them.
+
+Addresses of a container's host machine cannot be looked up inside; they are learned from requests. A request to the
+plain page has the typed address in `Host`. Only private addresses are accepted; a false one does no harm, because the
+certificate serves this server only.
+"""
 
 from __future__ import annotations
 
 import ipaddress
 import re
 import socket
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import ifaddr
 
-from server.tls.ranges import may_vouch_for_address, may_vouch_for_name
+RANGES = tuple(
+    ipaddress.ip_network(text)
+    for text in (
+        "10.0.0.0/8",  # RFC 1918, with the two below
+        "172.16.0.0/12",
+        "192.168.0.0/16",
+        "169.254.0.0/16",  # link-local: a cable without DHCP, RFC 3927
+        "127.0.0.0/8",
+        "100.64.0.0/10",  # between a provider's router and the world, and every overlay network, RFC 6598
+        "fc00::/7",  # unique local, RFC 4193
+        "fe80::/10",  # link-local
+        "::1/128",
+    )
+)
+DOMAINS = ("local", "localhost")  # each with all beneath it: mDNS, RFC 6762, and this machine, RFC 6761
 
 IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 MAX_NAMES = 60  # a certificate is sent with every handshake; a machine with more addresses has them from containers
 _CONTAINERS = re.compile(r"docker|veth|br-|virbr|lxc|cni|podman", re.IGNORECASE)
+
+MOST = 12  # then the one with the oldest use is dropped
+EVERY_S = 1.0  # each new one is a new certificate
+
+
+def may_vouch_for_address(ip: ipaddress.IPv4Address | ipaddress.IPv6Address) -> bool:
+    """Whether an address is in one of the ranges."""
+    return any(ip.version == network.version and ip in network for network in RANGES)
+
+
+def may_vouch_for_name(name: str) -> bool:
+    """Whether a lower-case name is one of the domains or a subdomain."""
+    return name.rpartition(".")[2] in DOMAINS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,3 +113,34 @@ def label_of(host: str) -> str:
     (RFC 1123, at most 63); empty where nothing is left or it is localhost."""
     label = re.sub(r"[^a-z0-9-]+", "-", host.partition(".")[0].lower()).strip("-")[:63].strip("-")
     return "" if label == "localhost" else label
+
+
+class HostAddresses:
+    """Addresses of a container's host machine, learned from requests.
+
+    The addresses learnt, the newest first.
+    """
+
+    def __init__(self, known: Iterable[IpAddress], *, now: Callable[[], float]) -> None:
+        """`known`: those the certificate of before was for."""
+        self._addresses = [ip for ip in known if not ip.is_loopback][:MOST]
+        self._now = now
+        self._learnt_s: float | None = None
+
+    @property
+    def addresses(self) -> tuple[str, ...]:
+        return tuple(map(str, self._addresses))
+
+    def learn(self, host: str | None) -> bool:
+        """Whether `host`, as somebody typed it, was new."""
+        try:
+            ip = ipaddress.ip_address(host or "")
+        except ValueError:
+            return False
+        if ip in self._addresses or ip.is_loopback or not may_vouch_for_address(ip):
+            return False
+        if self._learnt_s is not None and self._now() - self._learnt_s < EVERY_S:
+            return False
+        self._learnt_s = self._now()
+        self._addresses = [ip, *self._addresses][:MOST]
+        return True

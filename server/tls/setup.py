@@ -1,12 +1,18 @@
 """The plain HTTP page with instructions for trusting this server. It serves our authority's certificate only.
 
 An attacker on the network can change this page. It therefore has no secret, links only to itself, and asks the user to
-compare the fingerprint with the one on the server's terminal.
+compare the fingerprint with the one on the server's terminal. An iPhone, an iPad and a Mac take the authority as a
+configuration profile.
+
+The page asks the server whether HTTPS works. It has another origin, which the server's routes refuse, so the answer is
+outside the application, because it has no data of the car. A browser that does not trust the certificate gets none.
 """
 
 from __future__ import annotations
 
 import ipaddress
+import plistlib
+import uuid
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -17,15 +23,67 @@ from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 from starlette.routing import Route
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from server.system.page_files import static_dir, templates_dir
 from server.tls.authority import Authority
-from server.tls.profile import MEDIA_TYPE, mobileconfig
 from server.tls.steps import PLATFORMS, Platform, platform_of
+
+MEDIA_TYPE = "application/x-apple-aspen-config"
+_OUR_PROFILES = uuid.UUID("5a1d3c5e-60a5-4f0c-9a44-4a0f9fb1f7a5")  # under it the ids of all our profiles are made
+
+PROBE_PATH = "/trusted"
+_PROBE_HEADERS = [(b"cross-origin-resource-policy", b"cross-origin"), (b"cache-control", b"no-store")]
 
 CERTIFICATE = "application/x-x509-ca-cert"
 FONTS = ("catgraph-numerals-500.woff2", "catgraph-numerals-700.woff2")
+
+
+def mobileconfig(authority: Authority) -> bytes:
+    """Our authority as a configuration profile.
+
+    The profile, unsigned, because the signer would not be trusted yet. An authority always has the same ids, so that
+    a second installation replaces the first.
+    """
+    id = authority.fingerprint.replace(":", "").lower()
+    root = {
+        "PayloadType": "com.apple.security.root",
+        "PayloadVersion": 1,
+        "PayloadIdentifier": f"catgraph.{id[:16]}.authority",
+        "PayloadUUID": str(uuid.uuid5(_OUR_PROFILES, f"{id} authority")).upper(),
+        "PayloadDisplayName": authority.name,
+        "PayloadDescription": "Lets this device trust the page of one catgraph server. Private addresses only.",
+        "PayloadCertificateFileName": "catgraph-ca.crt",
+        "PayloadContent": authority.der,
+    }
+    profile = {
+        "PayloadType": "Configuration",
+        "PayloadVersion": 1,
+        "PayloadIdentifier": f"catgraph.{id[:16]}",
+        "PayloadUUID": str(uuid.uuid5(_OUR_PROFILES, f"{id} profile")).upper(),
+        "PayloadDisplayName": authority.name,
+        "PayloadDescription": "Then switch it on in Settings, General, About, Certificate Trust Settings.",
+        "PayloadRemovalDisallowed": False,
+        "PayloadContent": [root],
+    }
+    return plistlib.dumps(profile)
+
+
+class Probe:
+    """Answers the instruction page that HTTPS works.
+
+    Around the whole application.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http" and scope["path"] == PROBE_PATH and scope["method"] in ("GET", "HEAD"):
+            await send({"type": "http.response.start", "status": 204, "headers": _PROBE_HEADERS})
+            await send({"type": "http.response.body"})
+            return
+        await self._app(scope, receive, send)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,7 @@ from monitor.runner import Refused
 from server.control.attention import Attention, ItemAct, Need
 from server.control.authorization import Authorization, Caller
 from server.control.lease import Operator
-from server.protocol import item_commands
+from server.protocol import handover_commands
 from server.protocol.alarm_state import Note
 from server.protocol.cars_state import AttentionItem, ItemHolder, ItemOffer, PagePerson
 from server.vehicle.judgement import Judgement
@@ -44,20 +44,20 @@ class CarAttention:
         if caller.page is not None:
             self._attention.hear(_operator(caller), now_s)
 
-    def obey(self, command: item_commands.ItemCommand, caller: Caller, now_s: float) -> None:
+    def obey(self, command: handover_commands.ItemCommand, caller: Caller, now_s: float) -> None:
         """Raises Refused."""
         self.tick(now_s)
         by, attention = _operator(caller), self._attention
         match command:
-            case item_commands.TakeItem():
+            case handover_commands.TakeItem():
                 act = attention.take(by, now_s, over=command.over)
-            case item_commands.ReleaseItem():
+            case handover_commands.ReleaseItem():
                 act = attention.release(by)
-            case item_commands.OfferItem():
+            case handover_commands.OfferItem():
                 act = attention.offer(by, self._person(command.to, now_s), now_s)
-            case item_commands.AnswerItem():
+            case handover_commands.AnswerItem():
                 act = attention.answer(by, now_s, accept=command.accept)
-            case item_commands.WithdrawItem():
+            case handover_commands.WithdrawItem():
                 act = attention.withdraw(by)
             case _:
                 assert_never(command)

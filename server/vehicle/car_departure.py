@@ -13,12 +13,12 @@ from server.control.departure import Change, DepartureCheck
 from server.control.departure_list import KINDS, Item
 from server.control.departure_sight import Peak, Seen
 from server.judge.active_settings import ActiveSettings
-from server.protocol import departure_commands, serialize
+from server.protocol import drive_commands, serialize
 from server.protocol.alarm_state import Note
 from server.protocol.departure import DepartureAnswer, DepartureItem, DepartureSignature, DepartureState
 from server.storage.storage_thread import StorageThread
 from server.vehicle.departure_file import DepartureFile
-from server.vehicle.departure_past import DeparturePast
+from server.vehicle.restore import DeparturePast
 
 DRIVES_AFTER_S = 10.0  # moving for so long is a drive, not a push
 MOVES_MPS = 0.5
@@ -111,7 +111,7 @@ class CarDeparture:
 
     async def obey(
         self,
-        command: departure_commands.DepartureCommand,
+        command: drive_commands.DepartureCommand,
         caller: Caller,
         wall_ms: int,
         storage: StorageThread | None = None,
@@ -120,19 +120,19 @@ class CarDeparture:
         caller waits no longer. Raises Refused, OSError."""
         check, by = self._check, caller.name
         match command:
-            case departure_commands.BeginDeparture():
+            case drive_commands.BeginDeparture():
                 self._log_change(check.begin(_new_id(), by, wall_ms), wall_ms, by=by)
-            case departure_commands.SetDepartureItem():
+            case drive_commands.SetDepartureItem():
                 self._log_change(
                     check.set_item(command.item, command.result, command.note, by, wall_ms), wall_ms, by=by
                 )
-            case departure_commands.SignDeparture():
+            case drive_commands.SignDeparture():
                 role = caller.person.title if caller.person is not None else ""
                 for change in check.sign(command.check, by, role, wall_ms):
                     self._log_change(change, wall_ms, by=by if change.step == "signed" else change.result.by)
-            case departure_commands.ReopenDeparture():
+            case drive_commands.ReopenDeparture():
                 self._log_change(check.reopen(), wall_ms, by=by)
-            case departure_commands.SetDepartureList():
+            case drive_commands.SetDepartureList():
                 items = None if command.items is None else departure_list.of_rows(command.items)
                 setting = asyncio.create_task(self._set_list(items, by, storage), name="set the departure list")
                 await asyncio.shield(setting)

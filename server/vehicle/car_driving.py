@@ -14,8 +14,8 @@ from monitor.values import Mode
 from server.bus.bus import SessionBus
 from server.judge.logged_transition import number_of, text_of
 from server.protocol.alarm_state import Note
+from server.protocol.drive_commands import DescribeIntervention
 from server.protocol.driving_state import DriveSample, DrivingAnswer, InterventionAnswer, ModeState, WhyUnknown
-from server.protocol.mode_commands import DescribeIntervention
 from server.vehicle.connection import Connection
 from server.vehicle.judgement import Judgement
 

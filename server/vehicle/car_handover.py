@@ -18,7 +18,6 @@ from server.slowdown.controller import SlowDownController
 from server.vehicle import phone
 from server.vehicle.car_departure import CarDeparture
 from server.vehicle.car_driving import CarDriving
-from server.vehicle.car_planned_stop import CarPlannedStop
 from server.vehicle.handover_lines import (
     alarm_key,
     alarm_lines,
@@ -30,7 +29,7 @@ from server.vehicle.handover_lines import (
     stop_lines,
 )
 from server.vehicle.judgement import Judgement
-from server.vehicle.pause import Pause
+from server.vehicle.pause import CarPlannedStop, Pause
 
 
 class CarHandover:

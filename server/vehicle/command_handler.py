@@ -3,42 +3,33 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, assert_never
 
-from monitor.alarm import Refused
+from monitor.alarm import Refused, Transition
+from monitor.runner import Monitor
 from server.control import display_name
-from server.control.acting import acting_as
 from server.control.authorization import Caller
+from server.control.duty import acting_as
 from server.control.handover import NotReadBack
 from server.control.lease import Operator
 from server.judge.phone_report import phone_report
-from server.protocol import (
-    commands,
-    departure_commands,
-    handover_commands,
-    item_commands,
-    mark_commands,
-    mode_commands,
-    planned_stop_commands,
-    serialize,
-    slowing_commands,
-)
+from server.protocol import commands, drive_commands, handover_commands, serialize
 from server.protocol.command_base import OfCar, Prompt
 from server.protocol.messages import Answer
 from server.protocol.state import LiveState
 from server.rosbridge.address import BadAddress
 from server.storage.storage_thread import StorageThread
-from server.vehicle import departure_seen, phone, queries, responses
-from server.vehicle.check_detail import check_answer
+from server.vehicle import departure_seen, phone, queries
 from server.vehicle.outcomes import Outcomes
+from server.vehicle.queries import check_answer
 from server.vehicle.session_parts import SessionActions, SessionParts
 from server.vehicle.settings_change import SettingsChange
 
 log = logging.getLogger("catgraph.session")
 
 # Nothing of the car changes by these, so one that is not on the disk was not obeyed.
-RECORDS = (mark_commands.OfMark, departure_commands.OfDeparture, mode_commands.DescribeIntervention)
+RECORDS = (drive_commands.OfMark, drive_commands.OfDeparture, drive_commands.DescribeIntervention)
 OTHER_CAR = "This was meant for {meant}, and this is {this}: nothing was sent to either."
 
 
@@ -121,7 +112,7 @@ class CommandHandler:
             why = command.too_late(self._wall_ms())
         if why is None:
             return
-        if isinstance(command, slowing_commands.Decelerate):
+        if isinstance(command, drive_commands.Decelerate):
             self._parts.event_log.note("slow_down", f"Slow-down refused: {why}", by=by, step="refused")
         raise Refused(why)
 
@@ -214,14 +205,14 @@ class CommandHandler:
             case commands.Resume():
                 if parts.pause.end(parts.judgement.state, by=by):
                     parts.judgement.judge(now_s)
-            case planned_stop_commands.OfPlannedStop():
+            case drive_commands.OfPlannedStop():
                 self._plan_stop(command, now_s, by=by)
             case commands.Record():
                 await self._record_by_hand(command.on, by=by)
                 return None
             case commands.Acknowledge() | commands.Silence() | commands.Shelve() | commands.Unshelve():
                 judgement = parts.judgement
-                judgement.report(responses.respond(judgement.monitor, command, now_s, by))
+                judgement.report(respond(judgement.monitor, command, now_s, by))
             case commands.TakeControl():
                 parts.authorization.obey(command, caller, now_s)
                 self._actions.attention_changed()  # the queue shows who asks for control
@@ -229,19 +220,19 @@ class CommandHandler:
                 was = parts.handover.obey(command, caller, now_s, self._wall_ms())
                 parts.publisher.put()
                 return was
-            case departure_commands.OfDeparture():
+            case drive_commands.OfDeparture():
                 await parts.departure.obey(command, caller, self._wall_ms(), self._storage)
-            case item_commands.OfItem():
+            case handover_commands.OfItem():
                 parts.attention.obey(command, caller, now_s)
                 self._actions.attention_changed()
                 return None  # the state has nothing of it
             case commands.Ride():
                 self._ride(command.phone, now_s, by=by)
-            case mode_commands.DescribeIntervention():
+            case drive_commands.DescribeIntervention():
                 parts.driving.describe(command, by=by)
-            case mark_commands.OfMark():
+            case drive_commands.OfMark():
                 parts.marks.obey(command, by=by, source="http" if caller.page is None else "page")
-            case slowing_commands.OfSlowing():
+            case drive_commands.OfSlowing():
                 parts.slow_down.obey(command, by=by)
                 self._actions.slow_down_ordered()
             case commands.Position():
@@ -270,7 +261,7 @@ class CommandHandler:
         parts.publisher.put()
         await parts.recording.demand_settled()
 
-    def _plan_stop(self, command: planned_stop_commands.PlannedStopCommand, now_s: float, *, by: str) -> None:
+    def _plan_stop(self, command: drive_commands.PlannedStopCommand, now_s: float, *, by: str) -> None:
         speed_mps, phase = departure_seen.speed_of(self._parts, now_s), self._parts.connection.phase
         self._parts.planned_stop.obey(command, now_s, by=by, phase=phase, speed_mps=speed_mps)
         self._actions.attention_changed()  # the summary of the car shows it
@@ -285,3 +276,24 @@ class CommandHandler:
         judgement.ride(phone_, now_s)
         judgement.judge(now_s)
         self._parts.event_log.note("ride", phone.phone_in_car_text(judgement.snapshot(), phone_), by=by, phone=phone_)
+
+
+def respond(
+    monitor: Monitor,
+    command: commands.Acknowledge | commands.Silence | commands.Shelve | commands.Unshelve,
+    now_s: float,
+    by: str,
+) -> Collection[Transition]:
+    """Carries out what an operator does about an alarm.
+
+    What changed by it. Raises Refused.
+    """
+    match command:
+        case commands.Acknowledge():
+            return monitor.acknowledge(command.alarm, command.occurrence, by=by, now_s=now_s)
+        case commands.Silence():
+            return monitor.silence(command.alarm, command.occurrence, by=by, now_s=now_s)
+        case commands.Shelve():
+            return monitor.shelve(command.alarm, command.occurrence, minutes=command.minutes, by=by, now_s=now_s)
+        case _:
+            return monitor.unshelve(command.alarm, by=by, now_s=now_s)

@@ -10,7 +10,7 @@ from monitor.runner import Refused
 from server.control import departure_list
 from server.control.departure_list import MAX_BYTES, Item
 from server.storage import durable_file
-from server.storage.set_aside import set_aside
+from server.storage.durable_file import set_aside
 
 log = logging.getLogger("catgraph.settings")
 

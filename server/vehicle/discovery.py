@@ -10,7 +10,7 @@ from server.judge.message import RosVersion
 from server.judge.message_fields import stamp_s
 from server.judge.topics import ros_version
 from server.recording.read.schemas import text_of_details
-from server.rosbridge.link_errors import CallFailed, LinkDown
+from server.rosbridge.live_source import CallFailed, LinkDown
 from server.rosbridge.rosapi_client import Asks
 
 MAX_TOPICS = 5000

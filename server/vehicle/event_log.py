@@ -12,7 +12,7 @@ from typing_extensions import Unpack
 from monitor.alarm import Transition
 from monitor.planned_stop import StopReason
 from server.bus.bus import SessionBus
-from server.control.acting import acting
+from server.control.duty import acting
 from server.judge.active_settings import ActiveSettings
 from server.protocol import serialize
 from server.protocol.alarm_state import EventDetails, NotedEvent

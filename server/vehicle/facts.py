@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from monitor.state import LinkFacts
-from server.judge.unit_questions import unit_questions
+from server.judge.unit_watch import unit_questions
 from server.protocol.departure import DepartureState
 from server.protocol.state import LiveState, RecordedState, ServerState
 from server.rosbridge.connection_errors import Problem

@@ -9,14 +9,13 @@ from typing import Any
 from monitor.alarm import Transition
 from monitor.alarm_marks import AlarmMarks
 from monitor.catalog import AnyCheck
-from monitor.check_minute import CheckMinute
 from monitor.drive_trends import DriveTrends
 from monitor.load import AlarmLoad, RecentLoad
 from monitor.runner import Monitor
 from monitor.signal_limits import expected_rates
 from monitor.state import Snapshot, State
 from monitor.transport import TransportDelay
-from monitor.trends import Trends
+from monitor.trends import CheckMinute, Trends
 from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
 from server.judge.frames import Frames

@@ -9,17 +9,16 @@ from typing import Any
 
 from monitor.alarm import Refused
 from server.bus.bus import SessionBus
-from server.control.acting import acting_as
 from server.control.authorization import Caller
+from server.control.duty import acting_as
 from server.protocol.alarm_state import Note
-from server.protocol.mark_commands import MarkCommand, PlaceMark, RemoveMark
+from server.protocol.drive_commands import MarkCommand, PlaceMark, RemoveMark
 from server.protocol.marks import DriveMark, MarkList, MarkSource
-from server.recording.clock_history import ClockHistory
 from server.recording.controller import SessionRecording
 from server.recording.marks.media import MediaName, name_of
 from server.recording.marks.rows import CHANGES, MOST_CATEGORY, MOST_WORDS, entry, row_of
 from server.recording.recorder_queue import Attachment
-from server.recording.recording_clock import STEP_MS
+from server.recording.recording_clock import STEP_MS, ClockHistory
 from server.system.clean_text import clean
 from server.vehicle.car_marks import CarMarks
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from server.bus.bus import SessionBus
-from server.vehicle import departure_past, restore
+from server.vehicle import restore
 from server.vehicle.restore import RestoredState
 from server.vehicle.session_parts import SessionParts
 
@@ -38,7 +38,7 @@ class Restoration:
         parts.marks.restore(self._bus, self._vehicle)
         judgement.ride(restore.phone_chosen(self._bus, self._vehicle), self._now())
         parts.driving.restore(self._bus, self._vehicle)
-        departure = departure_past.recall(self._bus, self._vehicle)
+        departure = restore.recall_departure(self._bus, self._vehicle)
         parts.departure.restore(departure)
         if departure.signed is not None:
             parts.recording.remember([departure.signed])

@@ -17,6 +17,7 @@ from server.protocol.state import LiveState, ServerState
 from server.recording.folder import RecordingsFolder
 from server.rosbridge import address
 from server.rosbridge.connection_errors import Problem
+from server.rosbridge.link_listener import Marks
 from server.rosbridge.live_source import LiveSource, OpenSource
 from server.storage.storage_thread import StorageThread
 from server.system import log_context
@@ -24,7 +25,6 @@ from server.system.supervision import Supervisor
 from server.vehicle import facts
 from server.vehicle.command_handler import CommandHandler
 from server.vehicle.judgement import Judgement
-from server.vehicle.link_marks import LinkMarks
 from server.vehicle.marks import NO_PLACE, MarksPlace
 from server.vehicle.open_source import open_source
 from server.vehicle.restoration import Restoration
@@ -281,3 +281,28 @@ class Session:
         self._tick.watch_link(now_s)
         self._parts.judgement.judge(now_s)
         self._parts.publisher.put()
+
+
+class LinkMarks:
+    """The `marks` of one car's link: those of its delay, and every subscription that is sent."""
+
+    def __init__(self, delay: Marks, subscribed: Callable[[str], None]) -> None:
+        """`subscribed(topic)` is called with each subscription that is sent, the first one or another."""
+        self._delay = delay
+        self._subscribed = subscribed
+
+    def open(self, at_s: float) -> None:
+        self._delay.open(at_s)
+
+    def took(self, size: int) -> None:
+        self._delay.took(size)
+
+    def sent(self, at_s: float) -> None:
+        self._delay.sent(at_s)
+
+    def answered(self, sent_s: float, at_s: float) -> None:
+        self._delay.answered(sent_s, at_s)
+
+    def subscribe(self, topic: str, queue_length: int, throttle_s: float = 0.0) -> None:
+        self._delay.subscribe(topic, queue_length, throttle_s)
+        self._subscribed(topic)

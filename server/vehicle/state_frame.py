@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from monitor import catalog, values
 from monitor.instruments import stopping_m, time_gap_s
-from monitor.link import Phase
 from monitor.load import AlarmLoad
 from monitor.planned_stop import PlannedStop
 from monitor.runner import Monitor
 from monitor.scan_shape import habit_words
+from monitor.shell_facts import Phase
 from monitor.signals import SIGNALS, Signal
 from monitor.state import Reading, Snapshot
 from monitor.trends import Piece

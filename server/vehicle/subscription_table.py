@@ -10,13 +10,11 @@ from server.recording.recorded_topics import Also
 from server.rosbridge.live_source import LiveSource
 from server.rosbridge.subscription import Subscription
 from server.vehicle import car_marks, wanted_topics
-from server.vehicle.cbor_use import CborUse
 from server.vehicle.delivery import Delivery
-from server.vehicle.large_topics import LargeTopics
 from server.vehicle.link_load import LinkLoad
-from server.vehicle.probation import Probation
 from server.vehicle.type_definitions import TypeDefinitions
 from server.vehicle.undelivered import CLIENT_COUNT
+from server.vehicle.wanted_topics import CborUse, LargeTopics, Probation
 
 TRANSFORMS_MS = (
     200  # of transforms that move, where none of them places a sensor: they are sent a hundred times a second

@@ -11,12 +11,10 @@ from server.judge.sources.evidence import Place
 from server.judge.topics import Source, could_carry
 from server.recording.recorded_topics import Also, Missing
 from server.rosbridge.connection_errors import Problem
-from server.rosbridge.link_errors import LinkDown
-from server.rosbridge.live_source import LiveSource
+from server.rosbridge.live_source import LinkDown, LiveSource
 from server.rosbridge.rosapi_client import Asks
 from server.vehicle import car_marks, discovery
-from server.vehicle.missing_watch import MissingWatch
-from server.vehicle.ros_watch import RosWatch
+from server.vehicle.rosapi_watch import MissingWatch, RosWatch
 from server.vehicle.signal_map import SignalMap
 from server.vehicle.subscription_table import SubscriptionTable
 from server.vehicle.type_definitions import TypeDefinitions

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from server.bus.bus import SessionBus
 from server.recording.read.spans import span
-from server.system import open_files
+from server.system import process_limits
 from server.vehicle.event_log import EventLog
 
 log = logging.getLogger("catgraph.session")
@@ -88,5 +88,5 @@ class OpenFilesWatch:
         """Raises OSError while the process has none left."""
         if now_s - self._looked_s >= EVERY_S or self._fails:
             self._looked_s, self._fails = now_s, True
-            open_files.demand_free()
+            process_limits.demand_free()
             self._fails = False

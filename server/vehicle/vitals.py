@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from monitor.recorder import RecorderFacts
+from monitor.shell_facts import RecorderFacts
 
 LATE_TICK_S = 1.0  # twenty ticks
 LATE_STATE_S = 2.0  # pages cover their values by then

@@ -1,14 +1,20 @@
-"""Which vehicles a web node has heard: one whose agent is gone after a restart is shown as lost, not left out."""
+"""Which vehicles a web node knows without their agents: those it has heard before, and those that are off on purpose.
+
+One whose agent is gone after a restart is shown as lost, not left out. One of which a person said that it is off on
+purpose is not lost, until its agent is heard again.
+"""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
 import orjson
+from pydantic import TypeAdapter, ValidationError
 
+from server.protocol.cars_state import OffOnPurpose
 from server.storage import durable_file
 from server.storage.storage_thread import StorageThread
 from server.vehicle.vehicle import is_name
@@ -18,9 +24,16 @@ log = logging.getLogger("catgraph.web")
 FILE = "vehicles.json"
 MOST = 1000  # names from a broker without keys could be anything
 
+OFF_FILE = "off.json"
+MOST_OFF = 1000
+_OFF_FILE: TypeAdapter[dict[str, OffOnPurpose]] = TypeAdapter(dict[str, OffOnPurpose])
+
 
 class KnownVehicles:
-    """Their names, in a file of the data folder."""
+    """Vehicles that a web node has heard.
+
+    Their names, in a file of the data folder.
+    """
 
     def __init__(self, folder: Path | None, storage: StorageThread, *, forget: Sequence[str] = ()) -> None:
         """`folder` None: they last as long as this run. `forget`: those that are not listed any more, until heard."""
@@ -48,3 +61,62 @@ class KnownVehicles:
         except (OSError, ValueError, TypeError, AttributeError) as why:
             log.warning("%s cannot be read; lost vehicles are not listed until they are heard: %s", self._path, why)
             return set()
+
+
+class OffVehicles:
+    """Cars of which a person said that they are off on purpose.
+
+    By their names, in a file of the data folder.
+    """
+
+    def __init__(self, folder: Path | None, storage: StorageThread, *, wall_ms: Callable[[], int]) -> None:
+        """`folder` None: they last as long as this run."""
+        self._path = None if folder is None else folder / OFF_FILE
+        self._storage = storage
+        self._wall_ms = wall_ms
+        self._off = self._read()
+
+    @property
+    def names(self) -> frozenset[str]:
+        return frozenset(self._off)
+
+    def of(self, name: str) -> OffOnPurpose | None:
+        """Who said so and when; None: nobody."""
+        return self._off.get(name)
+
+    def declare(self, name: str, by: str) -> None:
+        """A person says that it is off. Written without waiting for the disk."""
+        if name in self._off or len(self._off) >= MOST_OFF:
+            return
+        self._off[name] = {"by": by, "since_ms": self._wall_ms()}
+        log.info("car_off vehicle=%s by=%s", name, by)
+        self._write()
+
+    def withdraw(self, name: str, by: str) -> None:
+        """A person says that it is not off."""
+        if self._off.pop(name, None) is not None:
+            log.info("car_not_off vehicle=%s by=%s", name, by)
+            self._write()
+
+    def heard(self, name: str) -> None:
+        """Its agent said something: it is on, whatever a person said before."""
+        if self._off.pop(name, None) is not None:
+            log.info("car_heard_again vehicle=%s", name)
+            self._write()
+
+    def _write(self) -> None:
+        if self._path is not None:
+            self._storage.submit(partial(durable_file.write, self._path, orjson.dumps(self._off)))
+
+    def _read(self) -> dict[str, OffOnPurpose]:
+        """Where the file cannot be read the cars are lost: that is shown, and said anew by a person."""
+        if self._path is None:
+            return {}
+        try:
+            found = _OFF_FILE.validate_json(self._path.read_bytes())
+            return {name: off for name, off in found.items() if is_name(name)}
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValidationError) as why:
+            log.warning("%s cannot be read; cars that are off on purpose are shown as lost: %s", self._path, why)
+            return {}

@@ -1,17 +1,27 @@
-"""What a page sends, read with care: a limited number of JSON objects; a page that sends anything else is closed."""
+"""The reader and the writer of one page's socket, until the page leaves, and what the page sends, read with care.
+
+A page sends a limited number of JSON objects; one that sends anything else is closed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import asyncio
+import contextlib
+import logging
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 import orjson
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from server.protocol import commands, messages
 from server.protocol.rate_limit import MAX_DEPTH, Allowance, Limits, nests_deeper
 
+log = logging.getLogger("catgraph.hub")
 MAX_COMPLAINTS = 200  # a page that sends nothing sensible is closed
 LONGEST_SLOW_DOWN = 400  # letters of an order to slow the car
+
+_GONE = (WebSocketDisconnect, RuntimeError, OSError)  # it left, perhaps while something was being sent
 
 
 class PageInbox:
@@ -62,3 +72,43 @@ def _parsed(text: str | None) -> dict[str, Any]:
 def _may_slow_down(text: str | None) -> bool:
     """Whether a message beyond the allowance is read all the same: it may be an order to slow the car."""
     return text is not None and len(text) <= LONGEST_SLOW_DOWN and '"slow_down"' in text
+
+
+async def run_tasks(
+    socket: WebSocket,
+    *,
+    read: Coroutine[Any, Any, None],
+    write: Coroutine[Any, Any, None],
+    leave: Callable[[], Awaitable[None]],
+) -> None:
+    """Runs until `read` ends; `leave` is called before the writer ends.
+
+    A page whose writer failed gets nothing any more: it is closed, so that it connects again.
+    """
+    is_leaving = False
+    writer = asyncio.create_task(write, name="page writer")
+    reader = asyncio.create_task(read, name="page reader")
+
+    def writer_ended(task: asyncio.Task[None]) -> None:
+        if not is_leaving and (task.cancelled() or task.exception() is not None):
+            error = None if task.cancelled() else task.exception()
+            log.error("the writer of a page ended: %s", error or "it was cancelled", exc_info=error)
+            reader.cancel()
+
+    writer.add_done_callback(writer_ended)
+    try:
+        await reader
+    except (WebSocketDisconnect, RuntimeError):
+        pass
+    except asyncio.CancelledError:
+        if not writer.done():
+            raise  # the server ends; else the writer failed, and the page shall connect again
+        with contextlib.suppress(*_GONE):
+            await socket.close(code=1011, reason="the server failed to send")
+    finally:
+        is_leaving = True
+        reader.cancel()
+        await leave()
+        writer.cancel()
+        with contextlib.suppress(asyncio.CancelledError, *_GONE):
+            await writer

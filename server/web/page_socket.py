@@ -16,7 +16,7 @@ from server.protocol.rate_limit import Limits
 from server.protocol.state import ServerState
 from server.replay.manager import ReplayManager
 from server.replay.view_source import ViewSource
-from server.web import page_tasks
+from server.web import page_inbox
 from server.web.cars_board import CarsBoard
 from server.web.fair_wakeup import FairWakeup
 from server.web.page_commands import PageCommands
@@ -98,7 +98,9 @@ class Page:
             await self._commands.close()
 
         try:
-            await page_tasks.run(self._socket, read=self._read(), write=self._writer.run(self._hello), leave=leave)
+            await page_inbox.run_tasks(
+                self._socket, read=self._read(), write=self._writer.run(self._hello), leave=leave
+            )
         finally:
             self._writer.close()
             await self._view.leave()

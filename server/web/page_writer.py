@@ -19,16 +19,32 @@ from server.bus.log_runs import Resumed
 from server.protocol import messages
 from server.protocol.alarm_state import LogEvent
 from server.protocol.messages import FrameKind, Hello
+from server.protocol.slow_down_state import FORMER_PHASES
 from server.replay.view_source import ViewSource
-from server.web import former_page
 from server.web.event_feed import EventFeed
 from server.web.fair_wakeup import FairWakeup
+
+_FORMER = {present: former for former, present in FORMER_PHASES.items()}
 
 RESTARTED = 1012  # RFC 6455: the page dials again, and is greeted anew
 HELLO_WITHIN_S = 10.0  # until then no event is sent: the hello names the newest that the page has; it waits 8 s at most
 OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
 BATCH_EVERY_S = 0.2  # to a page that catches up: with its other messages it sends at most 25 a second
 MAX_REPLIES = 200  # waiting for a page that does not read
+
+
+def former_state(payload: str) -> str:
+    """What a page of before a change of names gets: it may be open while the server is updated.
+
+    A state with the former name of its slow-down's phase.
+    """
+    found = orjson.loads(payload)
+    slow_down = found.get("decelerate")
+    phase = slow_down.get("state") if isinstance(slow_down, dict) else None
+    if not isinstance(phase, str) or phase not in _FORMER:
+        return payload
+    slow_down["state"] = _FORMER[phase]
+    return orjson.dumps(found).decode()
 
 
 class PageWriter:
@@ -275,7 +291,7 @@ class PageWriter:
             await self._socket.send_bytes(frame.payload)
         else:
             is_renamed = self._is_former and kind == "state"
-            await self._socket.send_text(former_page.state(frame.payload) if is_renamed else frame.payload)
+            await self._socket.send_text(former_state(frame.payload) if is_renamed else frame.payload)
 
     async def _send(self, message: messages.ToPage | Hello | messages.Offer | messages.Events) -> None:
         await self._socket.send_text(orjson.dumps(message).decode())

@@ -27,8 +27,8 @@ from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle, is_name
 from server.vehicle.vitals import problems
 from server.web.hub import Hub
+from server.web.known_vehicles import OffVehicles
 from server.web.maps.layers import MapLayers
-from server.web.off_vehicles import OffVehicles
 
 if TYPE_CHECKING:  # without a broker nats-py need not be installed, without a store obstore
     from server.bus.nats_http_node import HttpNode

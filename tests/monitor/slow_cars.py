@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from monitor.shell_facts import SlowingFacts
 from monitor.slow_proof import ProofFollower, SlowProof
-from monitor.slowing import SlowingFacts
 
 ORDERED_S = 100.0
 KNOWN_S = 4.0  # of the motion before the order

@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from monitor.check import Finding, Quantity, fault, ok, unknown
-from monitor.check_minute import CheckMinute
-from monitor.trends import SPAN, STEP_S
+from monitor.trends import SPAN, STEP_S, CheckMinute
 
 
 def measured(value: float, limit: float | None = 11.0) -> Finding:

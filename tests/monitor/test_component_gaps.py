@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 import pytest
 
 from monitor.components import FORGOTTEN_AFTER_S, ONE_INTERVAL_S, SILENT_AFTER_S, TOPIC_SILENT_S, Components
-from monitor.link import LinkFacts
+from monitor.shell_facts import LinkFacts
 from monitor.state import State
 from monitor.values import Component, Diagnostics, Level
 

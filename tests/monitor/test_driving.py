@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from monitor.catalog import AllLimits, changed
 from monitor.driving_mode import CONFIRM_S, FLICKERS, FLICKERS_WITHIN_S, SETTLE_S
 from monitor.driving_summary import DrivingSummary
-from monitor.link import LinkFacts
+from monitor.shell_facts import LinkFacts
 from monitor.snapshot import Snapshot
 from monitor.state import State
 from monitor.values import DriveMode, Effort, GpsFix, Mode, MotionCommand, Steering, Twist

@@ -9,21 +9,18 @@ from typing import Any
 import pytest
 
 from monitor.alarm import Alarm
-from monitor.alarm_order import standing, suppressed
 from monitor.alarm_spec import Priority
-from monitor.car_clock import AHEAD_S, CONTRADICTION_S, IN_TIME_S, SAMPLES, CarClock, StampedDelay
+from monitor.car_clock import AHEAD_S, CONTRADICTION_S, IN_TIME_S, SAME_JUMP_S, SAMPLES, CarClock, StampedDelay, merged
 from monitor.catalog import AllLimits, changed
 from monitor.components import FORGOTTEN_AFTER_S, ONE_INTERVAL_S, SILENT_AFTER_S, Components
 from monitor.freeze_detection import Repeats
-from monitor.inhibition import CauseTable, table_of
+from monitor.inhibition import CauseTable, standing, suppressed, table_of
 from monitor.instruments import ObstacleLimits, stopping_m, time_gap_s
 from monitor.motion import Slope
 from monitor.obstacle_view import corridor_ahead
-from monitor.reading import Reading
-from monitor.reading_history import AT_MOST_S, BEFORE_S, ReadingHistory
+from monitor.reading import AT_MOST_S, BEFORE_S, Reading, ReadingHistory
 from monitor.signal_limits import expected_rates, set_hz
 from monitor.snapshot import NotFresh
-from monitor.stamps import SAME_JUMP_S, merged
 from monitor.unusable import Unusable, refused, without
 from monitor.values import Component, Diagnostics, Steering, Twist
 from tests.monitor.checks.known import known

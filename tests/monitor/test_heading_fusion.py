@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from monitor.heading_fusion import DOUBTS, HeadingFusion
+from monitor.derived_signals import DOUBTS, HeadingFusion
 from monitor.values import Heading, Odometry
 
 

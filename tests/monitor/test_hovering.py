@@ -17,10 +17,9 @@ from monitor import catalog
 from monitor.catalog import CHECKS, AllLimits
 from monitor.checks.slow_down import SlowDownLimits
 from monitor.instruments import DrivingLimits, StoreLimits
-from monitor.link import LinkFacts
 from monitor.phones import PhoneReport
-from monitor.recorder import RecorderFacts
 from monitor.runner import Monitor
+from monitor.shell_facts import LinkFacts, RecorderFacts
 from monitor.signals import SIGNALS
 from monitor.state import State
 from monitor.unseen import UnseenLimits

@@ -12,7 +12,7 @@ from tests.tree import PROJECT
 
 WRITES = """
 from monitor.check import Quantity
-from monitor.link import LinkFacts
+from monitor.shell_facts import LinkFacts
 from monitor.reading import Reading
 from monitor.snapshot import Snapshot
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from monitor.reading import Reading
-from monitor.reading_history import AT_MOST_S, BEFORE_S, ReadingHistory
+from monitor.reading import AT_MOST_S, BEFORE_S, Reading, ReadingHistory
 
 
 def after(*received_s: float) -> float | None:

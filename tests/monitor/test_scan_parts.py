@@ -11,9 +11,9 @@ import pytest
 
 from monitor.check import Finding
 from monitor.instruments import ObstacleLimits
-from monitor.link import LinkFacts
-from monitor.mounting import Mounting
-from monitor.scan_parts import MOST, SWEEP_S
+from monitor.scan import Mounting
+from monitor.scan_shape import MOST_PARTS, SWEEP_S
+from monitor.shell_facts import LinkFacts
 from monitor.state import State
 from monitor.values import LaserScan
 from tests.monitor.checks.known import check_of
@@ -100,7 +100,7 @@ def test_a_laser_that_sends_its_sweep_whole_has_no_parts_and_what_is_kept_is_bou
     assert state.snapshot(now_s).scan_parts == ()
     odd = [replace(sweep([]), angle_min_rad=-1.5 - 1e-4 * n) for n in range(500)]
     state, _, now_s = driven(odd, turn_s=0.5)
-    assert len(state.snapshot(now_s).scan_parts) <= MOST
+    assert len(state.snapshot(now_s).scan_parts) <= MOST_PARTS
     # The clock is set back: nothing that was kept would ever grow old.
     state.receive("scan", odd[0], 1.0)
     assert state.snapshot(1.0).scan_parts == ()

@@ -10,7 +10,7 @@ import pytest
 
 from monitor.check import Verdict
 from monitor.checks.slow_down import BEFORE_UNKNOWN, STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, obeys
-from monitor.slowing import SlowingFacts
+from monitor.shell_facts import SlowingFacts
 from monitor.state import State
 from monitor.values import Twist
 from tests.monitor.slow_cars import ORDERED_S, SlowCar, random_car

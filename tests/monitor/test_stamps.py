@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from monitor.stamps import ClockJump, StampFollower, merged
+from monitor.car_clock import ClockJump, StampFollower, merged
 
 EPOCH_S = 1_469_722_837.0  # the car's clock when ours is 0
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from monitor.trail import GAP_S, KEPT_S, MOST, SIGMA_UNKNOWN_M, Trail
+from monitor.tracks import MOST_OF_TRAIL, SIGMA_UNKNOWN_M, TRAIL_GAP_S, TRAIL_KEPT_S, Trail
 from monitor.values import GpsFix
 
 M_NORTH = 1 / 110_890.0
@@ -42,7 +42,7 @@ def test_without_positions_nothing_is_known() -> None:
     assert Trail().newest_s == -math.inf
 
 
-@pytest.mark.parametrize(("gap_s", "known"), [(GAP_S, True), (GAP_S + 0.01, False)])
+@pytest.mark.parametrize(("gap_s", "known"), [(TRAIL_GAP_S, True), (TRAIL_GAP_S + 0.01, False)])
 def test_in_a_gap_the_car_may_have_been_anywhere(gap_s: float, known: bool) -> None:
     trail = Trail()
     trail.add(fix(32.23), 100.0)
@@ -78,10 +78,10 @@ def test_a_clock_that_goes_back_begins_a_new_trail() -> None:
 
 
 def test_it_is_bounded_in_time_and_number() -> None:
-    assert northward(seconds=60.0).at(160.0 - KEPT_S - 0.5) is None
-    assert northward(seconds=60.0).at(160.0 - KEPT_S + 0.5) is not None
+    assert northward(seconds=60.0).at(160.0 - TRAIL_KEPT_S - 0.5) is None
+    assert northward(seconds=60.0).at(160.0 - TRAIL_KEPT_S + 0.5) is not None
     fast = northward(hz=1000.0, seconds=3.0)
-    assert fast.at(103.0 - MOST / 1000.0 - 0.1) is None
+    assert fast.at(103.0 - MOST_OF_TRAIL / 1000.0 - 0.1) is None
 
 
 def test_the_worse_of_two_errors_counts_and_an_unknown_one_is_5_m() -> None:

@@ -11,9 +11,9 @@ from server.analysis import summary
 from server.analysis.rehearse import rehearse
 from server.analysis.report import Report
 from server.analysis.thresholds import read_override
+from server.judge.active_settings import SettingsOverride
 from server.judge.drive import Drive as JudgedDrive
 from server.judge.offline import OfflineRun
-from server.judge.settings_override import SettingsOverride
 from server.recording.event_channels import read_recorded_events
 from server.recording.export.formats.csv_zip import write_csv_zip
 from server.recording.read.read import open_recording

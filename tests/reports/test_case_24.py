@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from server.analysis.rehearse import Rehearsed, rehearse
-from server.judge.settings_override import SettingsOverride
+from server.judge.active_settings import SettingsOverride
 from server.recording.read.read import open_recording
 from tests.reports.cases import judged, made
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from monitor import catalog
 from monitor.catalog import AllLimits
-from monitor.link import LinkFacts
 from monitor.phones import PhoneReport
 from monitor.runner import Monitor, Transition
+from monitor.shell_facts import LinkFacts
 from monitor.state import State
 from monitor.values import PhoneFix
 from server.analysis.faults import Faults

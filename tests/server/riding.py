@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from monitor.catalog import CHECKS
-from monitor.link import LinkFacts
 from monitor.runner import Monitor
+from monitor.shell_facts import LinkFacts
 from monitor.state import State
 from server.judge import pipeline
 from server.judge.phone_report import phone_report
@@ -20,7 +20,7 @@ from server.judge.reception_stats import Reception
 from server.judge.topics import map_signals
 from server.protocol import commands
 from server.simulator.car import SimulatedCar
-from server.simulator.place import metres_per_degree
+from server.simulator.lap import metres_per_degree
 from server.simulator.scenarios import Planned
 
 WANDER_S = 40.0  # the error of a receiver wanders slowly

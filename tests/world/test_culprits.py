@@ -12,11 +12,11 @@ import pytest
 from server.rosbridge import connection_errors
 from server.rosbridge.diagnosis import SILENT_S, Diagnosis
 from server.rosbridge.link import RosLink
-from server.rosbridge.link_errors import CallFailed, LinkDown
+from server.rosbridge.live_source import CallFailed, LinkDown
 from server.rosbridge.rosapi_client import Questions
 from server.vehicle import discovery
 from server.vehicle.delivery import Delivery
-from server.vehicle.missing_watch import MissingWatch
+from server.vehicle.rosapi_watch import MissingWatch
 from server.vehicle.undelivered import BLOCKED_AFTER_S, OWN_CLIENTS, Passing
 from tests.server.cli.test_doctor import doctor
 from tests.server.ear import Bridge, Ear, bridging, linked, until

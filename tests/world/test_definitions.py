@@ -9,7 +9,7 @@ import pytest
 
 from server.judge.message import RosVersion
 from server.recording.read.schemas import TypeBook
-from server.rosbridge.link_errors import CallFailed
+from server.rosbridge.live_source import CallFailed
 from server.vehicle import discovery
 from tests.world.test_encoding_choice import VERSIONS, definitions, transcript
 

@@ -13,7 +13,7 @@ import pytest
 from server.app.config import Config
 from server.judge.message import RosVersion
 from server.judge.signals import TOPICS
-from server.vehicle.encoding_choice import fit_for_cbor
+from server.vehicle.type_definitions import fit_for_cbor
 from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving
 from tests.server.conftest import serving

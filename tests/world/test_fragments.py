@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from server.judge.message import RosVersion
 from server.rosbridge.codec import Unreadable
-from server.rosbridge.fragments import Fragments, TooLarge, is_fragment
-from server.rosbridge_server import text as bridge
+from server.rosbridge.frame_reader import Fragments, TooLarge, is_fragment
+from server.rosbridge_server import encoding as bridge
 from tests.world.transcripts import names, needs_transcripts, read
 
 pytestmark = pytest.mark.world(n=10)

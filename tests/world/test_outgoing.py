@@ -24,14 +24,13 @@ from server.judge.topics import Source
 from server.recording.read.schemas import standard
 from server.rosbridge.address import parse
 from server.rosbridge.link import RosLink
-from server.rosbridge.link_errors import LinkDown
+from server.rosbridge.live_source import LinkDown
 from server.rosbridge.outgoing import PUBLISHED, SERVICES, NotAllowed, Outgoing
 from server.rosbridge.subscription import Subscription
-from server.slowdown.command_target import target_of
+from server.slowdown.command_target import target_of, twist_message
 from server.slowdown.controller import SlowDownController
 from server.slowdown.guard_client import GuardClient
 from server.slowdown.publisher import CommandPublisher
-from server.slowdown.twist import message
 from server.vehicle import discovery
 from server.vehicle.subscriptions import Subscriptions
 from tests.server.ear import Ear
@@ -257,7 +256,7 @@ def test_any_command_of_a_slow_down_is_refused_or_harmless(
         mouth = CommandPublisher()
         mouth.attach(link)
         kind: Any = type.rpartition("/")[2]
-        said = message(kind, speed, tyre, stamp_ns=stamp_ns, ros_version=version)
+        said = twist_message(kind, speed, tyre, stamp_ns=stamp_ns, ros_version=version)
         fits = all(isinstance(x, float) and math.isfinite(x) for x in (speed, tyre))
         try:
             mouth.publish("/catvehicle/cmd_vel", type, said)

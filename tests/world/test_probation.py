@@ -9,14 +9,14 @@ import pytest
 
 from server.app.config import Config
 from server.rosbridge.link import RosLink
-from server.vehicle import probation
+from server.vehicle import wanted_topics
 from server.vehicle.connection import Connection
 from server.vehicle.delivery import Delivery
-from server.vehicle.probation import LEFT_AFTER, STEADY_S, Probation
 from server.vehicle.subscription_table import SubscriptionTable
 from server.vehicle.subscriptions import Subscriptions
 from server.vehicle.type_definitions import TypeDefinitions
 from server.vehicle.vehicle import Vehicle
+from server.vehicle.wanted_topics import LEFT_AFTER, STEADY_S, Probation
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.ear import until
@@ -110,7 +110,7 @@ def test_one_that_makes_all_others_late_is_found_and_left_and_the_others_are_rec
 async def test_after_a_silence_of_the_bridge_the_large_ones_that_never_came_wait(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(probation, "STEADY_S", 3.0)
+    monkeypatch.setattr(wanted_topics, "STEADY_S", 3.0)
     links: list[RosLink] = []
     silent = Subscriptions.fell_silent
 

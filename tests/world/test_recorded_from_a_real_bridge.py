@@ -15,11 +15,11 @@ from server.cli.main import main
 from server.judge.message import RosVersion
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
-from server.rosbridge.link_errors import CallFailed
+from server.rosbridge.live_source import CallFailed
 from server.rosbridge.rosapi_client import Asks
+from server.rosbridge_server.client_topics import Subscription
 from server.rosbridge_server.encoding import Outgoing
 from server.rosbridge_server.server import RosBridge
-from server.rosbridge_server.subscription import Subscription
 from server.vehicle import delivery, discovery
 from server.vehicle.undelivered import CLIENT_COUNT, Passing
 from server.vehicle.vehicle import Vehicle

@@ -11,14 +11,14 @@ from typing import Any
 import pytest
 
 from monitor.alarm import Transition
-from monitor.stamps import StampFollower
+from monitor.car_clock import StampFollower
 from server.cli.replay import Rounds
 from server.judge.drive import Drive
 from server.judge.message import Message
 from server.judge.offline import Observer, OfflineRun
 from server.judge.recorded_events import RecordedEvents
 from server.recording.read.read import TopicInfo
-from server.rosbridge_server.stamps import moved
+from server.rosbridge_server.player import moved
 from server.simulator.car import SimulatedCar
 
 pytestmark = pytest.mark.world(n=10)

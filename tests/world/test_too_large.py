@@ -10,7 +10,7 @@ import orjson
 import pytest
 
 from server.app.config import Config
-from server.rosbridge.large_message import ENDS_BYTES, topic_of
+from server.rosbridge.raw_frame import ENDS_BYTES, topic_of
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from server.analysis.drive.drive_report import DriveReport
 from server.bus.event_table import safe_cell
-from server.recording.export.outcome import ExportRefused, Outcome
+from server.recording.export.export_format import ExportRefused, Outcome
 from server.recording.read.read import Recording
 from server.storage import bounded_toml
 

@@ -11,8 +11,8 @@ import orjson
 from monitor.unseen import unseen_words
 from server.analysis.drive.drive_report import DriveReport
 from server.analysis.drive.form import as_csv
+from server.recording.export.export_format import Outcome
 from server.recording.export.formats.csv_zip import when
-from server.recording.export.outcome import Outcome
 from server.recording.read.read import Recording
 
 COLUMNS = ("section", "time", "until", "what", "value", "unit", "by", "details")

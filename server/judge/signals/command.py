@@ -6,8 +6,8 @@ from typing import Any
 
 from monitor.values import MotionCommand
 from server.judge.message_fields import inner, known, number
-from server.judge.plausible import plausible_speed
 from server.judge.topic import Topic
+from server.judge.units import plausible_speed
 
 
 def command(message: Any) -> MotionCommand:

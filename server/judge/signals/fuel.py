@@ -7,8 +7,8 @@ from typing import Any
 from monitor.values import Level
 from server.judge.message_fields import Rejected, finite
 from server.judge.not_measured import NO_BATTERY, NO_PERCENTAGE
-from server.judge.plausible import plausible_percent
 from server.judge.topic import Topic, floats
+from server.judge.units import plausible_percent
 
 
 def level(message: Any) -> Level:

@@ -6,8 +6,8 @@ from typing import Any
 
 from monitor.values import Effort
 from server.judge.message_fields import finite
-from server.judge.plausible import plausible_percent
 from server.judge.topic import Topic, floats
+from server.judge.units import plausible_percent
 
 
 def effort(message: Any) -> Effort:

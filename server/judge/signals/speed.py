@@ -9,8 +9,8 @@ from typing import Any
 from monitor.values import Twist
 from server.judge.frame_words import is_earth_fixed
 from server.judge.message_fields import finite, inner, known, number, text
-from server.judge.plausible import FASTEST_KMH, plausible_speed
 from server.judge.topic import Topic, floats
+from server.judge.units import FASTEST_KMH, plausible_speed
 
 SIDEWAYS = 0.25  # of the way made: a car rolls forwards or backwards, and slips a little
 MOVES_MPS = 1.0  # below it what is measured sideways may be noise

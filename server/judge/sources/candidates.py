@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from server.judge.frame_words import looks
 from server.judge.signals import TOPICS
 from server.judge.sources import namespaces
 from server.judge.sources.evidence import Evidence
-from server.judge.sources.source import BY_SIGNAL, COMMAND, Source, plain_type, source_of
+from server.judge.sources.source import BY_SIGNAL, Source, plain_type, source_of
 from server.judge.topic import Topic
+from server.protocol.questions import Question
 
 MOST_COMPARED = 12  # topics of one signal
 MOST_BESIDE = 4  # of those that show whether the car moves
@@ -18,6 +19,19 @@ OWN_NAMES = {"speed": "/catvehicle/vel", "scan": "/catvehicle/front_laser_points
 OTHER_CAR = "of another car"
 USUAL_NAME = "a usual name"
 NO_PUBLISHER = "no node publishes it"
+
+MOST_OPTIONS = 12
+ORDER = ("scan", "speed", "position", "odometry")  # the most urgent first
+_NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
+_KINDS = {
+    "scan": ("lasers", "which looks ahead?"),
+    "speed": ("sources of speed", "which is the car's?"),
+    "odometry": ("odometries", "which is the car's?"),
+    "position": ("GPS receivers", "which is the car's?"),
+    "mode": ("reports of the driving mode", "which is the car's?"),
+    "diagnostics": ("topics of diagnostics", "which is the car's?"),
+}
+_OTHER = ("topics", "which is the car's?")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,6 +206,34 @@ def what_is_known(one: Candidate, signal: str, evidence: Evidence) -> str:
     return ", ".join(words)
 
 
-__all__ = [
-    "COMMAND", "Candidate", "Pools", "cars_of", "follow", "named_first", "pools_of", "to_compare", "what_is_known",
-]  # fmt: skip
+def counted(count: int, what: str) -> str:
+    """ "Two lasers", "12 lasers"."""
+    return f"{_NUMBERS[count] if count < len(_NUMBERS) else count} {what}"
+
+
+def title(signal: str, among: Sequence[Candidate]) -> str:
+    """What there are several of: "Two lasers"."""
+    is_odometry = signal == "speed" and all(one.plain_type == "nav_msgs/Odometry" for one in among)
+    return counted(len(among), "odometries" if is_odometry else _KINDS.get(signal, _OTHER)[0])
+
+
+def question(signal: str, among: Sequence[Candidate], known: Mapping[str, str], cars: Sequence[str] = ()) -> Question:
+    """The question which of the candidates carries a signal. `known`: topic → what is known of it; `cars`: the
+    namespaces of several cars, of which one is asked for."""
+    if cars:
+        last = f"{len(cars) - 3} more" if len(cars) > 4 else cars[-1]
+        named = f"{', '.join(cars[: 3 if len(cars) > 4 else len(cars) - 1])} and {last}"
+        words = f"{counted(len(cars), 'cars')}: {named}: which is this?"
+    elif signal == "speed" and title(signal, among).endswith("odometries"):
+        words = f"{title(signal, among)}: which is the car's speed?"
+    else:
+        words = f"{title(signal, among)}: {_KINDS.get(signal, _OTHER)[1]}"
+    return {
+        "signal": signal,
+        "kind": "source",
+        "words": words,
+        "options": [
+            {"value": one.topic, "label": one.topic, "why": known.get(one.topic, "")} for one in among[:MOST_OPTIONS]
+        ],
+        "options_count": len(among),
+    }

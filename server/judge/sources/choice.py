@@ -13,7 +13,7 @@ from server.judge.frame_words import is_earth_fixed
 from server.judge.signals import TOPICS
 from server.judge.signals.odometry import pose_only
 from server.judge.signals.speed import way_made, way_made_stamped
-from server.judge.sources import questions
+from server.judge.sources import candidates
 from server.judge.sources.candidates import (
     MOST_COMPARED,
     OTHER_CAR,
@@ -152,7 +152,7 @@ class _Chooser:
         if self._cars:
             inside = [one for one in pool if namespace_of(one.topic, self._cars) is not None]
             if inside and self._car is None:
-                return _Open(why=f"{_lower(questions.counted(len(self._cars), 'cars'))}, none chosen", among=inside)
+                return _Open(why=f"{_lower(candidates.counted(len(self._cars), 'cars'))}, none chosen", among=inside)
             own = [one for one in inside if self._car is not None and is_within(one.topic, self._car)]
             pool = own or [one for one in pool if one not in inside]
         readable = [one for one in pool if one.is_readable]
@@ -187,7 +187,7 @@ class _Chooser:
         kept = next((one for one in found if one.topic == self._in_use.get(signal)), None)
         if kept is not None:
             return kept.source(signal, why="in use since before the others came")
-        return _Open(why=f"{_lower(questions.title(signal, found))}, none chosen", among=found)
+        return _Open(why=f"{_lower(candidates.title(signal, found))}, none chosen", among=found)
 
     def _speed(self, found: list[Candidate]) -> Source | _Open:
         """What is zero while the car moves is taken only if nothing but a receiver says so, and there is no other."""
@@ -248,7 +248,7 @@ class _Chooser:
             return used.source("scan", why="in use; no evidence against it")
         if not evidence.is_settled:
             return _Open(why="lasers are being compared", among=order)
-        return _Open(why=f"{_lower(questions.title('scan', found))}, none chosen", among=order)
+        return _Open(why=f"{_lower(candidates.title('scan', found))}, none chosen", among=order)
 
     def _of_pick(self, signal: str, topic: str) -> Source | _Open:
         kind = self._offered.get(topic)
@@ -289,14 +289,14 @@ class _Chooser:
         is_asked: set[str] = set()  # topics of the questions so far
         if self._cars and self._is_car_assumed:
             return (self._question_of_cars(),)
-        for signal in sorted(opened, key=lambda name: questions.ORDER.index(name) if name in questions.ORDER else 99):
+        for signal in sorted(opened, key=lambda name: candidates.ORDER.index(name) if name in candidates.ORDER else 99):
             among = opened[signal].among
             if not among:
                 continue
             if signal == "odometry" and {one.topic for one in among} <= is_asked:
                 continue  # the answer for the speed answers this too
             is_asked |= {one.topic for one in among}
-            asked.append(questions.question(signal, among, self._known(signal, among)))
+            asked.append(candidates.question(signal, among, self._known(signal, among)))
         return tuple(asked)
 
     def _question_of_cars(self) -> Question:
@@ -308,10 +308,10 @@ class _Chooser:
         }
         signal = max(by_signal, key=lambda name: len({namespace_of(o.topic, self._cars) for o in by_signal[name]}))
         among = by_signal[signal]
-        return questions.question(signal, among, self._known(signal, among), self._cars)
+        return candidates.question(signal, among, self._known(signal, among), self._cars)
 
     def _known(self, signal: str, among: Sequence[Candidate]) -> dict[str, str]:
-        return {one.topic: what_is_known(one, signal, self._evidence) for one in among[: questions.MOST_OPTIONS]}
+        return {one.topic: what_is_known(one, signal, self._evidence) for one in among[: candidates.MOST_OPTIONS]}
 
     def _reasons(self, sources: Mapping[str, Source]) -> dict[str, dict[str, str]]:
         """What speaks for and against each candidate."""

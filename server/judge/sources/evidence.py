@@ -10,11 +10,19 @@ from monitor.values import LaserScan
 from server.judge.message_fields import Rejected, inner, number, stamp_s, text
 from server.judge.signals.scan import laser_scan
 from server.judge.signals.speed import SIDEWAYS
-from server.judge.sources.motion import FIX_MPS, MOVES_MPS, least_way_m
-from server.judge.sources.pictures import picture_of, see_the_same
+from server.judge.sources.motion import (
+    FIX_MPS,
+    GAP_S,
+    MOVES_MPS,
+    course_rad,
+    east_north_m,
+    is_same,
+    least_way_m,
+    metres_between,
+    turned,
+)
 from server.judge.sources.source import plain_type
-from server.judge.sources.topic_evidence import FIXES_S, ODOMETRY, TopicEvidence
-from server.judge.sources.ways import GAP_S, course_rad, east_north_m, is_same, metres_between, turned
+from server.judge.sources.topic_evidence import FIXES_S, ODOMETRY, TopicEvidence, picture_of, see_the_same
 
 MOST_TOPICS = 64
 SAME_TIME_S = 0.3  # two messages so near in time are compared

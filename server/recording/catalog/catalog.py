@@ -1,7 +1,7 @@
 """The catalog of recordings: files, annotations, and the trash.
 
 The files are authoritative; the database is a cache that is rebuilt if it is lost. A file is surveyed by a
-process of its own (survey_worker.py), so that the event loop never waits for one; until then it is listed by its name.
+process of its own (survey_task.py), so that the event loop never waits for one; until then it is listed by its name.
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from server.protocol.answers import Recording, RecordingNames, Total, Verificati
 from server.protocol.logbook import LogbookDrive
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.catalog_db import Entry, Which
-from server.recording.catalog.entries import Entries
-from server.recording.catalog.errors import Refused
+from server.recording.catalog.entries import Entries, Refused
 from server.recording.catalog.folder_listing import FolderListing
 from server.recording.catalog.rows import Page, page_of, row_of
 from server.recording.catalog.survey_task import SurveyTask

@@ -1,4 +1,4 @@
-"""What is known of each file, shared by the threads that list, read, move and show recordings."""
+"""What is known of each file, shared by the threads that list, read, move and show recordings; and their refusals."""
 
 from __future__ import annotations
 
@@ -15,6 +15,14 @@ from server.recording.catalog import catalog_db
 from server.recording.catalog.catalog_db import COLUMNS, Entry, Which
 
 log = logging.getLogger("catgraph.catalog")
+
+
+class NotThere(Exception):
+    """No such recording. The text is one sentence."""
+
+
+class Refused(Exception):
+    """It cannot be done now. The text is one sentence."""
 
 
 class Entries:

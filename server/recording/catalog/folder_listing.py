@@ -10,8 +10,7 @@ from pathlib import Path
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.catalog_db import Entry
 from server.recording.catalog.discovery import TRASH, files_below, files_of, id_of, shape_of, started_ms_of, vehicle_of
-from server.recording.catalog.entries import Entries
-from server.recording.catalog.errors import NotThere
+from server.recording.catalog.entries import Entries, NotThere
 from server.recording.catalog.survey import VERSION
 
 GROWS_MS = 120_000  # a file that changed this recently may still be copied

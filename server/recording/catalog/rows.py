@@ -15,8 +15,7 @@ from server.recording.catalog import catalog_db
 from server.recording.catalog.annotations import LATE
 from server.recording.catalog.catalog_db import Entry, Which
 from server.recording.catalog.discovery import SEVERAL
-from server.recording.catalog.entries import Entries
-from server.recording.catalog.errors import Refused
+from server.recording.catalog.entries import Entries, Refused
 from server.recording.catalog.verifications import Verifications
 from server.recording.folder import DAMAGED, FINISHED, FOLDER
 

@@ -17,7 +17,7 @@ import orjson
 
 from server.protocol.answers import VerificationAnswer
 from server.recording.catalog.catalog_db import Entry
-from server.recording.catalog.errors import Refused
+from server.recording.catalog.entries import Refused
 
 log = logging.getLogger("catgraph.catalog")
 

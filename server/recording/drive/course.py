@@ -6,7 +6,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from typing import Any
 
-from server.protocol.drive_course import Course, CourseEvent, CoursePoints
+from server.protocol.logbook import Course, CourseEvent, CoursePoints
 from server.protocol.marks import DriveMark
 from server.recording.drive.facts import DriveFacts
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from server.recording.export.export_format import ExportRefused, Progress, nothing
 from server.recording.export.formats import FORMATS
-from server.recording.export.outcome import ExportRefused, Progress, nothing
 from server.recording.export.worker import Made, run_worker
 
 __all__ = ["ExportRefused", "Made", "make_export"]

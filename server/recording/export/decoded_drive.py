@@ -14,7 +14,7 @@ from server.judge.reception_stats import Reception
 from server.judge.topics import Source
 from server.judge.units import Unit
 from server.recording.event_channels import read_recorded_events
-from server.recording.export.outcome import Progress, nothing
+from server.recording.export.export_format import Progress, nothing
 from server.recording.read.read import Recording
 
 REPORT_EVERY = 1000  # messages

@@ -21,8 +21,8 @@ from typing import Any
 from server.protocol.answers import ExportJob, ExportState
 from server.recording.catalog import annotations as annotation_store
 from server.recording.export.clip import Window
+from server.recording.export.export_format import ExportRefused
 from server.recording.export.formats import CLIP, FORMATS
-from server.recording.export.outcome import ExportRefused
 from server.recording.export.worker import Made, run_worker
 from server.recording.folder import FINISHED, WRITING, RecordingsFolder, id_of, is_id
 from server.recording.space import why

@@ -13,7 +13,7 @@ from typing import Any
 
 import orjson
 
-from server.recording.export.outcome import ExportRefused, NothingRecorded, Progress
+from server.recording.export.export_format import ExportRefused, NothingRecorded, Progress
 
 log = logging.getLogger("catgraph.export")
 

@@ -15,16 +15,14 @@ from mcap.records import ChunkIndex, Statistics
 from server.judge.message import RosVersion
 from server.recording.mcap.chunk_rows import EVERYWHERE, ChunkRow, chunk_rows, in_order, run_rows
 from server.recording.mcap.chunks import MAGIC
-from server.recording.mcap.part_times import arrivals_of, corrected_parts
-from server.recording.mcap.scan import Index, Part, by_name, scan
+from server.recording.mcap.scan import Index, Part, arrivals_of, by_name, corrected_parts, scan
 from server.recording.own import METADATA, PREFIX
+from server.recording.read.bag2_metadata import is_latched
 from server.recording.read.clock_steps import PLACES_A_PART, Arrivals, Stretch
-from server.recording.read.compressed_messages import PACKED, unpacked_rows
 from server.recording.read.errors import RecordingUnreadable
-from server.recording.read.qos import is_latched
 from server.recording.read.source import UNDECLARED, Channel, Damage, DefinitionFormat
 from server.recording.read.temporary_copy import TemporaryCopy
-from server.recording.read.unpack import PartTooLarge
+from server.recording.read.unpack import PACKED, PartTooLarge, unpacked_rows
 
 _FORMATS: dict[str, DefinitionFormat] = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
 _INDEX_HEAD = 9 + 2 + 4  # bytes of a message index's record besides its entries

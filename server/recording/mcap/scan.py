@@ -1,12 +1,16 @@
-"""Makes the index of an MCAP file from its records, for files whose own index is missing, incomplete or cut off."""
+"""Makes the index of an MCAP file from its records, for files whose own index is missing, incomplete or cut off.
+
+The times of the file's parts are in the order in which the messages were written, and corrected.
+"""
 
 from __future__ import annotations
 
 import os
 import struct
+from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from typing import IO, Any
 
@@ -17,7 +21,7 @@ from mcap.records import AttachmentIndex, Channel, Header, Metadata, Schema
 
 from server.recording.mcap.chunk_rows import read_chunk
 from server.recording.mcap.chunks import HEAD_BYTES, MAGIC
-from server.recording.read.clock_steps import PLACES_A_PART, Arrivals
+from server.recording.read.clock_steps import PLACES_A_PART, Arrivals, Stretch
 from server.recording.read.unpack import verified
 
 RUN_BYTES = 1 << 20  # messages outside of chunks are read in runs of about this size
@@ -28,6 +32,8 @@ _MESSAGE = struct.Struct("<HIQ")  # channel, sequence, log time [ns]
 _MESSAGE_BYTES = 22  # before the data of a message
 _ATTACHMENT_HEAD = 4096  # bytes in which name and media type of an attachment are
 _TIMES = struct.Struct("<QQ")  # of a chunk: first and last message [ns]
+
+_INDEX_HEAD = struct.Struct("<BQHI")  # of a message index: opcode, length, channel, bytes of its entries
 
 
 @dataclass(slots=True, kw_only=True)
@@ -268,3 +274,60 @@ def _records(data: bytes) -> Iterator[tuple[int, int, int]]:
 def by_name(metadata: list[Metadata], name: str) -> Mapping[str, str]:
     """The last metadata record of a name; empty: there is none."""
     return next((dict(record.metadata) for record in reversed(metadata) if record.name == name), {})
+
+
+def arrivals_of(file: IO[bytes], parts: Sequence[Part]) -> Iterator[Arrivals]:
+    """The messages of each part, in the order of the file. Raises OSError."""
+    for number, part in enumerate(sorted(parts, key=lambda part: part.at)):
+        found = part.arrivals or _indexed(file, part)
+        if found is not None:
+            yield Arrivals(found.places + number * PLACES_A_PART, found.times_ns, found.channels)
+
+
+def _indexed(file: IO[bytes], part: Part) -> Arrivals | None:
+    """The messages of a chunk by its message indexes; None where these are damaged."""
+    file.seek(part.index_at)
+    data = file.read(part.index_bytes)
+    entries, channels, counts = [], [], []
+    at = 0
+    while at + _INDEX_HEAD.size <= len(data):
+        opcode, length, channel, size = _INDEX_HEAD.unpack_from(data, at)
+        if opcode != Opcode.MESSAGE_INDEX or size + 6 != length or size % 16:
+            return None
+        entries.append(data[at + _INDEX_HEAD.size : at + _INDEX_HEAD.size + size])
+        channels.append(channel)
+        counts.append(size // 16)
+        at += 9 + length
+    joined = b"".join(entries)
+    if not joined or at != len(data) or len(joined) != 16 * sum(counts):
+        return None
+    table = np.minimum(np.frombuffer(joined, "<u8"), LATEST_NS).astype(np.int64).reshape(-1, 2)
+    order = np.argsort(table[:, 1], kind="stable")
+    numbers = np.repeat(np.array(channels, np.int64), counts)
+    return Arrivals(places=table[order, 1], times_ns=table[order, 0], channels=numbers[order])
+
+
+def corrected_parts(parts: Sequence[Part], stretches: Sequence[Stretch]) -> list[Part]:
+    """The parts with the corrections of their times; one in which the clock was set becomes several."""
+    starts = [one.place for one in stretches]
+    found = []
+    for number, part in enumerate(sorted(parts, key=lambda part: part.at)):
+        origin = number * PLACES_A_PART
+        first = max(bisect_right(starts, origin) - 1, 0)
+        behind = max(bisect_left(starts, origin + PLACES_A_PART), first + 1)
+        for place, one in enumerate(stretches[first:behind], first):
+            is_inner = behind - first > 1
+            first_ns, last_ns = part.message_start_time, part.message_end_time
+            if is_inner:
+                first_ns, last_ns = max(first_ns, one.first_ns), min(last_ns, one.last_ns)
+            found.append(
+                replace(
+                    part,
+                    message_start_time=first_ns + one.shift_ns,
+                    message_end_time=last_ns + one.shift_ns,
+                    shift_ns=one.shift_ns,
+                    from_place=max(one.place - origin, 0) if place > first else 0,
+                    to_place=stretches[place + 1].place - origin if place + 1 < behind else PLACES_A_PART,
+                )
+            )
+    return found

@@ -12,12 +12,12 @@ from urllib.parse import quote
 import numpy as np
 
 from server.judge.message import RosVersion
+from server.recording.read.bag2_metadata import is_latched
 from server.recording.read.clock_steps import BACK_NS, GAP_NS, Arrivals, Stretch
-from server.recording.read.compressed_messages import PACKED, unpacked
 from server.recording.read.errors import RecordingUnreadable
-from server.recording.read.qos import is_latched
 from server.recording.read.source import Channel, Damage, DefinitionFormat
 from server.recording.read.temporary_copy import TemporaryCopy
+from server.recording.read.unpack import PACKED, unpacked
 
 _FORMATS: dict[str, DefinitionFormat] = {"ros2msg": "msg", "ros2idl": "idl"}
 _LOGS = ("-wal", "-journal")  # what SQLite leaves beside a database that was not closed

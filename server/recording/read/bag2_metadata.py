@@ -2,6 +2,10 @@
 
 The files themselves say what they hold. Counts and times of the metadata are those of a recorder that ended well, and
 are not used.
+
+The quality of service of a topic is read as every version of rosbag2 writes it. Sources: `offered_qos_profiles` is YAML
+text up to metadata version 8 and a list from 9 on; policies are the numbers of `rmw_qos_durability_policy_t`
+(rmw/types.h) or, from version 9 on, their names.
 """
 
 from __future__ import annotations
@@ -23,6 +27,9 @@ NAME = "metadata.yaml"
 MOST_METADATA = 2 << 20  # bytes: a thousand topics
 DEEPEST = 30
 MOST_ENTRIES = 100_000
+
+MOST_QOS = 64 << 10  # letters, of one topic
+_TRANSIENT_LOCAL = ("1", "transient_local")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,3 +92,22 @@ def why_not_plain(text: str) -> str | None:
     except (YAMLError, ValueError):
         return None
     return None
+
+
+def is_latched(offered: Any) -> bool:
+    """Whether a publisher kept its last message for late subscribers. What cannot be understood is not known: False."""
+    if isinstance(offered, str):
+        return _is_latched_text(offered)
+    profiles = [offered] if isinstance(offered, dict) else offered if isinstance(offered, list) else []
+    return any(isinstance(one, dict) and str(one.get("durability")).lower() in _TRANSIENT_LOCAL for one in profiles)
+
+
+@lru_cache(maxsize=64)  # topics have a few kinds of quality of service
+def _is_latched_text(text: str) -> bool:
+    if not text.strip() or len(text) > MOST_QOS or why_not_plain(text) is not None:
+        return False
+    try:
+        found = YAML(typ="safe", pure=True).load(text)
+    except Exception:  # the parser raises many exception types on what is not YAML
+        return False
+    return not isinstance(found, str) and is_latched(found)

@@ -1,14 +1,18 @@
-"""Single topics of a file, for what is to be known before it is read: nothing is counted as lost by it."""
+"""Single topics of a file, for what is to be known before it is read: nothing is counted as lost by it.
+
+Types of topics that were recorded without one, from a bridge that names none, are known in this way.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 
+from server.judge import shapes
 from server.judge.message import Json
 from server.recording.read.decode import Decode
 from server.recording.read.errors import Undecodable
-from server.recording.read.source import Damage, FileSource
+from server.recording.read.source import Channel, Damage, FileSource
 
 
 def beforehand(
@@ -25,3 +29,11 @@ def beforehand(
         raise
     except Exception:  # a damaged file makes the readers fail in every way there is
         return
+
+
+def type_of_first(source: FileSource, channel: Channel, decode: Decode) -> str:
+    """The type of a channel by the fields of its first message, as live; "": none is known."""
+    for _, topic, _, message in beforehand(source, {channel.number: (channel.topic, "", decode)}):
+        found = shapes.type_of(message, topic) or shapes.type_by_fields(message)
+        return found if source.ros_version == 1 else found.replace("/", "/msg/")
+    return ""

@@ -7,7 +7,7 @@ ROS 2: OMG CDR 1.0 (DDSI-RTPS 10: a 4-byte header, then each primitive aligned t
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 
 from server.judge.message import RosVersion
-from server.recording.read.definition_bounds import demand_few_fields
+from server.recording.read.definitions import demand_few_fields
 from server.recording.read.errors import Undecodable
 
 Decode = Callable[[bytes], dict[str, Any]]
@@ -43,6 +43,36 @@ _ROS1_TIMES = {
 _PLACEHOLDER = "structure_needs_at_least_one_member"  # how ROS 2 writes a message without fields; no field of anybody's
 _MISTAKES = (struct.error, ValueError, OverflowError, MemoryError)
 _DEEPEST = 32  # levels of messages in messages: a definition that contains itself never ends
+
+
+def sifted(decode: Decode, topic: str, topics: Collection[str] | None) -> Decode:
+    """Leaves out what is not wanted: decoding is most of the work of reading a recording.
+
+    The decoder of a topic's messages where only `topics` are wanted (None: all); what is not is empty.
+
+    With `topics` as a mapping, those are wanted whose bytes hold one of the words of their topic (None: all); the words
+    may change while they are read.
+    """
+    if topics is None:
+        return decode
+    if topic not in topics:
+        return _nothing
+    words: Collection[bytes] | None = topics[topic] if isinstance(topics, Mapping) else None
+    return decode if words is None else _sifting(decode, words)
+
+
+def _sifting(decode: Decode, words: Collection[bytes]) -> Decode:
+    def decode_some(raw: bytes) -> dict[str, Any]:
+        for word in words:
+            if word in raw:
+                return decode(raw)
+        return {}
+
+    return decode_some
+
+
+def _nothing(raw: bytes) -> dict[str, Any]:
+    return {}
 
 
 def compile_decoder(type: str, definitions: dict[str, Any], version: RosVersion) -> Decode:

@@ -17,7 +17,7 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 
 from server.judge.message import RosVersion
-from server.recording.read.definition_bounds import demand_few_fields
+from server.recording.read.definitions import demand_few_fields
 from server.recording.read.errors import Undecodable
 
 Encode = Callable[[Any], bytes]
@@ -47,7 +47,6 @@ _DEEPEST = 32
 _NAN = float("nan")
 _CDR_HEADER = b"\x00\x01\x00\x00"  # plain CDR, little-endian
 _MISTAKES = (struct.error, ValueError, TypeError, KeyError, OverflowError, AttributeError)
-
 
 _Kind = tuple[str, np.dtype[Any], str]  # typecode of array, dtype of numpy, name
 

@@ -16,18 +16,14 @@ import orjson
 from server.judge.message import Json, Message, RosVersion
 from server.recording.mcap.mcap_file import McapFile
 from server.recording.own import PREFIX
-from server.recording.read.beforehand import beforehand
-from server.recording.read.decode import Decode, compile_decoder
+from server.recording.read.beforehand import beforehand, type_of_first
+from server.recording.read.decode import Decode, compile_decoder, sifted
 from server.recording.read.definitions import definition_of, definitions_of
 from server.recording.read.errors import NoRoom, RecordingUnreadable, Undecodable
-from server.recording.read.open_file import open_file
-from server.recording.read.recognise import Found, FoundRecording, by_name, recognise
-from server.recording.read.sift import sifted
-from server.recording.read.source import Channel, Damage, FileSource, why_not_decoded
+from server.recording.read.recognise import Found, FoundRecording, by_name, open_file, recognise
+from server.recording.read.source import Channel, Damage, FileSource, Stream, in_time_order, why_not_decoded
 from server.recording.read.steady_time import ClockStep, make_steady, notes_on
-from server.recording.read.time_order import Stream, in_time_order
 from server.recording.read.unpack import PartTooLarge
-from server.recording.read.untyped import type_of_first
 
 __all__ = ["Recording", "RecordingUnreadable", "TopicInfo", "open_recording"]
 

@@ -1,4 +1,4 @@
-"""Finds the files of a recording, recognizes each by its first bytes, and describes it if it is not a recording."""
+"""Finds the files of a recording, recognizes each by its first bytes, and opens it or describes what else it is."""
 
 from __future__ import annotations
 
@@ -10,10 +10,16 @@ from typing import IO, Literal
 
 import zstandard
 
+from server.recording.mcap.mcap_file import McapFile
+from server.recording.read import rosbag1_truncated
+from server.recording.read.bag2_database import Bag2Database
 from server.recording.read.bag2_metadata import NAME as METADATA
-from server.recording.read.bag2_metadata import BagMetadata, read_metadata
-from server.recording.read.compressed_messages import PACKED as _ZSTD
+from server.recording.read.bag2_metadata import BagMetadata, is_latched, read_metadata
 from server.recording.read.errors import RecordingUnreadable
+from server.recording.read.rosbag1 import Bag1
+from server.recording.read.source import FileSource
+from server.recording.read.temporary_copy import TemporaryCopy
+from server.recording.read.unpack import PACKED as _ZSTD
 
 Kind = Literal["bag", "mcap", "db3"]
 PACKED_SUFFIX = ".zstd"  # behind the ending of a file that is packed as a whole
@@ -191,3 +197,32 @@ def _in_words(start: bytes) -> str:
     if all(letter.isprintable() or letter.isspace() for letter in text):
         return "a text file"
     return "neither a ROS 1 bag nor an MCAP or db3 file"
+
+
+def open_file(found: Found) -> FileSource:
+    """The open file. Raises RecordingUnreadable, MemoryError, and whatever damage makes the readers raise."""
+    path = found.path
+    if found.kind == "bag":
+        return rosbag1_truncated.CutBag1(path) if rosbag1_truncated.is_cut(path) else Bag1(path)
+    copy = TemporaryCopy() if found.is_packed else None
+    try:
+        content, is_whole = copy.unpack(path) if copy is not None else (path, True)
+        source: McapFile | Bag2Database
+        if found.kind == "mcap":
+            source = McapFile(path, content=content, copy=copy)
+        elif is_whole:
+            source = Bag2Database(path, content=content, copy=copy)
+        else:
+            raise RecordingUnreadable(f"{path} is not complete: it ends too early")
+    except BaseException:
+        if copy is not None:
+            copy.close()
+        raise
+    if found.bag is not None:
+        latched = {topic for topic, offered in found.bag.qos.items() if is_latched(offered)}
+        source.is_listed = True
+        source.distro = source.distro or found.bag.distro
+        source.channels = [
+            replace(channel, is_latched=True) if channel.topic in latched else channel for channel in source.channels
+        ]
+    return source

@@ -12,7 +12,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from server.judge.message import RosVersion
-from server.recording.read.definition_bounds import bounded
+from server.recording.read.definitions import bounded
 from server.recording.read.encode import Encode, compile_encoder
 
 MAX_DEFINITION = 256 * 1024  # letters; the longest of the standard ones has 7 000

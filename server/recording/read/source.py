@@ -1,11 +1,12 @@
-"""What every kind of recording file offers its reader."""
+"""What every kind of recording file offers its reader, and the rows of several files in the order of time."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import heapq
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Any, Generic, Literal, Protocol, TypeVar
 
 from server.judge.message import RosVersion
 from server.recording.read.clock_steps import FIRST_NS, LAST_NS, Arrivals, Stretch
@@ -14,6 +15,8 @@ from server.recording.read.unpack import PartTooLarge
 DefinitionFormat = Literal["none", "msg", "idl"]
 LEAST_SLACK_NS = 3600 * 10**9  # by which a damaged part can be before or behind what is whole
 UNDECLARED = ""  # the encoding of messages whose channel the file does not declare
+
+R = TypeVar("R")
 
 
 def why_not_decoded(encoding: str) -> str:
@@ -133,3 +136,33 @@ class FileSource(Protocol):
         ...
 
     def close(self) -> None: ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stream(Generic[R]):
+    """The rows of one file, in order."""
+
+    start_ns: int
+    end_ns: int
+    rows: Iterable[R]
+
+
+def in_time_order(streams: Sequence[Stream[R]], time_of: Callable[[R], Any]) -> Iterator[R]:
+    """All rows in order. Parts of a split recording follow each other, so that one is read behind the other; only
+    files that overlap are merged, which takes longer for each row."""
+    for group in _overlapping(streams):
+        rows = [stream.rows for stream in group]
+        yield from rows[0] if len(rows) == 1 else heapq.merge(*rows, key=time_of)
+
+
+def _overlapping(streams: Sequence[Stream[R]]) -> list[list[Stream[R]]]:
+    groups: list[list[Stream[R]]] = []
+    end_ns = 0
+    for stream in sorted(streams, key=lambda one: one.start_ns):
+        if groups and stream.start_ns <= end_ns:
+            groups[-1].append(stream)
+            end_ns = max(end_ns, stream.end_ns)
+        else:
+            groups.append([stream])
+            end_ns = stream.end_ns
+    return groups

@@ -1,19 +1,28 @@
-"""Unpacks one part of a recording, and never more of it than fits."""
+"""Unpacks one part or message of a recording, and never more of it than fits.
+
+rosbag2 may compress messages one by one (`--compression-mode message`). Nothing in a bag's file says so, only
+`metadata.yaml` beside it, which a copy may lack. A message in CDR begins with a zero byte, so that the first bytes of a
+zstd frame cannot be confused with one.
+"""
 
 from __future__ import annotations
 
 import bz2
 import zlib
+from collections.abc import Container, Sequence
 from typing import Any
 
 import lz4.frame
 import zstandard
 
-from server.system.memory_limit import free_bytes
+from server.system.process_limits import free_bytes
 
 MOST_BYTES = 1 << 30  # of one part, unpacked; recorders write 1 MB, and one message is hardly ever larger than 100 MB
 UNASKED_BYTES = 16 << 20  # below this size the free memory is not checked
 FREE_PART = 0.25  # of the free memory, for one part
+
+PACKED = b"\x28\xb5\x2f\xfd"  # begins a zstd frame
+Row = tuple[int, int, bytes]  # ns, channel, message
 
 
 class PartTooLarge(Exception):
@@ -90,3 +99,32 @@ def _zstd(packed: bytes, size: int) -> bytes:
     if declared >= 0 and declared != size:  # the declared size is reserved before unpacking
         raise ValueError("another size than it says")
     return zstandard.ZstdDecompressor().decompress(packed, max_output_size=max(1, size))
+
+
+def unpacked_rows(rows: Sequence[Row], channels: Container[int]) -> tuple[list[Row], int]:
+    """The rows with the packed messages of these channels unpacked, and how many could not be.
+
+    Raises PartTooLarge and MemoryError.
+    """
+    found, lost = [], 0
+    for row in rows:
+        time_ns, channel, raw = row
+        if raw[:4] != PACKED or channel not in channels:
+            found.append(row)
+            continue
+        message = unpacked(raw)
+        if message is None:
+            lost += 1
+        else:
+            found.append((time_ns, channel, message))
+    return found, lost
+
+
+def unpacked(raw: bytes) -> bytes | None:
+    """A packed message; None where it is damaged. Raises PartTooLarge and MemoryError."""
+    try:
+        return unpack_message(raw)
+    except (PartTooLarge, MemoryError):
+        raise
+    except (ValueError, EOFError, RuntimeError, zstandard.ZstdError):
+        return None

@@ -10,8 +10,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from server.recording.export.clip import AFTER_S, BEFORE_S
+from server.recording.export.export_format import ExportRefused, NothingRecorded, nothing
 from server.recording.export.formats import CLIP
-from server.recording.export.outcome import ExportRefused, NothingRecorded, nothing
 from server.recording.export.worker import Made, run_worker
 
 _POLL_S = 0.2

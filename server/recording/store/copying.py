@@ -16,11 +16,10 @@ from server.protocol.answers import Recording
 from server.recording.catalog.annotations import NONE, Annotations
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.discovery import why_not_one_file
-from server.recording.catalog.errors import NotThere, Refused
+from server.recording.catalog.entries import NotThere, Refused
 from server.recording.store import names, row, said
 from server.recording.store.clips import ClipMaker
-from server.recording.store.object_store import FileChanged, ObjectStore
-from server.recording.store.pace import Pace
+from server.recording.store.object_store import FileChanged, ObjectStore, Pace
 from server.recording.store.plan import is_another
 from server.recording.store.rules import moments_of
 from server.recording.store.said import Said

@@ -8,7 +8,7 @@ from typing import Literal
 
 from server.protocol.answers import Recording
 from server.recording.catalog.catalog import Catalog
-from server.recording.catalog.errors import Refused
+from server.recording.catalog.entries import Refused
 from server.recording.store.row import digest_of
 from server.recording.store.rules import CLIP_PRIORITIES, Situation, StoreRule
 from server.recording.store.uploads import Upload, Uploads

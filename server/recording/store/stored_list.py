@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from server.protocol.answers import StoredList
-from server.recording.catalog.errors import NotThere, Refused
+from server.recording.catalog.entries import NotThere, Refused
 from server.recording.store import names, row
 from server.recording.store.object_store import Found, ObjectStore
 from server.recording.store.row import BadRow, RowPart, StoredRow

@@ -15,12 +15,11 @@ from typing import Literal
 from server.protocol.answers import Recording, StoredCopy, StoreFacts
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.discovery import why_not_one_file
-from server.recording.catalog.errors import NotThere, Refused
+from server.recording.catalog.entries import NotThere, Refused
 from server.recording.folder import FOLDER
 from server.recording.store.clips import ClipMaker
 from server.recording.store.copying import ANOTHER, Copying, FileChanged, NotTheSame
-from server.recording.store.object_store import ObjectStore
-from server.recording.store.pace import Pace
+from server.recording.store.object_store import ObjectStore, Pace
 from server.recording.store.plan import Job, Plan, backoff_ms, is_another, is_deletion_due
 from server.recording.store.rules import Situation, WholeFiles, is_interface_up, why_not_whole
 from server.recording.store.trouble import StoreTrouble

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from server.storage.set_aside import set_aside
+from server.storage.durable_file import set_aside
 
 log = logging.getLogger("catgraph.store")
 

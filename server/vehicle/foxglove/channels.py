@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from server.rosbridge.link_errors import CallFailed
+from server.rosbridge.live_source import CallFailed
 from server.vehicle.foxglove.protocol import Channel, GraphUpdate
 
 UNKNOWN_NODE = "unknown node"  # who publishes what is offered, where the server lists no nodes

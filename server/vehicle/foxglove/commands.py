@@ -9,8 +9,8 @@ from typing import Any
 from server.judge.message import RosVersion
 from server.recording.read.encode import TypeMismatch
 from server.recording.read.schemas import Schema, TypeBook
-from server.rosbridge.link_errors import LinkDown
-from server.rosbridge.message_bytes import json_bytes
+from server.rosbridge.codec import json_bytes
+from server.rosbridge.live_source import LinkDown
 from server.rosbridge.outgoing import NotAllowed, Outgoing
 from server.vehicle.foxglove import protocol
 from server.vehicle.foxglove.protocol import Channel, ServerInfo

@@ -10,20 +10,17 @@ from server.rosbridge import connection_errors
 from server.rosbridge.address import Address
 from server.rosbridge.connection_errors import Problem
 from server.rosbridge.dialer import Dialer
-from server.rosbridge.link_errors import LinkDown, NoWebSocket
-from server.rosbridge.link_listener import NOTE, LinkListener, Marks
+from server.rosbridge.link_listener import NOTE, LinkListener, Marks, SafeCalls
+from server.rosbridge.live_source import LinkDown, NoWebSocket
 from server.rosbridge.raw_frame import RawFrame
-from server.rosbridge.safe_calls import SafeCalls
 from server.rosbridge.subscription import Subscription
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES, BridgeProtocol
 from server.system.clean_text import short_text
 from server.vehicle.foxglove import protocol
-from server.vehicle.foxglove.answers import Answers
 from server.vehicle.foxglove.channels import MAX_OFFERED
 from server.vehicle.foxglove.delay import Delay
-from server.vehicle.foxglove.reader_table import ReaderTable
-from server.vehicle.foxglove.server_state import ServerState
-from server.vehicle.foxglove.subscribed import Subscribed
+from server.vehicle.foxglove.readers import ReaderTable
+from server.vehicle.foxglove.server_state import Answers, ServerState, Subscribed
 
 LAST_WORD_S = 0.2
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from server.protocol.check_state import CheckAnswer
+from server.protocol.alarm_state import CheckAnswer
 from server.protocol.http_answers import AlarmList, EventList
 from server.web.routes.session_request import OF_VEHICLE, ReplayToken, VehicleName, as_json, ask, ask_either, vehicle_of
 from server.web.services import services

@@ -10,10 +10,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from server.access.access import NotPaired
 from server.access.access import this_task as answering
+from server.access.credentials import TICKET_LASTS_S as TICKET_LASTS_S
 from server.access.devices import Device
 from server.access.identity import Principal, Role, principal_of
 from server.access.invitations import LASTS_S
-from server.access.tickets import LASTS_S as TICKET_LASTS_S
 from server.protocol.answers import DeviceList, DeviceRow
 from server.system.loopback import is_loopback
 from server.web.interface import raises

@@ -11,8 +11,7 @@ from fastapi import APIRouter, HTTPException, Query, Request, Response
 from fastapi import Path as InPath
 
 from server.bus.event_table import safe_cell
-from server.protocol.drive_course import Course
-from server.protocol.logbook import LogbookAnswer, LogbookDrive
+from server.protocol.logbook import Course, LogbookAnswer, LogbookDrive
 from server.recording.catalog.catalog_db import Which
 from server.recording.drive.logbook import logbook
 from server.recording.export.formats.csv_zip import when

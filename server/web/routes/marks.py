@@ -10,7 +10,7 @@ from fastapi import APIRouter, HTTPException, Request, Response
 from fastapi import Path as InPath
 from pydantic import Field
 
-from server.protocol.mark_commands import MARK
+from server.protocol.drive_commands import MARK
 from server.protocol.marks import DriveMark, MarkList
 from server.recording.marks import media
 from server.recording.marks.media import TYPES, BadMedia, Kind, MediaName

@@ -18,7 +18,7 @@ from server.recording.catalog.annotations import BadAnnotation
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.catalog_db import Which
 from server.recording.catalog.discovery import why_not_one_file
-from server.recording.catalog.errors import NotThere, Refused
+from server.recording.catalog.entries import NotThere, Refused
 from server.recording.catalog.rows import MAX_ROWS
 from server.recording.export.formats import FORMATS
 from server.web.interface import OF_KEPT, UNCHANGED, files, raises

@@ -11,7 +11,7 @@ from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from server.protocol.answers import StoredCopy, StoredList
-from server.recording.catalog.errors import NotThere, Refused
+from server.recording.catalog.entries import NotThere, Refused
 from server.recording.store.trouble import StoreTrouble
 from server.web.interface import OF_KEPT, files, raises
 from server.web.middleware.methods import is_head

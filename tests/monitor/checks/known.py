@@ -7,7 +7,7 @@ from typing import Any
 
 from monitor.catalog import CHECKS, AnyCheck
 from monitor.check import Finding, unknown
-from monitor.link import LinkFacts
+from monitor.shell_facts import LinkFacts
 from monitor.state import NotFresh, Reading, Snapshot
 
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from monitor.car_clock import ClockJump
 from monitor.check import Finding, Verdict
 from monitor.freeze_detection import Repeats
-from monitor.link import LinkFacts
 from monitor.runner import Monitor
-from monitor.stamps import ClockJump
+from monitor.shell_facts import LinkFacts
 from monitor.state import Reading, Snapshot, State
 from monitor.values import GpsFix
 from tests.monitor.checks.known import LINK, ask

@@ -15,13 +15,13 @@ from typing import Any, get_args
 
 import pytest
 
+from monitor.car_clock import ClockJump
 from monitor.catalog import CHECKS
 from monitor.check import Finding
 from monitor.phones import Why
-from monitor.reach import ReachFacts
+from monitor.shell_facts import ReachFacts
 from monitor.slow_proof import SlowProof
 from monitor.snapshot import Snapshot
-from monitor.stamps import ClockJump
 from monitor.unusable import Unusable
 from monitor.values import Bearing, Effort, Level, Twist
 from tests.monitor.checks.known import ask, known

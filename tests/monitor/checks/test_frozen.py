@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from monitor.check import Finding, Verdict
-from monitor.link import LinkFacts
 from monitor.runner import Monitor
+from monitor.shell_facts import LinkFacts
 from monitor.signals import SIGNALS
 from monitor.state import State
 from monitor.values import (

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from monitor.catalog import CHECKS
-from monitor.link import LinkFacts
 from monitor.runner import Monitor
+from monitor.shell_facts import LinkFacts
 from monitor.state import State
 from monitor.values import GpsFix, Twist
 from tests.monitor.checks.known import LINK, ask, check_of, known

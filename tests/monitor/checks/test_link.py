@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from monitor.check import Finding, Verdict
-from monitor.link import LinkFacts, Phase
+from monitor.shell_facts import LinkFacts, Phase
 from monitor.state import Reading, Snapshot
 from tests.monitor.checks.known import ask
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from monitor.check import Verdict
-from monitor.link import LinkFacts, Phase
 from monitor.runner import Monitor
+from monitor.shell_facts import LinkFacts, Phase
 from monitor.state import Snapshot
 from tests.monitor.checks.known import ask
 

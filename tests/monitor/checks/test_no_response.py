@@ -10,8 +10,8 @@ import pytest
 
 from monitor.catalog import CHECKS
 from monitor.check import Verdict
-from monitor.link import LinkFacts
 from monitor.runner import Monitor
+from monitor.shell_facts import LinkFacts
 from monitor.state import Reading, Snapshot, State
 from monitor.values import MotionCommand, Twist
 from tests.monitor.checks.known import ask, check_of, known

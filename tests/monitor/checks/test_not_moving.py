@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from monitor.link import LinkFacts
+from monitor.shell_facts import LinkFacts
 from monitor.state import State
 from monitor.values import Twist
 from tests.monitor.checks.known import ask

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from monitor.catalog import CHECKS
 from monitor.check import Finding
 from monitor.compared import Compared, Other
-from monitor.link import LinkFacts
 from monitor.reading import Reading
 from monitor.runner import Monitor
+from monitor.shell_facts import LinkFacts
 from monitor.snapshot import Snapshot
 from monitor.state import State
 from monitor.values import GpsFix, Twist

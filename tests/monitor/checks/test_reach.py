@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from monitor.check import Verdict
-from monitor.reach import ReachFacts
 from monitor.runner import Monitor
+from monitor.shell_facts import ReachFacts
 from monitor.state import Snapshot
 from monitor.values import Twist
 from tests.monitor.checks.known import ask, check_of, known

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from monitor.check import Verdict
-from monitor.recorder import RecorderFacts
 from monitor.runner import Monitor
+from monitor.shell_facts import RecorderFacts
 from tests.monitor.checks.known import ask, known
 
 OK, FAULT, UNKNOWN = Verdict.OK, Verdict.FAULT, Verdict.UNKNOWN

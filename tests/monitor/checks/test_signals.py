@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from monitor.check import Finding, Verdict
-from monitor.link import LinkFacts
 from monitor.rates import Rate
+from monitor.shell_facts import LinkFacts
 from monitor.signals import SIGNALS
 from monitor.state import Reading, Snapshot
 from tests.monitor.checks.known import ask

@@ -16,9 +16,9 @@ from monitor.catalog import CHECKS
 from monitor.check import Finding
 from monitor.compared import MOST_OTHERS, Compared
 from monitor.freeze_detection import Repeats
-from monitor.link import LinkFacts
 from monitor.pace import Pace
 from monitor.runner import Monitor
+from monitor.shell_facts import LinkFacts
 from monitor.state import State
 from monitor.values import GpsFix, Odometry, Twist
 from tests.monitor.checks.known import LINK, Row, ask, known

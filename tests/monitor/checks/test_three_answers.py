@@ -13,17 +13,14 @@ from typing import Any
 
 import pytest
 
+from monitor.car_clock import ClockJump
 from monitor.catalog import CHECKS
 from monitor.check import Verdict
 from monitor.freeze_detection import Repeats
 from monitor.gps_watch import GpsWatch
-from monitor.link import LinkFacts
 from monitor.rates import Rate
-from monitor.reach import ReachFacts
-from monitor.recorder import RecorderFacts
+from monitor.shell_facts import LinkFacts, ReachFacts, RecorderFacts, SlowingFacts
 from monitor.slow_proof import SlowProof
-from monitor.slowing import SlowingFacts
-from monitor.stamps import ClockJump
 from monitor.state import Reading, Snapshot
 from monitor.unusable import Unusable
 from monitor.values import (

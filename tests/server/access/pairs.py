@@ -11,8 +11,8 @@ import httpx
 import websockets
 
 from server.access.access import Access
+from server.access.credentials import keys_of
 from server.access.identity import Role
-from server.access.keys import keys_of
 from server.app.app import create_app
 from server.app.config import Config, Tls
 from server.storage.storage_thread import StorageThread

@@ -11,7 +11,7 @@ import pytest
 from server.access.access import Access
 from server.access.devices_bucket import DevicesBucket
 from server.access.identity import Role
-from server.access.shared_devices import SharedDevices
+from server.access.shared_access import SharedDevices
 from server.bus import broker_users
 from server.bus.broker import Broker as BrokerAddress
 from server.bus.nats_link import BrokerLink

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from server.access.access import Access
 from server.access.devices import SEEN_EVERY_MS, Device
 from server.access.identity import Role
-from server.access.shared_devices import IDENTITY, KEPT_MS, BadEntry, SharedDevices
+from server.access.shared_access import IDENTITY, KEPT_MS, BadEntry, SharedDevices
 from tests.server.access.pairs import access_of, config
 
 HOST = {"host": "room"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from server.access.people import People
-from server.access.shared_people import BadPeopleEntry, SharedPeople
+from server.access.shared_access import BadPeopleEntry, SharedPeople
 from server.control.duty import MOST_PEOPLE
 
 

@@ -8,13 +8,10 @@ from pathlib import Path
 import pytest
 
 from server.access import pending_invitations, secret_file
-from server.access.cookie import Cookies
+from server.access.credentials import BadKey, Cookies, Tickets, keys_from, keys_of
 from server.access.identity import Role
-from server.access.invitations import LASTS_S, MOST_STANDING, Invitations
-from server.access.keys import BadKey, keys_from, keys_of
+from server.access.invitations import FEW, LASTS_S, MANY, MOST_STANDING, Invitations, PinThrottle
 from server.access.names import Names
-from server.access.pin_throttle import FEW, MANY, PinThrottle
-from server.access.tickets import Tickets
 from server.app.config import Config
 from server.system.loopback import is_loopback
 from tests.server.access.pairs import access_of, config

@@ -21,7 +21,7 @@ from server.analysis.drive.tables import write_report_csv, write_report_json
 from server.analysis.drive_page import write_drive_page
 from server.recording.catalog import annotations
 from server.recording.drive.departure import Departure
-from server.recording.export.outcome import ExportRefused
+from server.recording.export.export_format import ExportRefused
 from server.recording.marks.media import MediaName
 from server.recording.read.read import open_recording
 from tests.server.recording.drive.story import EVIL, PHOTO, logged, recorded

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from monitor.catalog import AllLimits
-from server.app import store_options
+from server.app import store
 from server.app.store import situation
 from server.cli.main import main
 from server.recording.store.rules import Place, WholeFiles
@@ -22,16 +22,16 @@ LOGIN = {"AWS_ACCESS_KEY_ID": "an-id", "AWS_SECRET_ACCESS_KEY": "a-secret"}
 
 def parsed(*arguments: str, uploads: bool = True) -> argparse.Namespace:
     parser = argparse.ArgumentParser()
-    store_options.add_arguments(parser, uploads=uploads)
+    store.add_arguments(parser, uploads=uploads)
     return parser.parse_args(arguments)
 
 
 def test_a_store_and_the_network_of_the_depot() -> None:
-    assert store_options.read(parsed(), LOGIN) is None
-    store = store_options.read(parsed("--store", "s3://b-1/x", "--depot-interface", "wlan0"), LOGIN)
-    assert store is not None
-    assert (store.address.text, store.depot_interface) == ("s3://b-1/x", "wlan0")
-    node = store_options.read(parsed("--store", "s3://b-1", uploads=False), LOGIN)
+    assert store.read_options(parsed(), LOGIN) is None
+    found = store.read_options(parsed("--store", "s3://b-1/x", "--depot-interface", "wlan0"), LOGIN)
+    assert found is not None
+    assert (found.address.text, found.depot_interface) == ("s3://b-1/x", "wlan0")
+    node = store.read_options(parsed("--store", "s3://b-1", uploads=False), LOGIN)
     assert node is not None
     assert node.depot_interface is None
 
@@ -48,13 +48,13 @@ def test_a_store_and_the_network_of_the_depot() -> None:
 )
 def test_what_cannot_be_is_refused(arguments: tuple[str, ...], sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
-        store_options.read(parsed(*arguments), LOGIN)
+        store.read_options(parsed(*arguments), LOGIN)
 
 
 def test_the_client_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store_options, "find_spec", lambda name: None)
+    monkeypatch.setattr(store, "find_spec", lambda name: None)
     with pytest.raises(ValueError, match=r"pip install 'catgraph\[store\]'"):
-        store_options.read(parsed("--store", "s3://b-1"), LOGIN)
+        store.read_options(parsed("--store", "s3://b-1"), LOGIN)
 
 
 def test_a_server_without_a_login_says_so(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from server.app import tls_options
+from server.app import tls_process
 from server.app.config import Config, Tls
 
 
 def read(*typed: str) -> Tls | None:
     parser = argparse.ArgumentParser()
-    tls_options.add_arguments(parser)
-    return tls_options.read(parser.parse_args(typed))
+    tls_process.add_arguments(parser)
+    return tls_process.read_options(parser.parse_args(typed))
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ from server.tls import tls_sniffer
 from server.tls.authority import TlsRefused
 from server.tls.certificate_renewal import OwnCertificate
 from server.tls.names import Names, names_of
-from server.tls.probe import Probe
+from server.tls.setup import Probe
 from server.version import catgraph_version
 from server.web.middleware import http_protocol
 from tests.http import http_client

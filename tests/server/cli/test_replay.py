@@ -21,8 +21,7 @@ import orjson
 import pytest
 from websockets import ConnectionClosed
 
-from server.cli.replay import add_arguments, run
-from server.cli.replay_report import Report
+from server.cli.replay import Report, add_arguments, run
 from server.recording.read.read import open_recording
 from server.rosbridge_server.server import RosBridge
 from tests.server.recording.bags import Drive, write_ros1, write_ros2

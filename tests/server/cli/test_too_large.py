@@ -10,8 +10,8 @@ from typing import NoReturn
 import pytest
 
 from server.cli import export, replay
-from server.recording.read import open_file, read, rosbag1_truncated
-from server.system.memory_limit import TOO_LARGE
+from server.recording.read import read, recognise, rosbag1_truncated
+from server.system.process_limits import TOO_LARGE
 
 
 def too_large(*_: object) -> NoReturn:
@@ -36,7 +36,7 @@ def test_each_command_says_so_in_one_sentence(
 def test_opening_does_not_take_it_for_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "drive.bag"
     file.write_bytes(b"#ROSBAG V2.0\n")
-    monkeypatch.setattr(open_file, "Bag1", too_large)
+    monkeypatch.setattr(recognise, "Bag1", too_large)
     monkeypatch.setattr(rosbag1_truncated, "is_cut", lambda _: False)
     with pytest.raises(MemoryError):
         read.open_recording([file])

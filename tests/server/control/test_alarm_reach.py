@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from monitor.reach import ReachFacts
+from monitor.shell_facts import ReachFacts
 from server.control.alarm_reach import BLIND_S, FORGOTTEN_S, FRESH_S, MOST, MOST_SHOWN, AlarmReach, Present
 from server.control.lease import Operator
 from server.protocol.operator_state import ReaderEnded

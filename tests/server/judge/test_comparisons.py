@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from monitor.link import LinkFacts
+from monitor.shell_facts import LinkFacts
 from monitor.state import State
 from server.judge import pipeline
 from server.judge.comparisons import MOST, comparison_sources, odometry_that_is_not_lost, size_of_twist

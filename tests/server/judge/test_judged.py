@@ -14,7 +14,7 @@ import pytest
 from monitor.catalog import CHECKS
 from monitor.signals import SIGNALS
 from server.simulator.effects import Silence
-from server.simulator.other_clock import OtherClock
+from server.simulator.faults import OtherClock
 from server.simulator.scenario import Scenario
 from server.simulator.scenarios import SCENARIOS, Planned, planned
 from tests.server.judged import judged

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from monitor.mounting import Mounting
+from monitor.scan import Mounting
 from server.analysis.rehearse import rehearse
 from server.judge.drive import Drive as JudgedDrive
 from server.judge.frames import Frames
@@ -16,7 +16,7 @@ from server.judge.offline import OfflineRun
 from server.judge.signals.scan import laser_scan
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, open_recording
-from server.replay import checkpoint
+from server.replay import timeline
 from tests.server.judge.mounted_lasers import Laser, row
 from tests.server.recording.bags import Drive, Row, write_ros1, write_ros2
 
@@ -86,10 +86,10 @@ def test_a_laser_on_a_tower_that_turns_is_where_it_was_sent_last_also_after_a_ch
         run = OfflineRun(recording, drive := judged_drive(recording))
         run.advance(3.2)
         assert mounting(run).yaw_rad == pytest.approx(1.2, abs=1e-4)
-        saved = checkpoint.save(run.run_state)
+        saved = timeline.save_checkpoint(run.run_state)
         run.advance(9.9)
         assert math.remainder(mounting(run).yaw_rad - 3.8, math.tau) == pytest.approx(0.0, abs=1e-4)
-        again = OfflineRun(recording, drive, run_state=checkpoint.restore(saved))
+        again = OfflineRun(recording, drive, run_state=timeline.restore_checkpoint(saved))
         again.advance(4.2)
         assert mounting(again).yaw_rad == pytest.approx(1.6, abs=1e-4)
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from monitor.checks.slow_down import SlowDownLimits
-from server.judge import recorded_slowdown
-from server.judge.recorded_slowdown import RecordedSlowDown
+from server.judge import recorded_events
+from server.judge.recorded_events import RecordedSlowDown
 
 START_S = 1_790_000_000.0
 LIMITS = SlowDownLimits()
@@ -29,7 +29,7 @@ DRIVE: list[tuple[float, dict[str, Any]]] = [
 def at(now_s: float) -> RecordedSlowDown:
     state = RecordedSlowDown()
     for at_s, event in DRIVE:
-        recorded = recorded_slowdown.read(event)
+        recorded = recorded_events.read_slowdown(event)
         assert recorded is not None
         if at_s <= now_s:
             state = state.after(recorded, at_s)
@@ -71,14 +71,14 @@ def test_each_moment_is_shown_as_it_was(
 def test_what_was_not_confirmed_says_so_until_the_car_slows() -> None:
     state = at(5.1)
     for step, confirmed in (("not_confirmed", False), ("slows", True)):
-        recorded = recorded_slowdown.read({"change": "slow_down", "step": step, "order": 7, "why": "by hand"})
+        recorded = recorded_events.read_slowdown({"change": "slow_down", "step": step, "order": 7, "why": "by hand"})
         assert recorded is not None
         state = state.after(recorded, 6.5)
         assert state.as_json(6.5, START_S, LIMITS)["order"]["confirmed"] is confirmed
 
 
 def test_a_recording_that_begins_in_the_middle_of_an_order_knows_it_from_the_next_word() -> None:
-    recorded = recorded_slowdown.read(
+    recorded = recorded_events.read_slowdown(
         {"change": "slow_down", "step": "slows", "order": 3, "why": "by hand", "ordered_by": "Ann"}
     )
     assert recorded is not None
@@ -93,7 +93,7 @@ def test_a_log_of_before_the_present_name_of_a_phase_is_read() -> None:
         ({"change": "armed", "by": "Ann", "state": "armed", "text": "Slow-down armed: /cmd_vel"}, "armed"),
         ({"change": "disarmed", "state": "safe", "text": "Slow-down disarmed."}, "not_armed"),
     ]:
-        recorded = recorded_slowdown.read(row)
+        recorded = recorded_events.read_slowdown(row)
         assert recorded is not None
         state = state.after(recorded, 1.0)
         assert state.as_json(1.0, START_S, LIMITS)["state"] == shown
@@ -111,7 +111,7 @@ def test_a_log_of_before_the_present_name_of_a_phase_is_read() -> None:
     ],
 )
 def test_events_that_make_no_sense_harm_nothing(event: dict[str, Any]) -> None:
-    recorded = recorded_slowdown.read(event)
+    recorded = recorded_events.read_slowdown(event)
     state = RecordedSlowDown() if recorded is None else RecordedSlowDown().after(recorded, 1.0)
     assert state.order is None
     state.facts(2.0, LIMITS)

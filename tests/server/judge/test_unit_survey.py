@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from server.judge import unit_survey
+from server.judge import recording_survey
+from server.judge.active_settings import SettingsOverride
 from server.judge.drive import Drive as JudgedDrive
 from server.judge.offline import OfflineRun
 from server.judge.recorded_events import RecordedEvents
-from server.judge.settings_override import SettingsOverride
 from server.judge.sources.evidence import Evidence
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import open_recording
@@ -113,7 +113,7 @@ def test_what_was_read_before_counts_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most: int, from_row: int
 ) -> None:
     """Two wrong values of a battery are glitches, and four of them are percent."""
-    monkeypatch.setattr(unit_survey, "MOST_VALUES", most)
+    monkeypatch.setattr(recording_survey, "MOST_VALUES", most)
     battery, levels = "sensor_msgs/msg/BatteryState", [0.9, 1.4, 1.3, 0.5, 0.6, 0.5, 0.4, 0.3]
     rows: list[Row] = [
         (float(n), "/battery_state", battery, {"present": True, "percentage": level}) for n, level in enumerate(levels)
@@ -134,7 +134,7 @@ def test_what_was_read_before_counts_once(
 
 def test_a_way_that_was_read_before_counts_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first 200 messages of a speed in km/h: 2.5 s of the way, which shows nothing yet."""
-    monkeypatch.setattr(unit_survey, "MOST_VALUES", 300)
+    monkeypatch.setattr(recording_survey, "MOST_VALUES", 300)
     with open_recording([driving(tmp_path, FLOAT, 3.6)]) as recording:
         run = OfflineRun(recording, JudgedDrive(recording, read_recorded_events(recording)))
         (evidence,) = run.run_state.reception.units._surveyed.values()

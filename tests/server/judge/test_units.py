@@ -19,7 +19,7 @@ from server.judge import pipeline, profiles
 from server.judge.profiles import GENERIC, Profile
 from server.judge.reception_stats import Reception
 from server.judge.topics import map_signals
-from server.judge.unit_questions import unit_questions, unit_sentences
+from server.judge.unit_watch import unit_questions, unit_sentences
 from server.judge.units import PERCENT, RULES, SHARE, UNITS, rule_for, table, unit_named
 from tests.tree import PROJECT
 

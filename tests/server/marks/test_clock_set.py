@@ -9,11 +9,11 @@ import pytest
 
 from server.judge.active_settings import ActiveSettings
 from server.judge.settings import SettingsFile
-from server.protocol.mark_commands import PlaceMark
-from server.recording.clock_history import ClockHistory
+from server.protocol.drive_commands import PlaceMark
 from server.recording.controller import SessionRecording
 from server.recording.folder import RecordingsFolder
 from server.recording.recorder_thread import Status
+from server.recording.recording_clock import ClockHistory
 from server.vehicle.marks import Marks, MarksPlace
 
 BEGIN_MS = 1_790_000_000_000

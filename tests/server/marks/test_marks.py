@@ -8,7 +8,7 @@ import pytest
 
 from monitor.alarm import Refused
 from server.bus.journal import Journal
-from server.protocol.mark_commands import PlaceMark, RemoveMark
+from server.protocol.drive_commands import PlaceMark, RemoveMark
 from server.vehicle.car_marks import Asked
 from server.vehicle.marks import MOST, MOST_OF_CAR, Marks, MarksPlace
 

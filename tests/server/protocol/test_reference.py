@@ -14,7 +14,7 @@ from monitor.signals import SIGNALS
 from server.protocol import alarm_reference, reference, tables
 from server.protocol.commands import BY_KIND
 from server.protocol.replay_commands import ReplayOrder
-from server.protocol.shapes import command_name, definitions
+from server.protocol.tables import command_name, definitions
 from tests.tree import PROJECT
 
 

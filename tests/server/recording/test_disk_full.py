@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from server.recording import space_watch, unfinished
+from server.recording import recover, space
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
-from server.recording.recover import recover, recover_all
+from server.recording.recover import recover_all
 from server.recording.space import Allowance
 from server.rosbridge_server.server import RosBridge
 from tests.server.cars import driving
@@ -41,7 +41,7 @@ def remount(disk: Path, how: str) -> None:
 async def test_a_disk_that_fills_up_ends_the_recording_and_it_is_completed_when_there_is_room_again(
     disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(unfinished, "TRY_AGAIN_S", 0.2)
+    monkeypatch.setattr(recover, "TRY_AGAIN_S", 0.2)
     user = RecorderUser(disk)
     part = user.part()
     user.recorder.begin(part)
@@ -76,7 +76,7 @@ async def test_a_disk_that_fills_up_ends_the_recording_and_it_is_completed_when_
 
 async def test_with_a_little_room_left_it_is_closed_as_any_other(disk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit that is left free is what the index needs."""
-    monkeypatch.setattr(space_watch, "LOOK_S", 0.05)
+    monkeypatch.setattr(space, "LOOK_S", 0.05)
     user = RecorderUser(disk)
     user.recorder.allowance = Allowance(quota=0, min_free=100_000)
     user.recorder.begin(user.part())
@@ -100,13 +100,13 @@ def test_what_was_left_waits_for_room_to_be_recovered(disk: Path) -> None:
     other = fill(disk)
     left = folder / "car_1.mcap.writing"
     before = left.read_bytes()
-    done = recover(left)
+    done = recover.recover(left)
     assert done.is_settled is False
     assert done.sentence == "car_1 cannot be recovered now: the disk is full. It is kept as it is."
     assert [path.name for path in folder.iterdir()] == ["car_1.mcap.writing"]
     assert left.read_bytes() == before
     other.unlink()
-    assert recover(left).messages > 1000
+    assert recover.recover(left).messages > 1000
     assert [path.name for path in folder.iterdir()] == ["car_1.mcap"]
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from server.judge.message import RosVersion
-from server.recording import chain_neighbours, recorder_queue, space_watch
+from server.recording import chain_neighbours, recorder_queue, space
 from server.recording.chain_neighbours import read_first_metadata
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
@@ -187,7 +187,7 @@ async def test_where_there_is_no_room_nothing_is_begun(tmp_path: Path, allowance
 async def test_at_the_limit_it_stops_and_what_was_recorded_is_saved(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(space_watch, "LOOK_S", 0.1)
+    monkeypatch.setattr(space, "LOOK_S", 0.1)
     user = RecorderUser(tmp_path)
     user.recorder.begin(user.part())
     user.say(1)
@@ -268,7 +268,7 @@ async def test_a_fault_of_the_search_for_the_recording_before_stops_none(
 async def test_a_file_that_is_taken_away_while_it_is_written_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(space_watch, "LOOK_S", 0.1)
+    monkeypatch.setattr(space, "LOOK_S", 0.1)
     user = RecorderUser(tmp_path)
     part = user.part()
     user.recorder.begin(part)

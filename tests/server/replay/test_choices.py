@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from server.judge.active_settings import SettingsOverride
 from server.judge.drive import Drive
 from server.judge.recorded_events import RecordedEvents
-from server.judge.settings_override import SettingsOverride
 from server.recording.read.read import open_recording
 from tests.reports.cases import made
 

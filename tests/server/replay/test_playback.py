@@ -11,13 +11,13 @@ import orjson
 import pytest
 
 from monitor.alarm import Transition
-from server.protocol.check_state import CheckAnswer
+from server.protocol.alarm_state import CheckAnswer
 from server.recording.catalog.survey import survey
 from server.recording.read.read import open_recording
-from server.replay import alarm_history
-from server.replay.alarm_history import AlarmHistory
+from server.replay import timeline
 from server.replay.manager import summary
 from server.replay.playback import RATES, WARM_UP_S, Playback
+from server.replay.timeline import AlarmHistory
 from tests.frames import check_shape
 from tests.monitor.test_alarm import SPEC
 from tests.page import drives
@@ -353,7 +353,7 @@ def test_a_check_has_its_minute_and_its_alarms_up_to_the_moment_shown(street: Pa
 
 
 def test_a_history_that_is_too_long_is_not_shown_as_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(alarm_history, "MOST", 2)
+    monkeypatch.setattr(timeline, "MOST_TRANSITIONS", 2)
     history = AlarmHistory()
     for at_s in (1.0, 2.0, 3.0):
         history.add(Transition(alarm_id="a", spec=SPEC, occurrence=1, change="raised", at_s=at_s, text=""), at_s)

@@ -17,7 +17,7 @@ import pytest
 from server.rosbridge import dialer, service_calls
 from server.rosbridge.address import parse
 from server.rosbridge.link import RosLink
-from server.rosbridge.link_errors import CallFailed, LinkDown
+from server.rosbridge.live_source import CallFailed, LinkDown
 from server.rosbridge.subscription import Subscription
 from tests.server.ear import Ear, accept, answering, bridging, linked, until
 from tests.server.rosbridge.rows import ANY, OVER, ROWS, SCAN, SPEED

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from server.rosbridge.paced import AT_ONCE, PAUSE_S, Paced
-from server.rosbridge.sent_rows import SentRows
+from server.rosbridge.sent_rows import AT_ONCE, PAUSE_S, Paced, SentRows
 from server.rosbridge.subscription import Subscription
 
 pytestmark = pytest.mark.virtual_time

@@ -10,8 +10,8 @@ import pytest
 from rosbags.typesys import get_types_from_msg
 
 from server.rosbridge_server.completion import Completion, Unfit
+from server.rosbridge_server.shape import stamp
 from server.rosbridge_server.types import MessageTypes
-from server.rosbridge_server.values import stamp
 
 ROS1, ROS2 = MessageTypes(1), MessageTypes(2)
 

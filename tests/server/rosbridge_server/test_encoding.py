@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from websockets.frames import Frame, Opcode
 
-from server.rosbridge.message_bytes import Unencodable, cbor_bytes, json_bytes
+from server.rosbridge.codec import Unencodable, cbor_bytes, json_bytes
 from server.rosbridge_server.encoding import Encoding, Outgoing, frame
 from server.rosbridge_server.server import RosBridge
 

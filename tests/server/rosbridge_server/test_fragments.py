@@ -7,9 +7,8 @@ from typing import Any
 import orjson
 import pytest
 
-from server.rosbridge_server.fields import Refused
-from server.rosbridge_server.fragments import MOST_MESSAGES, Fragments
-from server.rosbridge_server.text import MOST_FRAGMENTS, fragments
+from server.rosbridge_server.encoding import MOST_FRAGMENTS, fragments
+from server.rosbridge_server.fields import MOST_MESSAGES, Fragments, Refused
 from tests.server.rosbridge_server.conftest import bridging
 from tests.server.rosbridge_server.probe import Probe, probing
 

@@ -6,10 +6,9 @@ import time
 
 import pytest
 
-from server.recording.read import definition_bounds
+from server.recording.read import definitions
 from server.recording.read.decode import compile_decoder
-from server.recording.read.definition_bounds import MAX_LINE
-from server.recording.read.definitions import definitions_of
+from server.recording.read.definitions import MAX_LINE, definitions_of
 from server.recording.read.errors import Undecodable
 from server.recording.read.schemas import TypeBook
 from server.recording.read.source import Channel
@@ -36,8 +35,8 @@ BEYOND = {
 @pytest.mark.parametrize("name", BEYOND)
 def test_a_definition_beyond_a_bound_is_refused(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """With bounds of 100 lines and 30 fields."""
-    monkeypatch.setattr(definition_bounds, "MAX_LINES", 100)
-    monkeypatch.setattr(definition_bounds, "MAX_FIELDS", 30)
+    monkeypatch.setattr(definitions, "MAX_LINES", 100)
+    monkeypatch.setattr(definitions, "MAX_FIELDS", 30)
     book = TypeBook(1)
     book.learn({"a/T0": BEYOND[name]})
     channel = Channel(

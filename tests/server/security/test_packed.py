@@ -16,7 +16,7 @@ from server.recording import space
 from server.recording.catalog.survey import survey
 from server.recording.folder import RecordingsFolder
 from server.recording.mcap.chunks import MAGIC
-from server.recording.read import bag2_metadata, qos, temporary_copy, unpack
+from server.recording.read import bag2_metadata, temporary_copy, unpack
 from server.recording.read.read import RecordingUnreadable, open_recording
 from server.recording.read.unpack import MOST_BYTES
 from server.recording.recover import recover
@@ -217,7 +217,7 @@ def test_a_message_beyond_the_bound_is_refused(tmp_path: Path, capsys: pytest.Ca
 
 def test_quality_of_service_beyond_the_bounds_is_not_known() -> None:
     one = "- history: 1\n  depth: 5\n  reliability: 1\n  durability: 1\n"
-    assert qos.is_latched(one)
-    assert not qos.is_latched("- &one {durability: 1}\n- *one\n")
-    assert not qos.is_latched(one * (qos.MOST_QOS // len(one) + 1))
-    assert not qos.is_latched("[" * 40 + "]" * 40)
+    assert bag2_metadata.is_latched(one)
+    assert not bag2_metadata.is_latched("- &one {durability: 1}\n- *one\n")
+    assert not bag2_metadata.is_latched(one * (bag2_metadata.MOST_QOS // len(one) + 1))
+    assert not bag2_metadata.is_latched("[" * 40 + "]" * 40)

@@ -14,8 +14,8 @@ import pytest
 
 from server.analysis.thresholds import BadSettingsFile, read_override
 from server.app.config import Config
+from server.judge.active_settings import recorded_override
 from server.judge.settings import BadSetting, SettingsFile, from_toml, salvage
-from server.judge.settings_override import recorded_override
 from server.mail.settings import MailSettingsFile
 from server.recording.event_channels import MOST_SETTINGS, read_recorded_events
 from server.storage.bounded_toml import MAX_BYTES, MAX_ENTRIES, MAX_LINE, MAX_NESTING, MAX_PARTS, BadToml, loads

@@ -13,7 +13,7 @@ import pytest
 
 from server.judge.message import Message, RosVersion
 from server.judge.topics import map_signals
-from server.rosbridge.message_bytes import json_bytes
+from server.rosbridge.codec import json_bytes
 from server.simulator.car import START_S, SimulatedCar
 from server.simulator.messages import PUBLISHED
 from server.simulator.scenarios import planned

@@ -23,9 +23,8 @@ from server.simulator.effects import (
     SlowRate,
     Speeding,
 )
-from server.simulator.other_clock import OtherClock
+from server.simulator.faults import FrozenPosition, FrozenScan, NearObject, NoFix, OtherClock, TruncatedScan
 from server.simulator.scenarios import SCENARIOS, inject, planned
-from server.simulator.sensor_faults import FrozenPosition, FrozenScan, NearObject, NoFix, TruncatedScan
 
 EVERY_EFFECT: list[Callable[[], Effect]] = [
     scenario.effect for scenario in SCENARIOS.values() if scenario.effect is not None

@@ -7,10 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from server.simulator.beams import INTERLACED, dense
 from server.simulator.car import SimulatedCar
-from server.simulator.laser import Laser, nearest
-from server.simulator.scenery import Scenery, box
+from server.simulator.laser import INTERLACED, Laser, Scenery, box, dense, nearest
 from server.simulator.vehicle import LASER_AHEAD_M, Motion
 
 DEGREE = math.radians(1)

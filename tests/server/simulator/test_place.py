@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from geographiclib.geodesic import Geodesic
 
-from server.simulator.place import LAT_DEG, LON_DEG, lat_lon_deg, metres_per_degree, utm12_m
+from server.simulator.lap import LAT_DEG, LON_DEG, lat_lon_deg, metres_per_degree, utm12_m
 
 
 @pytest.mark.parametrize(("east_m", "north_m"), [(0, 0), (125, 0), (0, -125), (88, 88), (-88, 60)])

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from server.simulator.beams import INTERLACED, Beams, dense, fan
-from server.simulator.scenery import Scenery, box
+from server.simulator.laser import INTERLACED, Beams, Scenery, box, dense, fan
 
 ONE_AHEAD = fan(0.0, math.radians(1), 1, 0.0, 0.0)
 

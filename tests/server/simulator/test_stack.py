@@ -9,8 +9,7 @@ import pytest
 
 from server.simulator.car import SimulatedCar
 from server.simulator.scenarios import planned
-from server.simulator.stack import Stack
-from server.simulator.vehicle import MotionCommand
+from server.simulator.vehicle import MotionCommand, Stack
 
 COMMAND = MotionCommand(speed_mps=6.0, tyre_rad=0.1)
 HALTED = MotionCommand(speed_mps=0.0, tyre_rad=0.1)

@@ -6,7 +6,7 @@ import errno
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from monitor.slowing import SlowingFacts
+from monitor.shell_facts import SlowingFacts
 from monitor.state import Snapshot, State
 from monitor.values import Steering, Twist
 from server.protocol import commands

@@ -15,7 +15,7 @@ import websockets
 
 from server.app.app import create_app
 from server.app.config import Config
-from server.protocol import commands, slowing_commands
+from server.protocol import commands, drive_commands
 from server.rosbridge.outgoing import NotAllowed
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.foxglove.commands import CLIENT_PUBLISH, Commands
@@ -132,10 +132,10 @@ ENDS = ("disconnect", "connect")  # after these nothing is monitored: not walked
 
 def every_command() -> list[dict[str, Any]]:
     """Each kind of command once, with what it needs; those that order a slow-down last."""
-    models = [*get_args(commands.Command), *get_args(slowing_commands.SlowingCommand)]
+    models = [*get_args(commands.Command), *get_args(drive_commands.SlowingCommand)]
     found = {}
     for model in models:
-        if model is not slowing_commands.SlowingCommand:
+        if model is not drive_commands.SlowingCommand:
             (kind,) = get_args(model.model_fields["kind"].annotation)
             needed = {name for name, field in model.model_fields.items() if field.is_required() and name != "kind"}
             needed |= {"why"} if kind == "position" else set()

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from server.app.config import Config
-from server.protocol import slowing_commands
+from server.protocol import drive_commands
 from server.protocol.rate_limit import Limits, Rate
 from server.slowdown.order import DESERTED_S
 from server.slowdown.sender import PERIOD_S
@@ -122,7 +122,7 @@ def test_a_page_that_is_there_keeps_it_armed_and_an_order_is_not_ended_by_an_emp
     rig.slowing.watch_operators(None)
     order = rig.slowing.frame()["order"]
     assert order is not None
-    rig.slowing.obey(slowing_commands.Release(kind="release", number=order["number"]), by="Ann")
+    rig.slowing.obey(drive_commands.Release(kind="release", number=order["number"]), by="Ann")
     rig.slowing.watch_operators(None)
     assert rig.slowing.frame()["state"] == "not_armed"
 

@@ -11,10 +11,8 @@ from hypothesis import strategies as st
 
 from monitor.alarm import Refused
 from server.judge.topics import Source
-from server.slowdown.command_target import CommandTarget, target_of
-from server.slowdown.order import Car, SlowDown
-from server.slowdown.ramp import Ramp
-from server.slowdown.twist import kind_of, message
+from server.slowdown.command_target import CommandTarget, kind_of, target_of, twist_message
+from server.slowdown.order import Car, Ramp, SlowDown
 
 WAY = CommandTarget(topic="/cmd_vel", type="geometry_msgs/Twist", kind="Twist")
 NO_WAY = CommandTarget(problem="No car is connected.")
@@ -83,9 +81,9 @@ def test_only_twists_command_a_car(type: str, kind: str | None) -> None:
     [(1, {"secs": 1_790_000_000, "nsecs": 5}), (2, {"sec": 1_790_000_000, "nanosec": 5})],
 )
 def test_a_stamped_command_carries_the_stamp_of_its_ros(ros_version: int, stamp: dict[str, int]) -> None:
-    said = message("TwistStamped", 2.0, -0.1, stamp_ns=1_790_000_000_000_000_005, ros_version=ros_version)
+    said = twist_message("TwistStamped", 2.0, -0.1, stamp_ns=1_790_000_000_000_000_005, ros_version=ros_version)
     assert said["header"]["stamp"] == stamp
-    assert said["twist"] == message("Twist", 2.0, -0.1, stamp_ns=0, ros_version=ros_version)
+    assert said["twist"] == twist_message("Twist", 2.0, -0.1, stamp_ns=0, ros_version=ros_version)
     assert (said["twist"]["linear"]["x"], said["twist"]["angular"]["z"]) == (2.0, -0.1)
 
 

@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from monitor.alarm import Refused
-from server.slowdown.order import DESERTED_S, Car, Command, Order, SlowDown
-from server.slowdown.ramp import CAP_MPS2, Ramp
+from server.slowdown.order import CAP_MPS2, DESERTED_S, Car, Command, Order, Ramp, SlowDown
 from tests.server.slowdown.test_order import DRIVES, NO_WAY, WAY, begun
 
 

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from server.rosbridge.link_errors import LinkDown
+from server.rosbridge.live_source import LinkDown
 from server.rosbridge.outgoing import NotAllowed
 from server.slowdown.command_target import CommandTarget
 from server.slowdown.publisher import CommandPublisher

@@ -11,8 +11,7 @@ from monitor.checks.slow_down import STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLi
 from monitor.slow_proof import Shown, SlowProof
 from monitor.state import Snapshot
 from server.slowdown.order import SlowDown
-from server.slowdown.order_log import OrderLog
-from server.slowdown.response import Response
+from server.slowdown.order_log import OrderLog, Response
 from tests.monitor.checks.test_three_answers import NOW_S, slowed
 from tests.server.slowdown.test_order import DRIVES, WAY, begun
 

@@ -15,7 +15,7 @@ from server.app.config import Config
 from server.judge.settings import Settings, SettingsFile
 from server.mail.settings import MailSettings, MailSettingsFile
 from server.storage.data_folder import DATABASES, DataFolder, DataFolderRefused
-from server.storage.set_aside import set_aside
+from server.storage.durable_file import set_aside
 from tests.tree import PROJECT
 
 pytestmark = pytest.mark.world(n=23)

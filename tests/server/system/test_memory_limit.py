@@ -6,17 +6,17 @@ import resource
 
 import pytest
 
-from server.system import memory_limit
-from server.system.memory_limit import bounded_memory
+from server.system import process_limits
+from server.system.process_limits import bounded_memory
 
 pytestmark = pytest.mark.world(n=24)
 
 
 def test_what_is_too_large_is_a_memory_error_and_the_bound_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     before = resource.getrlimit(resource.RLIMIT_DATA)
-    read = memory_limit._bytes
+    read = process_limits._bytes
     small = {"MemAvailable": 100 << 20}
-    monkeypatch.setattr(memory_limit, "_bytes", lambda file, name: small.get(name) or read(file, name))
+    monkeypatch.setattr(process_limits, "_bytes", lambda file, name: small.get(name) or read(file, name))
     with bounded_memory(), pytest.raises(MemoryError):
         bytearray(400 << 20)
     assert resource.getrlimit(resource.RLIMIT_DATA) == before

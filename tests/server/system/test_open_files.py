@@ -10,8 +10,8 @@ import pytest
 
 from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
-from server.system import open_files
-from server.system.open_files import KEPT_FREE, FilesExhausted, demand_free
+from server.system import process_limits
+from server.system.process_limits import KEPT_FREE, FilesExhausted, demand_free
 from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving
 from tests.server.conftest import serving
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.world(n=24)
 
 
 def limited(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
-    monkeypatch.setattr(open_files.resource, "getrlimit", lambda _: (most, most))
+    monkeypatch.setattr(process_limits.resource, "getrlimit", lambda _: (most, most))
 
 
 def test_enough_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from monitor.recorder import RecorderFacts
+from monitor.shell_facts import RecorderFacts
 from server.app.app import create_app
 from server.app.config import Config
 from server.rosbridge_server.server import RosBridge

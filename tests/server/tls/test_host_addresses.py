@@ -9,7 +9,7 @@ import pytest
 
 from server.app.config import Config, Tls
 from server.app.tls_process import secure
-from server.tls.host_addresses import EVERY_S, MOST, HostAddresses
+from server.tls.names import EVERY_S, MOST, HostAddresses
 
 
 class Clock:

@@ -14,8 +14,7 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 
-from server.tls.certificate_renewal import OwnCertificate, ProvidedCertificateRenewal, keep
-from server.tls.context import LiveContext
+from server.tls.certificate_renewal import LiveContext, OwnCertificate, ProvidedCertificateRenewal, keep
 from server.tls.names import IpAddress, Names, names_of
 from tests.server.tls.certificates import pair
 

@@ -6,8 +6,7 @@ import ipaddress
 
 import pytest
 
-from server.tls.names import MAX_NAMES, addresses_now, label_of, names_of
-from server.tls.ranges import may_vouch_for_address, may_vouch_for_name
+from server.tls.names import MAX_NAMES, addresses_now, label_of, may_vouch_for_address, may_vouch_for_name, names_of
 
 ip = ipaddress.ip_address
 

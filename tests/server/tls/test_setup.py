@@ -12,8 +12,7 @@ import httpx
 import pytest
 
 from server.tls import authority, steps
-from server.tls.profile import mobileconfig
-from server.tls.setup import CERTIFICATE, SetupAddresses, explaining, leading
+from server.tls.setup import CERTIFICATE, SetupAddresses, explaining, leading, mobileconfig
 from server.tls.steps import PLATFORMS, platform_of
 from tests.http import http_client
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from server.judge.message import Message
 from server.rosbridge.address import Address
-from server.rosbridge.link_errors import CallFailed
 from server.rosbridge.link_listener import LinkListener, Marks
+from server.rosbridge.live_source import CallFailed
 from server.rosbridge.subscription import Subscription
 from server.simulator.car import SimulatedCar
 

@@ -16,8 +16,8 @@ from server.bus.local import LocalBus
 from server.recording.folder import RecordingsFolder
 from server.rosbridge import connection_errors
 from server.rosbridge.address import Address
-from server.rosbridge.link_errors import CallFailed
 from server.rosbridge.link_listener import LinkListener, Marks
+from server.rosbridge.live_source import CallFailed
 from server.rosbridge.raw_frame import RawFrame, raw_frame
 from server.rosbridge.subscription import Subscription
 from server.vehicle.session import Session

@@ -7,13 +7,12 @@ from typing import Any
 
 import orjson
 
-from monitor.check_minute import CheckMinute
 from monitor.runner import Monitor
-from monitor.trends import STEP_S
+from monitor.trends import STEP_S, CheckMinute
 from monitor.values import Twist
-from server.protocol.check_state import CheckAnswer
+from server.protocol.alarm_state import CheckAnswer
 from server.rosbridge_server.server import RosBridge
-from server.vehicle.check_detail import check_answer
+from server.vehicle.queries import check_answer
 from tests.frames import check_shape
 from tests.http import http_client
 from tests.monitor.checks.known import known

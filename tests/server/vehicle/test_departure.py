@@ -15,10 +15,10 @@ from monitor.values import Effort, Twist
 from server.control.authorization import Caller
 from server.judge.active_settings import ActiveSettings
 from server.judge.settings import SettingsFile
-from server.protocol.departure_commands import SetDepartureList
-from server.recording.early_entries import EarlyEntries
+from server.protocol.drive_commands import SetDepartureList
+from server.recording.standing import EarlyEntries
 from server.storage.storage_thread import StorageThread
-from server.vehicle import departure_past
+from server.vehicle import restore
 from server.vehicle.car_departure import WITHOUT, CarDeparture
 from server.vehicle.departure_file import DepartureFile
 from tests.server.vehicle.attended import ANN, BEN, Attended
@@ -125,7 +125,7 @@ async def test_a_restart_finds_what_stood_word_for_word() -> None:
     again = CarDeparture(ActiveSettings(SettingsFile(None)), DepartureFile(None), lambda *_, **__: None)
     again._file.items = car.session._parts.departure._file.items
     again._follow_list()
-    again.restore(departure_past.recall(car.bus, car.name))
+    again.restore(restore.recall_departure(car.bus, car.name))
     found = again.answer()
     assert found["signature"] == before["signature"], "the signed document too"
     rows = [{**row, "now": None, "peak": None} for row in before["items"]]
@@ -143,7 +143,7 @@ async def test_each_drive_has_a_check_of_its_own() -> None:
     assert [event["step"] for event in log(car)][-1] == "begun"
     await car.obeyed(ANN, "disconnect")
     assert (await answer(car))["state"] == "none"
-    assert departure_past.recall(car.bus, car.name).id is None
+    assert restore.recall_departure(car.bus, car.name).id is None
     await car.obeyed(ANN, "begin_departure")
     await car.obeyed(ANN, "set_departure_item", item="doors", result="done")
     car.session.connect("ws://127.0.0.1:9090", by="Ann")
@@ -165,7 +165,7 @@ async def test_a_drive_without_one_is_said_once() -> None:
     drive(1.0)
     drive(15.0)
     assert [event["text"] for event in log(car)] == [WITHOUT]
-    assert departure_past.recall(car.bus, car.name).is_without_logged
+    assert restore.recall_departure(car.bus, car.name).is_without_logged
     car = await signed()
     drive(12.0)
     assert log(car, "without") == []

@@ -10,7 +10,7 @@ import orjson
 import pytest
 
 from server.rosbridge.raw_frame import RawFrame, raw_frame
-from server.vehicle.transform_pace import TransformPace
+from server.vehicle.message_intake import TransformPace
 from tests.server.judge.mounted_lasers import row
 
 

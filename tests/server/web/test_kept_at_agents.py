@@ -16,7 +16,7 @@ from typing import Any
 import httpx
 import pytest
 
-from server.access.keys import Keys
+from server.access.credentials import Keys
 from server.app.config import Config
 from server.bus.broker import Broker
 from server.vehicle.vehicle import Vehicle

@@ -11,7 +11,7 @@ import pytest
 import websockets
 
 from server.rosbridge_server.server import RosBridge
-from server.web import former_page
+from server.web import page_writer
 from tests.http import http_client
 from tests.server import scan_frames
 from tests.server.cars import driving
@@ -51,7 +51,7 @@ async def test_only_a_page_that_names_no_build_gets_former_names(
         renamed.append(payload)
         return payload
 
-    monkeypatch.setattr(former_page, "state", rename)
+    monkeypatch.setattr(page_writer, "former_state", rename)
     async with driving(bridge), websockets.connect(server.replace("http", "ws") + "/ws") as socket:
         one = Viewer(socket)
         await one.send({"kind": "hello", "have_event": 0} | hello)

@@ -11,7 +11,7 @@ from server.bus.bus import ALL, SUMMARY
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.bus.nats_wire import Malformed
-from server.web import former_page
+from server.web import page_writer
 from server.web.cars_board import CarsBoard
 from server.web.remote_frames import RemoteFrames
 from tests.frames import check_frame
@@ -122,5 +122,5 @@ def test_what_is_no_summary_is_refused(broken: dict[str, Any]) -> None:
 def test_an_older_page_gets_the_former_name_of_a_phase(phase: object, expected: object) -> None:
     """With a phase that it does not know it refuses to be loaded anew."""
     frame = {"kind": "state", "decelerate": {"state": phase, "why": None}}
-    sent = orjson.loads(former_page.state(orjson.dumps(frame).decode()))
+    sent = orjson.loads(page_writer.former_state(orjson.dumps(frame).decode()))
     assert sent == {"kind": "state", "decelerate": {"state": expected, "why": None}}

@@ -7,12 +7,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from server.recording.export.bag_file import BagFile, BagTimeOutOfRange, Compression
-from server.recording.export.export_format import ExportFormat
-from server.recording.export.later import explain, in_time, later_messages
-from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
-from server.recording.export.raw import OWN, Raw, raw_messages
-from server.recording.export.ros1_definition import md5sum
-from server.recording.export.to_ros1 import Ros1Form, ros1_form
+from server.recording.export.export_format import ExportFormat, ExportRefused, Outcome, Progress, nothing
+from server.recording.export.raw import OWN, Raw, explain, in_time, later_messages, raw_messages
+from server.recording.export.to_ros1 import Ros1Form, md5sum, ros1_form
 from server.recording.read.errors import Undecodable
 from server.recording.read.read import Recording
 from server.recording.read.source import Channel, FileSource

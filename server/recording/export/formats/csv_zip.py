@@ -21,12 +21,10 @@ from monitor.values import GpsFix
 from server.bus.event_table import COLUMNS as ALARM_COLUMNS
 from server.bus.event_table import event_row, safe_cell
 from server.judge.units import Unit
-from server.recording.export.columns import OWN_TABLES, TABLES, TIMES, OwnTable, number_table
+from server.recording.export.columns import OWN_TABLES, TABLES, TIMES, OwnTable, Written, number_table, readme
 from server.recording.export.decoded_drive import DecodedDrive
-from server.recording.export.export_format import ExportFormat
-from server.recording.export.later import described_event
-from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
-from server.recording.export.readme import Written, readme
+from server.recording.export.export_format import ExportFormat, ExportRefused, Outcome, Progress, nothing
+from server.recording.export.raw import described_event
 from server.recording.marks.of_drive import described_late, marks_of, media_of
 from server.recording.read.read import Recording
 

@@ -13,8 +13,7 @@ from typing import Any
 import orjson
 
 from server.recording.export.decoded_drive import DecodedDrive
-from server.recording.export.export_format import ExportFormat
-from server.recording.export.outcome import Outcome, Progress, nothing
+from server.recording.export.export_format import ExportFormat, Outcome, Progress, nothing
 from server.recording.export.track import Place, Track, tracks_of, when
 from server.recording.read.read import Recording
 

@@ -8,8 +8,7 @@ from typing import TextIO
 from xml.sax.saxutils import escape
 
 from server.recording.export.decoded_drive import DecodedDrive
-from server.recording.export.export_format import ExportFormat
-from server.recording.export.outcome import Outcome, Progress, nothing
+from server.recording.export.export_format import ExportFormat, Outcome, Progress, nothing
 from server.recording.export.track import Track, tracks_of, when
 from server.recording.read.read import Recording
 from server.version import catgraph_version

@@ -19,10 +19,8 @@ from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, Qo
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from server.recording.export.export_format import ExportFormat
-from server.recording.export.later import explain, in_time, later_messages
-from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
-from server.recording.export.raw import OWN, Raw, raw_messages
+from server.recording.export.export_format import ExportFormat, ExportRefused, Outcome, Progress, nothing
+from server.recording.export.raw import OWN, Raw, explain, in_time, later_messages, raw_messages
 from server.recording.read.definitions import definitions_of, distribution, times
 from server.recording.read.errors import Undecodable
 from server.recording.read.read import Recording

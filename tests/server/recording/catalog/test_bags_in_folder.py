@@ -17,7 +17,7 @@ from server.recording import space
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.discovery import files_below
-from server.recording.catalog.errors import Refused
+from server.recording.catalog.entries import Refused
 from server.recording.catalog.survey import survey
 from server.recording.marks.of_drive import marks_of
 from server.recording.marks.rows import row_of

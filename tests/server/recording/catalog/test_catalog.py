@@ -23,7 +23,7 @@ from server.recording.catalog.annotations import Annotations
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.catalog_db import Entry, Which
 from server.recording.catalog.discovery import id_of
-from server.recording.catalog.errors import NotThere, Refused
+from server.recording.catalog.entries import NotThere, Refused
 from server.recording.folder import is_id
 from tests.server.recording.made import BEGAN_MS, record
 

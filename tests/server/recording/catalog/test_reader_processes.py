@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from server.recording.catalog.catalog_db import Entry
-from server.recording.catalog.survey_worker import Surveyor
+from server.recording.catalog.survey_task import Surveyor
 from server.recording.catalog.verifications import Verifications
 from tests.server.recording.chained import closed
 

@@ -15,8 +15,8 @@ from server.recording.drive.departure import check_of
 from server.recording.drive.facts import DriveFacts, DriveLog, figures_of, read_facts
 from server.recording.drive.modes import interventions_of
 from server.recording.drive.people import Span
-from server.recording.early_entries import EarlyEntries
 from server.recording.read.read import open_recording
+from server.recording.standing import EarlyEntries
 from tests.server.recording.bags import Drive, write_ros1
 from tests.server.recording.drive import story
 from tests.server.recording.drive.story import BEGIN_MS, EVIL, check, logged, mark, mode, recorded

@@ -9,8 +9,8 @@ import orjson
 import pytest
 
 from server.recording.export.clip import Window, first_raised_ns, write_clip
+from server.recording.export.export_format import ExportRefused, Outcome
 from server.recording.export.formats.bag import write_bag
-from server.recording.export.outcome import ExportRefused, Outcome
 from server.recording.folder import writing_path
 from server.recording.read.read import open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1, write_ros2

@@ -11,9 +11,9 @@ from xml.etree import ElementTree
 import orjson
 import pytest
 
+from server.recording.export.export_format import ExportRefused, Outcome
 from server.recording.export.formats.geojson import write_geojson
 from server.recording.export.formats.gpx import write_gpx
-from server.recording.export.outcome import ExportRefused, Outcome
 from server.recording.export.track import Track
 from server.recording.read.read import open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1

@@ -15,7 +15,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from server.cli.main import main
-from server.recording.read.qos import is_latched
+from server.recording.read.bag2_metadata import is_latched
 from server.recording.read.read import RecordingUnreadable, open_recording
 from tests.server.recording.bags import Drive, write_ros2
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from server.recording.read.clock_returns import MOST_JUMPS, Jump, S, returned
+from server.recording.read.clock_steps import MOST_JUMPS, Jump, S, returned
 from server.recording.read.read import Recording, open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1, write_ros2
 from tests.server.recording.stepped import CONTAINERS, LENGTH_S, Container, Step, rows, write

@@ -16,8 +16,7 @@ from rosbags.interfaces import Nodetype
 from server.recording.read.decode import compile_decoder
 from server.recording.read.encode import TypeMismatch, compile_encoder
 from server.recording.read.errors import Undecodable
-from server.rosbridge.codec import _typed_array
-from server.rosbridge.message_bytes import cbor_bytes, json_bytes
+from server.rosbridge.codec import _typed_array, cbor_bytes, json_bytes
 from tests.server.recording.bags import build, typestore
 from tests.server.recording.read.test_decode import DEFINITIONS, ODD, messages_of
 

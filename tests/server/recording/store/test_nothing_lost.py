@@ -12,8 +12,8 @@ from pathlib import Path
 import orjson
 import pytest
 
-from server.recording.catalog.errors import Refused
-from server.recording.export.outcome import ExportRefused
+from server.recording.catalog.entries import Refused
+from server.recording.export.export_format import ExportRefused
 from server.recording.store import clips, stored_list
 from server.recording.store.object_store import Found, ObjectStore
 from server.recording.store.row import RowFile, RowPart

@@ -10,7 +10,7 @@ import pytest
 
 from server.recording.store.address import BadStore, Login, store_address
 from server.recording.store.names import PART_BYTES, part_count, part_key, part_size, place_of, row_key
-from server.recording.store.pace import Pace
+from server.recording.store.object_store import Pace
 from server.recording.store.plan import backoff_ms
 from server.recording.store.rules import (
     MOST_CLIPS,

@@ -11,7 +11,7 @@ from pathlib import Path
 import orjson
 import pytest
 
-from server.recording.catalog.errors import NotThere, Refused
+from server.recording.catalog.entries import NotThere, Refused
 from server.recording.store import names
 from server.recording.store.object_store import ObjectStore
 from server.recording.store.rules import StoreRule, WholeFiles

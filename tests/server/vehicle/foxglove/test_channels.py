@@ -8,12 +8,12 @@ from typing import Any
 import orjson
 import pytest
 
-from server.rosbridge.link_errors import CallFailed
+from server.rosbridge.live_source import CallFailed
 from server.vehicle import discovery
 from server.vehicle.foxglove import channels
 from server.vehicle.foxglove.channels import UNKNOWN_NODE, Offered
 from server.vehicle.foxglove.protocol import Channel, GraphUpdate
-from server.vehicle.foxglove.subscribed import Subscribed
+from server.vehicle.foxglove.server_state import Subscribed
 
 ODOM = Channel(id=1, topic="/odom", encoding="cdr", type="nav_msgs/msg/Odometry", schema="…", schema_encoding="ros2msg")
 TEXT = Channel(

@@ -8,7 +8,7 @@ from typing import Any
 import orjson
 import pytest
 
-from server.rosbridge.link_errors import LinkDown
+from server.rosbridge.live_source import LinkDown
 from server.rosbridge.outgoing import NotAllowed
 from server.vehicle.foxglove.commands import CLIENT_PUBLISH, Commands
 from server.vehicle.foxglove.protocol import ServerInfo

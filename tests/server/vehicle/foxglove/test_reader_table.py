@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from server.recording.read.errors import Undecodable
-from server.vehicle.foxglove import reader_table
+from server.vehicle.foxglove import readers
 from server.vehicle.foxglove.protocol import Channel
-from server.vehicle.foxglove.reader_table import ReaderTable
+from server.vehicle.foxglove.readers import ReaderTable
 from tests.server.ear import until
 
 TEXT = Channel(
@@ -19,7 +19,7 @@ HELLO = b"\x05\x00\x00\x00hello"
 
 
 async def test_a_reader_in_use_is_not_dropped_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reader_table, "MOST_READERS", 3)
+    monkeypatch.setattr(readers, "MOST_READERS", 3)
     ready: list[str] = []
     table = ReaderTable(ready.append, lambda text: None, used=lambda: [TEXT])
     channels = [replace(TEXT, id=number, topic=f"/{number}") for number in range(5)]

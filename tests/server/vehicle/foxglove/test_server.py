@@ -20,8 +20,8 @@ from server.bus.local import LocalBus
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
 from server.rosbridge.address import parse
-from server.rosbridge.link_errors import LinkDown
 from server.rosbridge.link_listener import NOTE
+from server.rosbridge.live_source import LinkDown
 from server.rosbridge.outgoing import NotAllowed
 from server.rosbridge.subscription import Subscription
 from server.vehicle.foxglove.source import FoxgloveSource

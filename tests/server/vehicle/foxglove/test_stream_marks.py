@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from server.vehicle.foxglove.stream_marks import StreamMarks
+from server.vehicle.foxglove.delay import StreamMarks
 
 AHEAD_S = 1000.0  # the server's clock before ours
 NS = 10**9

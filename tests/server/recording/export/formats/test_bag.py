@@ -14,8 +14,8 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Reader as Reader1
 
 from server.recording.export.bag_file import CHUNK_BYTES, BagFile, BagTimeOutOfRange
+from server.recording.export.export_format import ExportRefused, Outcome
 from server.recording.export.formats.bag import write_bag
-from server.recording.export.outcome import ExportRefused, Outcome
 from server.recording.read.read import open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1, write_ros2
 from tests.server.recording.export.ours import OurFile, as_ours, event

@@ -13,8 +13,8 @@ import pytest
 from monitor.signals import SIGNALS
 from server.bus.event_table import COLUMNS
 from server.recording.export.columns import TABLES
+from server.recording.export.export_format import ExportRefused, Outcome
 from server.recording.export.formats.csv_zip import write_csv_zip
-from server.recording.export.outcome import ExportRefused, Outcome
 from server.recording.read.read import open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1, write_ros2
 from tests.server.recording.export.ours import TOML, OurFile, Own, as_ours, event

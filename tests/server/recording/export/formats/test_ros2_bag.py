@@ -12,8 +12,8 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader as Reader2
 from rosbags.typesys import get_types_from_msg
 
+from server.recording.export.export_format import ExportRefused, Outcome
 from server.recording.export.formats.ros2_bag import write_ros2_bag
-from server.recording.export.outcome import ExportRefused, Outcome
 from server.recording.read.read import open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1, write_ros2
 from tests.server.recording.export.ours import OurFile, as_ours, event
