@@ -80,7 +80,7 @@ class Questions:
         self.set_clock(vehicle, answer.run, answer.now_s)
         if answer.refused:
             outcome: Outcome = "unknown" if answer.is_unknown else "not_delivered"
-            raise NotServed(answer.refused, outcome=outcome, cut=None if answer.is_unknown else "broker-agent")
+            raise NotServed(answer.refused, outcome=outcome)  # the agent answers: no link is cut
         return answer
 
     def _unanswered(self, vehicle: str, client: Client, within_s: float) -> NotServed:
