@@ -187,7 +187,7 @@ def _fleet(
     agent = NatsAgent(bus, run=boot, now=now, admit=orders.admit)
     kept = HttpAgent(lambda: bus.vehicles, at_agent, scope_of, now=now)
     name = f"catgraph agent {' '.join(v.name for v in config.vehicles)}"
-    return bus, BrokerLink(config.broker, agent, kept, name=name), None
+    return bus, BrokerLink(config.broker, agent, kept, name=name, unsent=lambda: agent.unsent), None
 
 
 def _replays(
