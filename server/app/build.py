@@ -170,12 +170,15 @@ def _fleet(
     from server.bus.nats_http_node import HttpNode
     from server.bus.nats_link import BrokerLink
     from server.web.known_vehicles import KnownVehicles
-    from server.web.remote_frames import RemoteFrames
+    from server.web.remote_frames import RemoteFrames, event
 
     if config.is_node:
         known = KnownVehicles(config.data, storage, forget=config.forgotten)
         expected = known.names.union(config.expected)
-        remote = NatsBus(now=now, read=RemoteFrames(wall_ms), expected=expected, on_new=known.note, on_heard=off.heard)
+        remote = NatsBus(
+            now=now, read=RemoteFrames(wall_ms), read_event=event, expected=expected,
+            on_new=known.note, on_heard=off.heard,
+        )  # fmt: skip
         agents = HttpNode(remote.trouble, now=now)
         if not config.is_open:
             bucket = DevicesBucket(SharedDevices(access, wall_ms=wall_ms, people=SharedPeople(people)))
@@ -186,7 +189,7 @@ def _fleet(
     agent = NatsAgent(bus, run=boot, now=now, admit=orders.admit)
     kept = HttpAgent(lambda: bus.vehicles, at_agent, scope_of, now=now)
     name = f"catgraph agent {' '.join(v.name for v in config.vehicles)}"
-    return bus, BrokerLink(config.broker, agent, kept, name=name), None
+    return bus, BrokerLink(config.broker, agent, kept, name=name, unsent=lambda: agent.unsent), None
 
 
 def _replays(

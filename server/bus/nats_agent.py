@@ -91,7 +91,7 @@ class NatsAgent:
         self._stops: list[Callable[[], None]] = []
         self._subscriptions: list[Subscription] = []
         self.refused = 0  # what could not be read or sent, or was too much
-        self._said_s: dict[str, float] = {}  # when it was logged that something is too large
+        self._too_large: dict[str, tuple[str, float, float]] = {}  # what: a sentence, when it was so, and was logged
 
     def open(self) -> None:
         """Nothing: an agent does without a broker."""
@@ -158,17 +158,16 @@ class NatsAgent:
         finally:
             self._pulls -= 1
         data = self._framed(came_s, frame)
-        if len(data) > wire.LARGEST:
-            self.refused += 1
-            self._log_too_large(f"frame {kind}", vehicle, len(data))
+        if len(data) > self._largest:
+            refused = self._note_too_large(f"{kind} frame", vehicle, len(data))
             await asyncio.sleep(wire.PULL_WAITS_S)  # it would be asked for again at once
-            data = self._framed(came_s, None)
+            data = self._framed(came_s, None, refused)
         await self._respond(message, data)
 
-    def _framed(self, came_s: float, frame: Frame | None) -> bytes:
-        """A frame as it is sent now; None: that there is no newer one."""
+    def _framed(self, came_s: float, frame: Frame | None, refused: str = "") -> bytes:
+        """A frame as it is sent now; None: that there is no newer one, or why it is refused."""
         now_s = self._now()
-        head = wire.FrameHead(run=self._run, number=0, now_s=now_s, waited_s=now_s - came_s)
+        head = wire.FrameHead(run=self._run, number=0, now_s=now_s, waited_s=now_s - came_s, refused=refused)
         if frame is None:
             return wire.encode_frame(head)
         head = head.model_copy(
@@ -184,7 +183,7 @@ class NatsAgent:
             events = await self._bus.events_after(vehicle, n, wire.PORTION)
             if not events or self._published[vehicle] != n:  # another task was faster
                 return
-            events = wire.fitting(events)
+            events = wire.fitting(events, self._largest)
             self._published[vehicle] = events[-1]["n"]
             await self._publish(vehicle, "events", wire.Events(run=self._run, events=events))
 
@@ -236,12 +235,12 @@ class NatsAgent:
         finally:
             self._asked -= 1
         if events := found.get("events"):
-            found["events"] = wire.fitting(events)
+            found["events"] = wire.fitting(events, self._largest)
             found["is_cut"] = len(found["events"]) < len(events)
         body = wire.Answer(run=self._run, now_s=self._now(), last=self._bus.last_event(vehicle), **found)
         data = wire.encode(body)
-        if len(data) > wire.LARGEST:
-            self._log_too_large(f"answer to {asked.do}", vehicle, len(data))
+        if len(data) > self._largest:
+            self._note_too_large(f"answer to {asked.do}", vehicle, len(data))
             refusal = f"the answer of {vehicle} is too large for the broker ({len(data) // 1000} kB)"
             data = wire.encode(
                 wire.Answer(
@@ -250,11 +249,31 @@ class NatsAgent:
             )
         await self._respond(message, data)
 
-    def _log_too_large(self, what: str, vehicle: str, size: int) -> None:
-        now_s = self._now()
-        if now_s - self._said_s.get(what, -SAID_AGAIN_S) >= SAID_AGAIN_S:
-            self._said_s[what] = now_s
+    @property
+    def _largest(self) -> int:
+        """Bytes of the largest body that the broker takes."""
+        return wire.LARGEST if self._client is None else wire.largest(self._client.max_payload)
+
+    @property
+    def unsent(self) -> str | None:
+        """What of late was too large for the broker, in sentences; None: nothing."""
+        since_s = self._now() - SAID_AGAIN_S
+        return " ".join(words for words, at_s, _ in self._too_large.values() if at_s > since_s) or None
+
+    def _note_too_large(self, what: str, vehicle: str, size: int) -> str:
+        """A sentence on it."""
+        self.refused += 1
+        now_s, key = self._now(), f"{what} {vehicle}"
+        _, _, logged_s = self._too_large.get(key, ("", 0.0, -SAID_AGAIN_S))
+        if now_s - logged_s >= SAID_AGAIN_S:
+            logged_s = now_s
             log.error("too_large_for_the_broker what=%s vehicle=%s bytes=%d", what, vehicle, size)
+        words = (
+            f"The {what} of {vehicle} has {size // 1000} kB, and the broker takes {self._largest // 1000} kB: "
+            "it is not sent to web nodes."
+        )
+        self._too_large[key] = (words, now_s, logged_s)
+        return words
 
     async def _command(self, vehicle: str, asked: wire.Ask) -> Any:
         """Raises NotServed, also for a command that came too late or was meant for an earlier run."""

@@ -15,11 +15,12 @@ from server.bus.log_runs import Resumed
 from server.bus.nats_heard import GONE_AFTER_S, Heard
 from server.bus.nats_logs import RemoteLogs
 from server.bus.nats_pulls import Pulls
-from server.bus.nats_questions import Questions
+from server.bus.nats_questions import Questions, ReadEvent
 from server.bus.nats_sync import processed
 from server.bus.watchers import Watchers
 
 NOTIFY_EVERY_S = 0.5
+REFUSED_FOR_S = FRAME_LIVES_S + wire.PULL_WAITS_S  # after it was said last
 
 
 Read = Callable[[str, str, str | bytes, float], str | bytes]  # of vehicle, kind, payload, age [s]; raises Malformed
@@ -38,10 +39,12 @@ class NatsBus:
         now: Callable[[], float],
         read: Read = as_it_is,
         expected: Collection[str] = (),
+        read_event: ReadEvent = lambda event: event,
         on_new: Watcher = lambda _: None,
         on_heard: Watcher = lambda _: None,
     ) -> None:
-        """`read` frames of agents; `expected`: vehicles that are listed from the start, the others once heard.
+        """`read` frames of agents, `read_event` their events; `expected`: vehicles that are listed from the start, the
+        others once heard.
 
         `on_new` is called with the name of each vehicle that is heard for the first time, `on_heard` each time.
         """
@@ -53,10 +56,11 @@ class NatsBus:
         self._watchers = Watchers()
         self._wanted: dict[tuple[str, str], int] = {}
         self._notifying: asyncio.Task[None] | None = None
-        self._questions = Questions(now=now)
+        self._questions = Questions(now=now, read_event=read_event)
         self._heard = Heard(self._questions, now=now, expected=expected)
         self._logs = RemoteLogs(self._questions, lambda vehicle: self._watchers.wake(vehicle, "events"))
-        self._pulls = Pulls(self._questions, self._take_frame, now=now)
+        self._refused: dict[tuple[str, str], tuple[str, float]] = {}  # why there is no frame of a kind, and since when
+        self._pulls = Pulls(self._questions, self._take_frame, self._note_refused, now=now)
 
     def open(self) -> None:
         """Notify watchers of troubles, with or without a broker."""
@@ -90,9 +94,13 @@ class NatsBus:
 
     def trouble(self, vehicle: str) -> str | None:
         trouble = self._heard.trouble(vehicle)
-        if trouble is None and self._watchers.viewers(vehicle) and self.newest(vehicle, "state") is None:
-            return f"The agent of {vehicle} answers, and sends no values."
-        return trouble
+        if trouble is not None:
+            return trouble
+        if not self._watchers.viewers(vehicle):
+            return self._why_none(vehicle, SUMMARY)
+        if self.newest(vehicle, "state") is None:
+            return self._why_none(vehicle, "state") or f"The agent of {vehicle} answers, and sends no values."
+        return None
 
     def knows(self, vehicle: str) -> bool:
         return vehicle in self._logs
@@ -182,6 +190,14 @@ class NatsBus:
         payload = self._read_frame(vehicle, kind, payload, self._now() - put_s)
         whose, name = (ALL, vehicle) if kind == SUMMARY else (vehicle, kind)
         self._keep(whose, name, payload, put_s)
+        self._refused.pop((vehicle, kind), None)
+
+    def _note_refused(self, vehicle: str, kind: str, why: str) -> None:
+        self._refused[vehicle, kind] = (why, self._now())
+
+    def _why_none(self, vehicle: str, kind: str) -> str | None:
+        why, at_s = self._refused.get((vehicle, kind), ("", 0.0))
+        return why if why and self._now() - at_s <= REFUSED_FOR_S else None
 
     def last_event(self, vehicle: str) -> int:
         return self._logs.last(vehicle)
@@ -227,7 +243,7 @@ class NatsBus:
             return None
         if news.run != self.run(vehicle):
             self._meet(vehicle, news.run, first - 1)
-        return self._logs.take(vehicle, news.events)
+        return self._logs.take(vehicle, [self._questions.read_event(one) for one in news.events])
 
     async def request(
         self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0, comes_within_s: float | None = None

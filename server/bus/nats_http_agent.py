@@ -245,4 +245,9 @@ class HttpAgent:
     async def _respond(self, message: Msg, head: http.Chunk, payload: bytes = b"") -> None:
         with contextlib.suppress(NatsError):
             if self._client is not None and self._client.is_connected and message.reply:
-                await message.respond(http.pack(head, payload))
+                data = http.pack(head, payload)
+                if len(data) > http.LONGEST_MESSAGE:
+                    data = http.pack(
+                        http.Chunk(state="refused", status=502, refused="The answer has too long headers.")
+                    )
+                await message.respond(data)

@@ -23,6 +23,7 @@ SILENT_S = 8.0  # an agent that answers nothing for so long is given up
 ABSENT_S = 2.0  # where the broker knows nobody who would answer: an agent that starts again comes later
 BEGINS_WITHIN_S = 180.0  # an export is made first
 GOES_ON_WITHIN_S = 30.0  # between two chunks
+TOO_MUCH = "this is more than a request may carry"
 SLOW_S = 0.25  # a chunk that takes longer on its way leaves no room for frames: fewer are under way
 
 
@@ -82,7 +83,7 @@ class HttpNode:
         """The agent's answer, for the length of the block. Raises NotServed, Refused."""
         parts = [body[at : at + http.CHUNK] for at in range(0, max(1, len(body)), http.CHUNK)]
         if len(parts) > http.MOST_PARTS:
-            raise NotServed("this is more than a request may carry")
+            raise NotServed(TOO_MUCH)
         if (trouble := self._trouble(vehicle)) is not None:
             raise NotServed(trouble.rstrip("."))
         begin = begin.model_copy(update={"parts": len(parts)})
@@ -96,12 +97,13 @@ class HttpNode:
             await self._publish(vehicle, http.Drop(id=begin.id))
 
     async def ask(self, vehicle: str, what: str, head: wire.Body, payload: bytes = b"") -> tuple[http.Chunk, bytes]:
-        """One message and its answer. Raises the errors of the client, TimeoutError and Malformed."""
+        """One message and its answer. Raises the errors of the client, TimeoutError, Malformed and NotServed."""
         client = self._client
         if client is None or not client.is_connected:  # else it would wait in the client and come late
             raise TimeoutError
-        subject = wire.subject(vehicle, f"http.{what}")
-        message = await client.request(subject, http.pack(head, payload), timeout=ANSWERS_WITHIN_S)
+        if len(data := http.pack(head, payload)) > http.LONGEST_MESSAGE:
+            raise NotServed(TOO_MUCH)
+        message = await client.request(wire.subject(vehicle, f"http.{what}"), data, timeout=ANSWERS_WITHIN_S)
         return http.unpack(http.Chunk, message.data)
 
     async def _publish(self, vehicle: str, head: http.Drop) -> None:

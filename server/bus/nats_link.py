@@ -7,12 +7,14 @@ import contextlib
 import logging
 import secrets
 import ssl
+from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
 import nkeys
 from nats.aio.client import Client
 
+from server.bus import nats_wire as wire
 from server.bus.broker import Broker, BrokerRefused
 
 log = logging.getLogger("catgraph.bus")
@@ -48,9 +50,13 @@ class BrokerLink:
     after its key was withdrawn, the client ends for good: then another one takes its place.
     """
 
-    def __init__(self, broker: Broker, *parts: Part, name: str) -> None:
-        """`name`: of this program in the broker's own lists. Raises BrokerRefused."""
+    def __init__(
+        self, broker: Broker, *parts: Part, name: str, unsent: Callable[[], str | None] = lambda: None
+    ) -> None:
+        """`name`: of this program in the broker's own lists; `unsent`: what was too large for the broker, as a
+        sentence. Raises BrokerRefused."""
         self._broker = broker
+        self.unsent = unsent
         self._parts = parts
         self._name = name
         self._seed = _seed(broker.key)
@@ -101,6 +107,7 @@ class BrokerLink:
             self._client = client
             try:
                 await self._connect(client, ended)
+                _check_size(client)
                 for part in self._parts:
                     await part.start(client)
                 self._is_started = True
@@ -150,6 +157,13 @@ class BrokerLink:
         if self._why != said or now_s - at_s > SAID_AGAIN_S:
             self._said = (self._why, now_s)
             log.warning("broker_error address=%s why=%s", self._broker.address, self._why)
+
+
+def _check_size(client: Client) -> None:
+    """Raises BrokerRefused where the broker takes less than each part must be able to send."""
+    if client.max_payload < wire.SMALLEST:
+        takes, needed = client.max_payload // 1000, wire.SMALLEST // 1000
+        raise BrokerRefused(f"it takes messages of {takes} kB at most, and {needed} kB are needed (max_payload)")
 
 
 def _words(why: Exception) -> str:

@@ -13,17 +13,19 @@ from server.bus.nats_questions import ANSWER_S, Questions
 MOST = 100  # questions a second for one kind of frame, where an agent answers at once
 RETRY_S = 0.5  # after a pull that nobody answered
 Keep = Callable[[str, str, str | bytes, float], None]
+Refuse = Callable[[str, str, str], None]
 
 
 class Pulls:
     """`keep` gets vehicle, kind, payload, and when it was put by our clock `now`, in seconds: at the latest then.
 
-    It raises Malformed.
+    It raises Malformed. `refuse` gets vehicle, kind, and why there is no frame, as a sentence.
     """
 
-    def __init__(self, questions: Questions, keep: Keep, *, now: Callable[[], float]) -> None:
+    def __init__(self, questions: Questions, keep: Keep, refuse: Refuse, *, now: Callable[[], float]) -> None:
         self._questions = questions
         self._keep = keep
+        self._refuse = refuse
         self._now = now
         self._tasks: dict[tuple[str, str], asyncio.Task[None]] = {}
 
@@ -67,10 +69,11 @@ class Pulls:
                 await asyncio.sleep(RETRY_S)
                 continue
             except wire.Malformed as why:
-                self._questions.refuse(subject, why)
-                await asyncio.sleep(RETRY_S)
+                await self._not_read(vehicle, kind, why)
                 continue
             self._questions.set_clock(vehicle, head.run, head.now_s)
+            if head.refused:
+                self._refuse(vehicle, kind, head.refused)
             if not head.number or (head.number, head.run) == (have, run):
                 continue
             have, run = head.number, head.run
@@ -79,5 +82,9 @@ class Pulls:
             try:
                 self._keep(vehicle, kind, payload, put_s)
             except wire.Malformed as why:
-                self._questions.refuse(subject, why)
-                await asyncio.sleep(RETRY_S)
+                await self._not_read(vehicle, kind, why)
+
+    async def _not_read(self, vehicle: str, kind: str, why: wire.Malformed) -> None:
+        self._questions.refuse(wire.subject(vehicle, f"pull.{kind}"), why)
+        self._refuse(vehicle, kind, f"The agent of {vehicle} sends what this server cannot read.")
+        await asyncio.sleep(RETRY_S)

@@ -17,6 +17,7 @@ from server.bus.bus import NotServed, Outcome
 log = logging.getLogger("catgraph.bus")
 
 SAID_AGAIN_S = 10.0  # what an agent sends fills no log
+ReadEvent = Callable[[dict[str, Any]], dict[str, Any]]
 ANSWER_S = 2.0  # for a question; a command has its own deadline
 
 
@@ -36,7 +37,9 @@ class AgentClock:
 class Questions:
     """Asks the agents. `now`: a monotonic clock in seconds."""
 
-    def __init__(self, *, now: Callable[[], float]) -> None:
+    def __init__(self, *, now: Callable[[], float], read_event: ReadEvent = lambda event: event) -> None:
+        """`read_event`: an event of an agent as pages get it."""
+        self.read_event = read_event
         self.client: Client | None = None  # None: there was no connection yet
         self._now = now
         self.clocks: dict[str, AgentClock] = {}
@@ -63,7 +66,7 @@ class Questions:
         if client is None or not client.is_connected:  # else it would wait in the client and come late
             raise NotServed("the broker is not connected", cut="server-broker")
         data = wire.encode(asked)
-        if len(data) > wire.LARGEST:  # the broker would end the connection, with every car of this node
+        if len(data) > wire.largest(client.max_payload):  # the broker would end the connection
             raise NotServed(
                 f"the request is too large for the broker ({len(data) // 1000} kB)", outcome="not_delivered"
             )
@@ -78,9 +81,11 @@ class Questions:
             self.refuse(vehicle, why)
             raise NotServed(f"the agent of {vehicle} answered what cannot be read", outcome="unknown") from None
         self.set_clock(vehicle, answer.run, answer.now_s)
+        numbered = [one for one in answer.events if type(one.get("n")) is int]
+        answer = answer.model_copy(update={"events": [self.read_event(one) for one in numbered]})
         if answer.refused:
             outcome: Outcome = "unknown" if answer.is_unknown else "not_delivered"
-            raise NotServed(answer.refused, outcome=outcome, cut=None if answer.is_unknown else "broker-agent")
+            raise NotServed(answer.refused, outcome=outcome)  # the agent answers: no link is cut
         return answer
 
     def _unanswered(self, vehicle: str, client: Client, within_s: float) -> NotServed:

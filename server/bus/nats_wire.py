@@ -29,7 +29,9 @@ HERE_EVERY_S = 1.0
 PULL_WAITS_S = 1.0  # an agent without a newer frame answers after so long that there is none
 PORTION = 100  # events of one message: far below the broker's largest
 TRACE = "Catgraph-Trace"
-LARGEST = 900_000  # bytes of a body; the broker takes 1 MiB, with the headers
+LARGEST = 900_000  # bytes of a body; a broker as it is takes 1 MiB
+HEADERS = 200  # bytes that the broker counts beside a body, at most
+SMALLEST = 140_000  # bytes that a broker must take: chunks of downloads are smaller
 HEAD = 10_000  # bytes of a body besides its events
 KINDS = frozenset({"state", "scan", SUMMARY})
 
@@ -70,6 +72,7 @@ class FrameHead(Body):
     waited_s: Duration = 0.0  # from the pull to this answer
     age_s: Duration = 0.0  # of the frame when it was sent
     is_text: bool = True
+    refused: Annotated[str, Field(max_length=300)] = ""  # why the newer one is not sent, as a sentence
 
 
 class Here(Body):
@@ -114,6 +117,11 @@ def headers() -> dict[str, str] | None:
     return {TRACE: trace} if (trace := log_context.trace()) else None
 
 
+def largest(broker_takes: int) -> int:
+    """Bytes of the largest body for a broker that takes so many bytes."""
+    return min(LARGEST, broker_takes - HEADERS)
+
+
 def subject(vehicle: str, what: str) -> str:
     return f"veh.{vehicle}.{what}"
 
@@ -137,17 +145,17 @@ def decode(kind: type[B], data: bytes) -> B:
         raise Malformed(str(error)[:200]) from None
 
 
-def fitting(events: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def fitting(events: list[dict[str, Any]], largest: int = LARGEST) -> list[dict[str, Any]]:
     """As many of the first events as fit into one body. One that alone does not fit is cut to its number and time, so
     that those behind it arrive."""
     size, found = HEAD, []
     for event in events:
         length = len(orjson.dumps(event)) + 1
-        if HEAD + length > LARGEST:
+        if HEAD + length > largest:
             log.error("event_too_large_for_the_broker n=%s bytes=%d", event.get("n"), length)
             event = {name: event[name] for name in ("n", "at_ms", "alarm", "change") if name in event}
             length = len(orjson.dumps(event)) + 1
-        if (size := size + length) > LARGEST:
+        if (size := size + length) > largest:
             break
         found.append(event)
     return found

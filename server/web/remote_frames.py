@@ -1,4 +1,8 @@
-"""What a web node makes of frames that came from an agent: no page gets what is not of this vehicle."""
+"""What a web node makes of frames and events that came from an agent: no page gets what is not of this vehicle, or not
+of the declared types.
+
+A word that is not declared, as a priority of a newer version, is taken: the page knows what to make of it.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +14,17 @@ from pydantic import TypeAdapter, ValidationError
 
 from server.bus import nats_wire as wire
 from server.bus.bus import SUMMARY
+from server.protocol.alarm_state import LogEvent
 from server.protocol.cars_state import CarSummary
 from server.protocol.slow_down_state import FORMER_PHASES
+from server.protocol.state import LiveState
 
 LONGEST_SUMMARY = 6000  # bytes; it goes to every page
 _SUMMARY: TypeAdapter[CarSummary] = TypeAdapter(CarSummary)
+_STATE: TypeAdapter[LiveState] = TypeAdapter(LiveState)
+_EVENT: TypeAdapter[LogEvent] = TypeAdapter(LogEvent)
+# What a page needs of each event, and what it gets where an event has it not, or as another type.
+_UNREAD = {"at_ms": 0, "alarm": None, "change": "unread", "text": "This event of the agent cannot be read."}
 
 
 class RemoteFrames:
@@ -40,6 +50,9 @@ def state(vehicle: str, payload: str | bytes, time_ms: int) -> str:
     found = _loaded(payload)
     if found.get("kind") != "state" or found.get("vehicle") != vehicle or not isinstance(found.get("server"), dict):
         raise wire.Malformed(f"no state of {vehicle}")
+    if wrong := _wrong(_STATE, payload):
+        raise wire.Malformed(f"a state with a wrong {', '.join(wrong)}"[:200])
+    found = {name: found[name] for name in LiveState.__annotations__ if name in found}
     found["server"]["time_ms"] = time_ms
     if isinstance(slow_down := found.get("decelerate"), dict):
         _rename(slow_down, "state")
@@ -63,6 +76,33 @@ def summary(payload: str | bytes, time_ms: int) -> str:
         return orjson.dumps(found).decode()
     except (ValidationError, TypeError, ValueError) as error:  # a number may be too large to be written
         raise wire.Malformed(str(error)[:200]) from None
+
+
+def event(found: dict[str, Any]) -> dict[str, Any]:
+    """The event as pages get it: what is of another type than declared is left out, and no event is."""
+    try:
+        wrong = _wrong(_EVENT, orjson.dumps(found))
+    except TypeError:  # nested too deeply to be written
+        return {"n": found.get("n"), **_UNREAD}
+    for name, kind in wrong.items():
+        if kind != "missing":
+            del found[name]
+        if name in _UNREAD:
+            found[name] = _UNREAD[name]
+    return found
+
+
+def _wrong(adapter: TypeAdapter[Any], payload: str | bytes) -> dict[str, str]:
+    """The fields of a body that are not of the declared type, and the kind of the mistake."""
+    try:
+        adapter.validate_json(payload, strict=True)
+    except ValidationError as error:
+        return {
+            str(one["loc"][0]) if one["loc"] else "body": one["type"]
+            for one in error.errors(include_url=False, include_context=False)
+            if one["type"] not in ("literal_error", "enum") or not isinstance(one["input"], str)
+        }
+    return {}
 
 
 def _rename(found: dict[str, Any], field: str) -> None:

@@ -145,7 +145,8 @@ class Services:
         """What is wrong with the server, a sentence each; those of a vehicle begin with its name."""
         found = [f"{name}: {what}" for name, session in self.sessions.items() for what in problems(session.vitals())]
         if self.link is not None:
-            found += [one for one in (self.link.complaint, self.link.refused) if one is not None]
+            said = (self.link.complaint, self.link.refused, self.link.unsent())
+            found += [one for one in said if one is not None]
         if self.people.complaint is not None:
             found.append(self.people.complaint)
         if self.recordings is not None:

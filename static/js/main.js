@@ -301,8 +301,8 @@ function listenEverywhere(page, arming) {
     closeSheet(/** @type {HTMLDialogElement} */ (need(document, '#sheet-menu')));
     page.openPhone();
   });
-  store.on('became', ({ kind, became, reason }) => {
-    const { text, title } = laterWords(kind, became, reason);
+  store.on('became', ({ kind, became, reason, cut }) => {
+    const { text, title } = laterWords(kind, became, reason, cut);
     say(text, title);
   });
   store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));

@@ -4,6 +4,7 @@ import { Emitter } from '../../static/js/core/emitter.js';
 import { EventLog } from '../../static/js/core/event-log.js';
 import { challengeOf, controlOf, fenceOf, liveOf } from '../../static/js/core/live-car.js';
 import { LogSync } from '../../static/js/core/log-sync.js';
+import { laterWords } from '../../static/js/core/outcome.js';
 import { Requests } from '../../static/js/core/requests.js';
 import { ScanFeed } from '../../static/js/core/scan-feed.js';
 import { state } from './frames.js';
@@ -38,11 +39,12 @@ test('what is asked is answered once, not sent where it cannot be, and not known
   assert.deepEqual(await first, { ok: false, reason: 'Not now.', isConflict: true, heldBy: 'Ann' });
   const second = requests.ask('pause', {});
   requests.broke();
-  const broken = 'The connection to the server broke. It may have been carried out.';
+  const cut = 'It may have been carried out. The link is cut between this page and the server. Not known yet in which direction.';
+  const broken = `The connection to the server broke. ${cut}`;
   assert.deepEqual(await second, { ok: false, outcome: 'unknown', reason: broken });
   const third = requests.ask('pause', {}, 100);
   t.mock.timers.tick(100);
-  const late = 'The server did not answer in time. It may have been carried out.';
+  const late = `The server did not answer in time. ${cut}`;
   assert.equal((await third).reason, late);
   assert.deepEqual(refused, ['Not now.', broken, late]);
 });
@@ -83,12 +85,12 @@ test('what became of a command that was not answered is asked until it is known,
   reply(`${pause}?`, { became: 'done' });
   reply(`${pause}?`, { became: 'done' });
   reply(take, { ok: false, reason: 'Ben has it.' }); // its own answer, late
-  assert.deepEqual(found, [{ kind: 'pause', became: 'done', reason: '' }, { kind: 'take_item', became: 'refused', reason: 'Ben has it.' }]);
+  assert.deepEqual(found, [{ kind: 'pause', became: 'done', reason: '', cut: 'page-server' }, { kind: 'take_item', became: 'refused', reason: 'Ben has it.', cut: 'page-server' }]);
   sent.length = 0;
   void requests.ask('resume', {});
   requests.broke();
   requests.look(performance.now() + 61_000);
-  assert.deepEqual(found[2], { kind: 'resume', became: 'not_known', reason: '' });
+  assert.deepEqual(found[2], { kind: 'resume', became: 'not_known', reason: '', cut: 'page-server' });
   void requests.ask('resume', {});
   requests.broke();
   requests.forget();
@@ -105,6 +107,44 @@ test('an answer that says that it is not known is looked up as well', async () =
   assert.equal((await answer).outcome, 'unknown');
   requests.look(performance.now());
   assert.equal(sent[1].of, sent[0].id);
+});
+
+const LOST = /** @type {const} */ ([
+  ['not_delivered', 'server-broker', 'The link is cut between server and broker.'],
+  ['not_delivered', 'broker-agent', 'The link is cut between server and agent.'],
+  ['not_delivered', 'agent-car', 'The link is cut between the server or agent and the car.'],
+  ['unknown', 'server-broker', 'The link is cut between server and broker. Not known yet in which direction.'],
+  ['unknown', 'broker-agent', 'The link is cut between server and agent. Not known yet in which direction.'],
+]);
+for (const [outcome, cut, words] of LOST) {
+  test(`every command that is ${outcome} says that the link ${cut} is cut`, async () => {
+    for (const kind of /** @type {const} */ (['pause', 'arm', 'release', 'take_item'])) {
+      const sent = /** @type {any[]} */ ([]);
+      const requests = new Requests((message) => Boolean(sent.push(message)), () => {});
+      const answer = requests.ask(kind, /** @type {any} */ ({}));
+      requests.answered(/** @type {any} */ ({ kind: 'reply', id: sent[0].id, ok: false, outcome, cut, reason: 'Lost.' }));
+      assert.equal((await answer).reason, `Lost. ${words}`);
+    }
+  });
+}
+
+test('a refusal names no cut, and the later word names the direction', async () => {
+  const sent = /** @type {any[]} */ ([]);
+  const found = /** @type {any[]} */ ([]);
+  const requests = new Requests((message) => Boolean(sent.push(message)), () => {}, () => null, (one) => found.push(one));
+  const asked = requests.ask('pause', {});
+  requests.answered(/** @type {any} */ ({ kind: 'reply', id: sent[0].id, ok: false, outcome: 'not_delivered', cut: null, reason: 'Too late.' }));
+  assert.equal((await asked).reason, 'Too late.');
+  const lost = (/** @type {string} */ became) => {
+    void requests.ask('release', /** @type {any} */ ({}));
+    const { id } = sent.at(-1);
+    requests.answered(/** @type {any} */ ({ kind: 'reply', id, ok: false, outcome: 'unknown', cut: 'broker-agent', reason: 'Lost.' }));
+    requests.answered(/** @type {any} */ ({ kind: 'reply', id: `${id}?`, ok: true, became }));
+    const { kind, reason, cut } = found.at(-1);
+    return laterWords(kind, became === 'done' ? 'done' : 'never', reason, cut).text;
+  };
+  assert.equal(lost('done'), '“Release” was carried out. Only its answer was lost: the link was cut in the direction back, between server and agent.');
+  assert.equal(lost('never'), '“Release” was lost on its way. It is not carried out any more. The link was cut in the direction to the car, between server and agent.');
 });
 
 test('what must be signed is sent once it is, in its order, and never late', async (t) => {

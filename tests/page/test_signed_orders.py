@@ -89,9 +89,13 @@ async def test_a_page_signs_what_it_orders_and_a_cleared_browser_begins_anew(pho
         await expect(note).to_contain_text("Not known")
         await expect(note).to_contain_text("The agent of ocelot did not answer")
         await expect(note).to_contain_text("It may have been carried out.")
+        await expect(note).to_contain_text(
+            "The link is cut between server and agent. Not known yet in which direction."
+        )
         one.agent.thaw()
         await expect(note).to_contain_text("Not carried out", timeout=20_000)
         await expect(note).to_contain_text("“Resume” was lost on its way.")
+        await expect(note).to_contain_text("The link was cut in the direction to the car, between server and agent.")
         await phone.live()
         await expect(phone.f("pause")).to_contain_text("Resume")
         phone.complaints[:] = [said for said in phone.complaints if "503" not in said]  # what it asked of a lost agent

@@ -4,6 +4,7 @@
  * @typedef {import('./protocol-types.js').Reply} Reply
  * @typedef {NonNullable<Reply['outcome']>} Outcome
  * @typedef {NonNullable<Reply['became']>} Became
+ * @typedef {NonNullable<Reply['cut']> | 'page-server'} Cut
  * @typedef {Exclude<import('./protocol-types.js').PageMessage['kind'], 'hello' | 'take' | 'have' | 'watch' | 'replay' | 'present' | 'position' | 'outcome'>} Ordered
  */
 
@@ -24,6 +25,22 @@ export function isMaybe(sentence) {
   return sentence.includes(MAYBE);
 }
 
+/** Between which parts a command was lost. Of a silent broker and a silent agent a server cannot tell which it is. @type {Record<Cut, string>} */
+const BETWEEN = {
+  'page-server': 'this page and the server', 'server-broker': 'server and broker', 'broker-agent': 'server and agent', 'agent-car': 'the server or agent and the car',
+};
+
+/**
+ * The reason why a command was not answered, with the part of the link that is cut.
+ * @param {string} reason
+ * @param {Outcome} outcome
+ * @param {Cut} cut
+ */
+export function withCut(reason, outcome, cut) {
+  const direction = outcome === 'unknown' ? ' Not known yet in which direction.' : '';
+  return `${reason} The link is cut between ${BETWEEN[cut]}.${direction}`;
+}
+
 /** A sentence on a command that may have been carried out. @param {string} why */
 export function maybe(why) {
   return `${why} ${MAYBE}`;
@@ -34,17 +51,19 @@ export function maybe(why) {
  * @param {string} kind
  * @param {Became} became
  * @param {string} reason where it was refused
+ * @param {Cut | null} cut where it was lost, where known
  * @returns {{title: string, text: string}}
  */
-export function laterWords(kind, became, reason) {
+export function laterWords(kind, became, reason, cut) {
+  const between = cut ? `, between ${BETWEEN[cut]}` : '';
   const name = `“${NAMES[/** @type {Ordered} */ (kind)] ?? kind.replaceAll('_', ' ')}”`;
   switch (became) {
     case 'done':
-      return { title: 'Carried out', text: `${name} was carried out. Only its answer was lost.` };
+      return { title: 'Carried out', text: `${name} was carried out. Only its answer was lost: the link was cut in the direction back${between}.` };
     case 'refused':
       return { title: 'Refused', text: `${name} was refused: ${reason || 'it is not known why.'}` };
     case 'never':
-      return { title: 'Not carried out', text: `${name} was lost on its way. It is not carried out any more.` };
+      return { title: 'Not carried out', text: `${name} was lost on its way. It is not carried out any more. The link was cut in the direction to the car${between}.` };
     default:
       return { title: 'Not known', text: `It is not known whether ${name} was carried out. Look at what the car shows.` };
   }

@@ -48,5 +48,9 @@ export function readMessage(text) {
     const is = Array.isArray(value) ? 'array' : value === null ? 'null' : typeof value;
     if (is !== kind) return null;
   }
-  return understood(message);
+  try {
+    return understood(message);
+  } catch {
+    return null; // what is inside is not of its type
+  }
 }

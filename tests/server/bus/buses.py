@@ -85,10 +85,10 @@ async def offering(bus: LocalBus, address: str, run: str, clock: Clock) -> Async
 
 
 @contextlib.asynccontextmanager
-async def node(address: str, clock: Clock, *, read: Read = as_it_is) -> AsyncIterator[NatsBus]:
-    """The bus of a web node."""
+async def node(address: str, clock: Clock, *, read: Read = as_it_is, **more: Any) -> AsyncIterator[NatsBus]:
+    """The bus of a web node; `more` are parameters of it."""
     async with connected(address) as client:
-        bus = NatsBus(now=clock, read=read)
+        bus = NatsBus(now=clock, read=read, **more)
         await bus.start(client)
         try:
             yield bus

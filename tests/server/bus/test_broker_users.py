@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import dataclasses
+import platform
 import shutil
 import subprocess
 from collections.abc import AsyncIterator, Callable
@@ -23,7 +24,7 @@ from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus
 from server.bus.nats_link import BrokerLink
 from server.bus.nats_sync import processed
-from tests.server.bus.broker import Broker, nats_server, running_broker
+from tests.server.bus.broker import PINNED, Broker, check_pinned, nats_server, running_broker
 from tests.server.bus.buses import local_buses, until
 from tests.server.mail.post import certificates
 
@@ -325,3 +326,14 @@ def test_a_key_file_that_is_none_is_refused_with_a_sentence(tmp_path: Path, text
         path.write_text(text)
     with pytest.raises(BrokerRefused, match=why):
         BrokerLink(BrokerAddress(address="nats://127.0.0.1:1", key=path), NatsBus(now=lambda: 0), name="x")
+
+
+def test_a_broker_that_is_not_the_pinned_one_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = tmp_path / "nats-server"
+    program.write_bytes(b"another program")
+    monkeypatch.setattr(platform, "machine", lambda: "an unknown one")
+    check_pinned.__wrapped__(program)
+    monkeypatch.undo()
+    if (platform.system(), platform.machine()) in PINNED:
+        with pytest.raises(AssertionError, match="is not the pinned nats-server"):
+            check_pinned.__wrapped__(program)

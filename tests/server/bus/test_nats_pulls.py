@@ -27,7 +27,7 @@ async def test_an_agent_that_answers_at_once_does_not_keep_the_node_busy() -> No
     now = asyncio.get_running_loop().time
     questions = Questions(now=now)
     questions.client = cast(Client, SimpleNamespace(request=request))
-    pulls = Pulls(questions, lambda *_: None, now=now)
+    pulls = Pulls(questions, lambda *_: None, lambda *_: None, now=now)
     pulls.look("ocelot", "state", True)
     began_s = now()
     await until(lambda: asked > 2 * MOST + 5)

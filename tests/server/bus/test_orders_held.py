@@ -124,7 +124,7 @@ async def hold_up(place: Place, holds_s: Sequence[float]) -> None:
             for one in told:
                 assert isinstance(one, NotServed), one
                 assert str(one) == "the command reached ocelot too late and was not carried out"
-                assert one.outcome == "not_delivered"
+                assert (one.outcome, one.cut) == ("not_delivered", None), "its agent answers"
             assert {one["what"] for one in both.commands} == {-1}
 
 

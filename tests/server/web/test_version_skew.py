@@ -15,6 +15,7 @@ from server.web import page_writer
 from server.web.cars_board import CarsBoard
 from server.web.remote_frames import RemoteFrames
 from tests.frames import check_frame
+from tests.page.canned import live, slow
 
 NOW_MS = 1_800_000_000_000
 READ = RemoteFrames(lambda: NOW_MS)
@@ -65,7 +66,7 @@ def test_an_older_agent_is_understood() -> None:
 def test_a_phase_of_an_older_agent_has_its_present_name(was: str, now: str) -> None:
     summary = orjson.dumps({**orjson.loads(OLDER), "slow_down": was})
     assert listed(str(READ("ocelot", SUMMARY, summary, 0.0)))["slow_down"] == now
-    state = {"kind": "state", "vehicle": "ocelot", "server": {"time_ms": 1}, "decelerate": {"state": was}}
+    state = live() | {"vehicle": "ocelot", "decelerate": slow(was)}
     assert orjson.loads(READ("ocelot", "state", orjson.dumps(state), 0.0))["decelerate"]["state"] == now
 
 
