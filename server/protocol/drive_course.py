@@ -12,10 +12,12 @@ from server.protocol.doc import doc
 class CoursePoints(TypedDict):
     """Numbers at evenly spaced places or moments; null: not known there."""
 
-    t: Annotated[list[float], doc("s since the recording began")]
+    t: Annotated[list[float], doc("s since the drive began")]
     m: Annotated[list[float | None], doc("distance driven")]
     speed: Annotated[list[float | None], doc("m/s")]
     steering: Annotated[list[float | None], doc("%, negative = left")]
+    follow: Annotated[list[float | None], doc("m/s, speed minus the commanded speed")]
+    gps: Annotated[list[float | None], doc("m, error of the position as the receiver says it, one sigma")]
     lat: list[float | None]
     lon: list[float | None]
 
@@ -30,7 +32,7 @@ class CourseEvent(TypedDict):
 
 
 class Course(TypedDict):
-    """`GET /api/recordings/{id}/course`."""
+    """`GET /api/recordings/{id}/course`: of the whole drive of which the recording is a part."""
 
     start_ms: int
     length_s: float

@@ -15,6 +15,7 @@ class LogbookDrive(TypedDict):
 
     id: Annotated[str, doc("of its first recording")]
     parts: int
+    recordings: Annotated[list[str], doc("its parts, oldest first")]
     vehicle: str
     started_ms: int
     title: str
