@@ -5,7 +5,7 @@ The same class follows a live car and a recording; both give it a snapshot with 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, TypedDict
 
 from monitor.driving_mode import ModeChange, ModeWatch
@@ -17,6 +17,11 @@ MODES: tuple[Mode, ...] = ("autonomous", "manual", "unknown")
 LONGEST_STEP_S = 1.0  # a longer one was not watched: its time is of an unknown mode, and its distance is not known
 KEPT = 1000  # changes and interventions; beyond it they are only counted
 BEFORE_STEP_S = 0.5  # of the samples that an event carries
+
+
+class PerKilometre(TypedDict):
+    interventions: float | None
+    alarms: float | None
 
 
 class InMode(TypedDict):
@@ -124,6 +129,12 @@ class DrivingSummary:
         """So many alarms were announced."""
         self.alarms += count
 
+    def per_km(self) -> PerKilometre:
+        """Of the drive so far."""
+        way_m = self.driving.way_m
+        rates = per_km(way_m["autonomous"], sum(way_m.values()), self.interventions_counted, self.alarms)
+        return {"interventions": _plain(rates["interventions"], 3), "alarms": _plain(rates["alarms"], 3)}
+
     def as_json(self) -> dict[str, Any]:
         """Everything, for a report: SI, times as those of the snapshots."""
         time_s, way_m = self.driving.time_s, self.driving.way_m
@@ -136,17 +147,24 @@ class DrivingSummary:
             "changes_heard": self.driving.watch.changes_heard,
             "interventions": [intervention_json(one) for one in self.interventions],
             "interventions_counted": self.interventions_counted,
-            "per_km": per_km(way_m, interventions=self.interventions_counted, alarms=self.alarms),
+            "per_km": self.per_km(),
         }
 
 
-def per_km(way_m: Mapping[Mode, float], *, interventions: int, alarms: int) -> dict[str, float | None]:
-    """Interventions on a kilometre driven by itself, alarms on a kilometre; None: no such distance."""
-    autonomous_km, all_km = way_m["autonomous"] / 1000, sum(way_m.values()) / 1000
-    return {
-        "interventions": round(interventions / autonomous_km, 3) if autonomous_km > 0 else None,
-        "alarms": round(alarms / all_km, 3) if all_km > 0 else None,
-    }
+def per_km(
+    autonomous_m: float | None, all_m: float | None, interventions: int | None, alarms: int | None
+) -> PerKilometre:
+    """Interventions on a kilometre that the car drove by itself, alarms on any kilometre: the rule of the live page,
+    the report and the logbook. None: the count or the distance is not known, or there is no such distance."""
+    return {"interventions": _on_km(interventions, autonomous_m), "alarms": _on_km(alarms, all_m)}
+
+
+def _on_km(count: int | None, metres: float | None) -> float | None:
+    return None if count is None or not metres or metres <= 0 else count / metres * 1000
+
+
+def _plain(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)
 
 
 def change_json(change: ModeChange) -> dict[str, Any]:
@@ -185,12 +203,8 @@ def before_json(one: Intervention) -> list[dict[str, float | None]]:
 
 def sample_json(sample: Sample, zero_s: float) -> dict[str, float | None]:
     """A sample, at seconds from `zero_s`."""
-
-    def plain(value: float | None, digits: int) -> float | None:
-        return None if value is None else round(value, digits)
-
     return {
         "at_s": round(sample.at_s - zero_s, 2),
-        "speed_mps": plain(sample.speed_mps, 2),
-        "brake_percent": plain(sample.brake_percent, 1),
+        "speed_mps": _plain(sample.speed_mps, 2),
+        "brake_percent": _plain(sample.brake_percent, 1),
     }

@@ -237,6 +237,10 @@ class Monitor:
     def unshelve(self, alarm_id: str, by: str, now_s: float) -> tuple[Transition, ...]:
         return self._respond(alarm_id, lambda alarm: response.unshelve(alarm, by, now_s))
 
+    def take_over(self, alarm_id: str, by: str, now_s: float, *, is_read_back: bool) -> tuple[Transition, ...]:
+        """As `hand_over`, of one alarm; raises Refused."""
+        return self._respond(alarm_id, lambda alarm: response.hand_over(alarm, by, now_s, is_read_back=is_read_back))
+
     def hand_over(self, is_read_back: Callable[[Alarm], bool], by: str, now_s: float) -> tuple[Transition, ...]:
         """Control went to `by`, who has read back some of the alarms."""
         transitions: list[Transition] = []

@@ -13,6 +13,7 @@ from typing import Any
 from server.analysis.alarm_load import Load, load_of
 from server.analysis.episodes import Announcement, Episode
 from server.judge.logged_transition import spec_of, transition_of
+from server.recording.drive.parts import recorded_s
 from server.recording.read.read import Recording
 from server.recording.standing import read_standing
 
@@ -59,7 +60,7 @@ def read_recorded_log(recording: Recording) -> RecordedLog | None:
         entries=entries[:MOST_ENTRIES],
         left_out=max(0, len(entries) - MOST_ENTRIES),
         episodes=_episodes(events, start_s, recording.duration_s),
-        load=_load(events, start_s, recording.duration_s),
+        load=_load(events, start_s, recorded_s(recording)),
         titles={event["alarm"]: spec_of(event).title for event in events if event["alarm"]},
         settings=_settings(recording),
         clip_of=recording.metadata.get("clip_of") or None,

@@ -88,7 +88,7 @@ def build(
         started_s=now(),
         ground=ground,
         off=off,
-        mailer=_mailer(kept, lambda id: _recording(running, id), wall_ms=wall_ms),
+        mailer=_mailer(kept, lambda: running, wall_ms=wall_ms),
         replays=replays,
         recordings=_catalog(kept, now=now, wall_ms=wall_ms),
         link=link,
@@ -288,11 +288,18 @@ def _exports(
     if data is None or catalog is None:
         return None
     folder = RecordingsFolder(catalog.folder)
-    return Exports(data / "exports", folder, catalog.path, catalog.add, now=now, wall_ms=wall_ms)
+    return Exports(
+        data / "exports", folder, catalog.path, catalog.add, now=now, wall_ms=wall_ms, drive_of=catalog.drive_of
+    )
 
 
-def _mailer(data: Path | None, path_of: Callable[[str], Path | None], *, wall_ms: Callable[[], int]) -> Mailer | None:
-    return None if data is None else Mailer(data / "mail", Recorded(path_of), wall_ms=wall_ms)
+def _mailer(data: Path | None, running: Callable[[], Services], *, wall_ms: Callable[[], int]) -> Mailer | None:
+    def drive_of(id: str) -> list[str]:
+        recordings = running().recordings
+        return [id] if recordings is None else recordings.drive_of(id)
+
+    source = Recorded(lambda id: _recording(running(), id), drive_of)
+    return None if data is None else Mailer(data / "mail", source, wall_ms=wall_ms)
 
 
 def _recording(running: Services, id: str) -> Path | None:

@@ -10,7 +10,6 @@ from typing import Any
 
 from monitor.alarm import Transition
 from monitor.phones import PhoneReport
-from monitor.response import SHELVE_AT_MOST_MIN
 from monitor.restoring import restore
 from monitor.runner import Monitor, Refused
 from monitor.signal_limits import expected_rates
@@ -20,6 +19,7 @@ from server.judge import pipeline
 from server.judge.drive import Drive, MessageSource, Row, SettingsEpoch
 from server.judge.pipeline import TICK_S
 from server.judge.reception_stats import Reception
+from server.judge.recorded_answers import answered
 from server.judge.recorded_events import ChosenPhone, NewSettings, Pause, SlowDownEvent, StopChange
 from server.judge.run_state import RunState
 from server.judge.unit_watch import UnitWatch
@@ -291,7 +291,7 @@ class OfflineRun:
     def _respond(self, event: Transition, now_s: float) -> None:
         """What an operator did about an alarm counts where the alarm is raised now as it was then."""
         with suppress(Refused):
-            self._report(_answered(self.run_state.monitor, event, now_s), now_s)
+            self._report(answered(self.run_state.monitor, event, now_s), now_s)
 
     def _restore(self, transitions: Sequence[Transition]) -> None:
         self.run_state.recorded_alarms = restore(self.run_state.recorded_alarms, transitions)
@@ -331,19 +331,3 @@ def _link(drive: Drive, epoch: SettingsEpoch, run_state: RunState, now_s: float)
         undecided=epoch.undecided,
         wall_zero_s=drive.wall_zero_s,
     )
-
-
-def _answered(monitor: Monitor, event: Transition, now_s: float) -> tuple[Transition, ...]:
-    """What the operator's answer that `event` records brings about here; raises Refused."""
-    alarm_id, by = event.alarm_id, event.by or ""
-    match event.change:
-        case "acknowledged":
-            return monitor.acknowledge(alarm_id, event.occurrence, by, now_s)
-        case "silenced":
-            return monitor.silence(alarm_id, event.occurrence, by, now_s)
-        case "shelved" if event.shelved_until_s is not None:
-            minutes = min((event.shelved_until_s - now_s) / 60, SHELVE_AT_MOST_MIN)  # the log has whole ms
-            return monitor.shelve(alarm_id, event.occurrence, minutes, by, now_s)
-        case "unshelved":
-            return monitor.unshelve(alarm_id, by, now_s)
-    return ()

@@ -1,6 +1,7 @@
 """Mails the report of each drive by itself, where that is wished: to the addresses of the setting `report_to`.
 
-A drive has ended once nothing of its session has been written for a while: a link that returns goes on in another part.
+A drive has ended once nothing of its session has been written for a while: a link that returns goes on in another part,
+and after a restart of the server the drive goes on in another session.
 What is still to be mailed is in a file, so that a server that is killed mails it after its next start.
 """
 
@@ -8,8 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,19 +19,19 @@ import orjson
 from server.mail.mail_folder import MailRefused
 from server.mail.mailer import Mailer
 from server.mail.order import Order
-from server.recording.folder import FINISHED, WRITING, id_of, is_id
+from server.recording.drive.drive_events import of_change, read_drive_events
+from server.recording.folder import FINISHED, WRITING, first_part, id_of, is_id
+from server.recording.read.read import RecordingUnreadable, open_recording
 from server.storage import durable_file
 from server.system.supervision import Supervisor
 
 log = logging.getLogger("catgraph.mail")
 
 QUIET_S = 60.0  # nothing was written for so long: the drive has ended
-MOST_PARTS = 20  # recordings of one mail
 MOST_WAITING = 10_000  # recordings that wait to be mailed
 MAX_BYTES = 4 * 1024 * 1024  # of the file of what waits
 FILE = "reports.json"
 TEXT = "The report of the drive, sent when it ended. It opens in any browser without a network, and prints on A4."
-_PART = re.compile(r"_p\d+(-\d+)?$")
 _KEY = 57  # letters of an id in the key of an order
 
 
@@ -54,6 +54,7 @@ class DriveReports:
         self._quiet_s = quiet_s
         self._waiting: dict[tuple[Path, str], _Drive] = {}  # by folder of a car, and session
         self._kept: dict[str, list[str]] = {}  # folder → recordings, as the file has it
+        self._resumed: dict[tuple[Path, str], bool] = {}  # whether a session goes on with the drive before it
         self._loop: asyncio.AbstractEventLoop | None = None
         self._due = asyncio.Event()
         self._supervisor = Supervisor("drive reports")
@@ -66,9 +67,7 @@ class DriveReports:
         """What waits is ordered at once: the outbox keeps it, and it is sent after the next start."""
         await self._supervisor.stop()
         self._loop = None
-        for (folder, session), drive in list(self._waiting.items()):
-            if session not in await asyncio.to_thread(_written, folder):
-                await self._mail(folder, session, drive)
+        await self._mail_all(lambda drives, is_followed: True)
         await self._keep()
 
     def problems(self) -> list[str]:
@@ -83,7 +82,7 @@ class DriveReports:
     def _take(self, folder: Path, id: str) -> None:
         if not self._mailer.settings.report_to:
             return
-        drive = self._waiting.setdefault((folder, _PART.sub("", id)), _Drive())
+        drive = self._waiting.setdefault((folder, first_part(id)), _Drive())
         if id not in drive.ids:
             drive.ids.append(id)
         drive.at_s = self._now()
@@ -106,16 +105,42 @@ class DriveReports:
                 continue  # it is in the file before anything else
             except TimeoutError:
                 pass
-            for (folder, session), drive in list(self._waiting.items()):
-                written = await asyncio.to_thread(_written, folder)
-                if session not in written and self._is_over(folder, session, drive, written):
-                    await self._mail(folder, session, drive)
+            await self._mail_all(self._is_over)
 
-    def _is_over(self, folder: Path, session: str, drive: _Drive, written: Iterable[str]) -> bool:
-        """Whether nothing more will come: it is quiet, or a later session has begun."""
-        others = [*written, *(other for place, other in self._waiting if place == folder)]
-        is_followed = any(other > session for other in others)
-        return self._now() - drive.at_s >= self._quiet_s or (is_followed and not drive.is_refused)
+    async def _mail_all(self, is_over: Callable[[Sequence[_Drive], bool], bool]) -> None:
+        """Mails each drive of which nothing is being written and that is over."""
+        for folder in dict.fromkeys(folder for folder, _ in self._waiting):
+            mine = {session: drive for (place, session), drive in self._waiting.items() if place == folder}
+            written = await asyncio.to_thread(_written, folder)
+            groups = await asyncio.to_thread(self._grouped, folder, sorted({*mine, *written}))
+            for number, group in enumerate(groups):
+                waiting = {session: mine[session] for session in group if session in mine}
+                is_followed = number < len(groups) - 1
+                if waiting and written.isdisjoint(group) and is_over(list(waiting.values()), is_followed):
+                    await self._mail(folder, waiting)
+
+    def _is_over(self, drives: Sequence[_Drive], is_followed: bool) -> bool:
+        """Whether nothing more will come: it is quiet, or another drive has begun."""
+        is_quiet = self._now() - max(drive.at_s for drive in drives) >= self._quiet_s
+        return is_quiet or (is_followed and not any(drive.is_refused for drive in drives))
+
+    def _grouped(self, folder: Path, sessions: Iterable[str]) -> list[list[str]]:
+        """The sessions of each drive: one that goes on after a restart of the server is of the drive before it."""
+        groups: list[list[str]] = []
+        for session in sessions:
+            if groups and self._resumes(folder, session):
+                groups[-1].append(session)
+            else:
+                groups.append([session])
+        return groups
+
+    def _resumes(self, folder: Path, session: str) -> bool:
+        if (folder, session) not in self._resumed:
+            found = _says_it_resumes(folder, session)
+            if found is None:
+                return True  # nothing is written yet that could say so: the drive before it waits
+            self._resumed[folder, session] = found
+        return self._resumed[folder, session]
 
     async def _keep(self) -> None:
         """Writes what waits, where that has changed."""
@@ -131,26 +156,35 @@ class DriveReports:
         else:
             self._kept = kept
 
-    async def _mail(self, folder: Path, session: str, drive: _Drive) -> None:
-        """Orders the mails of one drive; what the outbox does not take is tried again."""
+    async def _mail(self, folder: Path, drives: Mapping[str, _Drive]) -> None:
+        """Orders the mail of one drive; what the outbox does not take is tried again."""
         to = self._mailer.settings.report_to
-        ids = list(drive.ids)
-        there = await asyncio.to_thread(lambda: [id for id in ids if (folder / f"{id}{FINISHED}").is_file()])
+        taken = {session: list(drive.ids) for session, drive in drives.items()}
+        there = await asyncio.to_thread(_one_of_each, folder, taken.values())
         try:
-            for first in range(0, len(there) if to else 0, MOST_PARTS):
-                part = there[first : first + MOST_PARTS]
-                await self._mailer.order(f"report-{part[-1][-_KEY:]}", _order(folder, part, to))
+            if to and there:
+                await self._mailer.order(f"report-{there[-1][-_KEY:]}", _order(folder, there, to))
         except MailRefused as why:
-            if not drive.is_refused:
-                log.warning("drive report not mailed, tried again: recording=%s reason=%s", session, why)
-            drive.is_refused, drive.at_s = True, self._now()
+            for session, drive in drives.items():
+                if not drive.is_refused:
+                    log.warning("drive report not mailed, tried again: recording=%s reason=%s", session, why)
+                drive.is_refused, drive.at_s = True, self._now()
             return
-        drive.ids = [id for id in drive.ids if id not in ids]  # others came meanwhile
-        if not drive.ids:
-            del self._waiting[folder, session]
+        for session, drive in drives.items():
+            drive.ids = [id for id in drive.ids if id not in taken[session]]  # others came meanwhile
+            if not drive.ids:
+                del self._waiting[folder, session]
+            self._resumed.pop((folder, session), None)
 
 
-def _order(folder: Path, ids: list[str], to: tuple[str, ...]) -> Order:
+def _one_of_each(folder: Path, sessions: Iterable[Sequence[str]]) -> list[str]:
+    """The first recording of each session that is there."""
+    found = (next((id for id in ids if (folder / f"{id}{FINISHED}").is_file()), None) for ids in sessions)
+    return [id for id in found if id is not None]
+
+
+def _order(folder: Path, ids: Sequence[str], to: tuple[str, ...]) -> Order:
+    """The report is of the whole drive of which these recordings are parts."""
     return Order(
         recordings=tuple(ids),
         format="html",
@@ -162,10 +196,23 @@ def _order(folder: Path, ids: list[str], to: tuple[str, ...]) -> Order:
     )
 
 
+def _says_it_resumes(folder: Path, session: str) -> bool | None:
+    """None: it cannot be read yet, as nothing of it is on the disk."""
+    path = next((path for end in (FINISHED, WRITING) if (path := folder / f"{session}{end}").exists()), None)
+    if path is None:
+        return False  # its first part is gone
+    try:
+        with open_recording([path]) as recording:
+            events = read_drive_events(recording)
+    except RecordingUnreadable:
+        return None if path.name.endswith(WRITING) else False
+    return any(event.get("resumes") is True for event in of_change(events or (), "started"))
+
+
 def _written(folder: Path) -> set[str]:
     """The sessions of which something is being written, or waits to be recovered."""
     try:
-        return {_PART.sub("", id_of(path)) for path in folder.iterdir() if path.name.endswith(WRITING)}
+        return {first_part(id_of(path)) for path in folder.iterdir() if path.name.endswith(WRITING)}
     except OSError:
         return set()
 

@@ -18,6 +18,7 @@ from server.mail.pack import NoRoom, Pack, cut, need_room, pack
 from server.mail.settings import MailSettings
 from server.mail.source import Source
 from server.recording.catalog.discovery import why_not_one_file
+from server.recording.export.formats import FORMATS
 from server.recording.mcap.chain import read_head
 from server.storage.durable_file import sync_folder
 
@@ -86,7 +87,12 @@ async def _exported(
     found: list[Path] = []
     missing: list[str] = []
     order = letter.order
+    covered: set[str] = set()
     for i, recording in enumerate(order.recordings):
+        if recording in covered:
+            continue  # another part of a drive that is there
+        drive = await asyncio.to_thread(_drive_of, letter, source, recording)
+        covered.update(drive)
         path = await asyncio.to_thread(source.path_of, recording)
         if path is None:
             raise CannotPrepare(f"The recording {recording} no longer exists.")
@@ -97,8 +103,9 @@ async def _exported(
             into = work / f"{i}"
             await asyncio.to_thread(into.mkdir)
             on_progress = partial(_part_of, progress, i, len(order.recordings))
+            paths = [path] if len(drive) == 1 else await asyncio.to_thread(_paths, drive, source)
             try:
-                made = await source.export(path, order.format, into, on_progress)
+                made = await source.export(paths, order.format, into, on_progress)
             except (OSError, ValueError, RuntimeError) as why:
                 raise CannotPrepare(f"{recording} cannot be written as {order.format}: {why}") from None
             path = made.path
@@ -111,6 +118,16 @@ async def _exported(
     return found, missing
 
 
+def _drive_of(letter: Letter, source: Source, recording: str) -> Sequence[str]:
+    """The recordings that are in one file: of a report all parts of the drive."""
+    form = FORMATS.get(letter.order.format)
+    return source.drive_of(recording) if form is not None and form.of_drive else [recording]
+
+
+def _paths(recordings: Sequence[str], source: Source) -> list[Path]:
+    return [path for path in map(source.path_of, recordings) if path is not None]
+
+
 def _part_of(progress: Callable[[float], None], i: int, of: int, share: float) -> None:
     progress((i + share) / of)
 
@@ -120,7 +137,8 @@ def _heads(letter: Letter, source: Source) -> list[str]:
     if letter.order.format != "html":
         return []
     found = []
-    for recording in letter.order.recordings:
+    parts = (part for recording in letter.order.recordings for part in _drive_of(letter, source, recording))
+    for recording in dict.fromkeys(parts):
         path = source.path_of(recording)
         head = None if path is None else read_head(path, recording)
         found.append(f"{recording}: {'not known' if head is None else head.digest}")

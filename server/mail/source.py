@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -15,8 +15,11 @@ class Source(Protocol):
     def path_of(self, recording: str) -> Path | None:
         """The finished recording of that name; None where there is none. May be called from any thread."""
 
-    async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Made:
-        """Writes a recording in another format into the folder `into`. Progress is 0 to 1.
+    def drive_of(self, recording: str) -> Sequence[str]:
+        """All recordings of its drive, oldest first; the recording alone where nothing else is known. As `path_of`."""
+
+    async def export(self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None]) -> Made:
+        """Writes a recording, or all parts of a drive, in another format into the folder `into`. Progress is 0 to 1.
 
         Raises OSError, ValueError or RuntimeError with a sentence.
         """

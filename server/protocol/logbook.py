@@ -15,6 +15,7 @@ class LogbookDrive(TypedDict):
 
     id: Annotated[str, doc("of its first recording")]
     parts: int
+    recordings: Annotated[list[str], doc("its parts, oldest first")]
     vehicle: str
     started_ms: int
     title: str
@@ -115,10 +116,12 @@ class LogbookAnswer(TypedDict):
 class CoursePoints(TypedDict):
     """Numbers at evenly spaced places or moments; null: not known there."""
 
-    t: Annotated[list[float], doc("s since the recording began")]
+    t: Annotated[list[float], doc("s since the drive began")]
     m: Annotated[list[float | None], doc("distance driven")]
     speed: Annotated[list[float | None], doc("m/s")]
     steering: Annotated[list[float | None], doc("%, negative = left")]
+    follow: Annotated[list[float | None], doc("m/s, speed minus the commanded speed")]
+    gps: Annotated[list[float | None], doc("m, error of the position as the receiver says it, one sigma")]
     lat: list[float | None]
     lon: list[float | None]
 
@@ -133,7 +136,7 @@ class CourseEvent(TypedDict):
 
 
 class Course(TypedDict):
-    """`GET /api/recordings/{id}/course`."""
+    """`GET /api/recordings/{id}/course`: of the whole drive of which the recording is a part."""
 
     start_ms: int
     length_s: float

@@ -21,6 +21,7 @@ RECOVERING = ".mcap.recovering"  # the new file while it is made; worth nothing 
 FOLDER = "folder"  # the format of a recording that is a folder: a split bag of ROS 2
 
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,79}")
+_PART = re.compile(r"_p\d+(-\d+)?$")
 _TRASH = ".trash"
 
 
@@ -96,6 +97,11 @@ class RecordingsFolder:
 def part_id(first: str, part: int) -> str:
     """The name of a session's part: the first has the session's own, the others end in _p2, _p3."""
     return first if part == 1 else f"{first}_p{part}"
+
+
+def first_part(id: str) -> str:
+    """The name of the first part of the session that a recording is of."""
+    return _PART.sub("", id)
 
 
 def id_of(path: Path) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from monitor.driving_mode import FLICKERS, ModeChange
-from monitor.driving_summary import DrivingSummary, intervention_json, per_km, sample_json
+from monitor.driving_summary import DrivingSummary, intervention_json, sample_json
 from monitor.interventions import AFTER_S, By, Intervention, KindOf, Sample
 from monitor.runner import Refused
 from monitor.values import Mode
@@ -206,7 +206,7 @@ class CarDriving:
 
     def _totals(self) -> DrivingAnswer:
         summary, driving = self.summary, self.summary.driving
-        rates = per_km(driving.way_m, interventions=summary.interventions_counted, alarms=summary.alarms)
+        rates = summary.per_km()
         return {
             "modes": {
                 mode: {"s": round(driving.time_s[mode], 1), "m": round(driving.way_m[mode], 1)}

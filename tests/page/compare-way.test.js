@@ -5,6 +5,7 @@ import test from 'node:test';
 
 import { csvOf } from '../../static/js/drive/compare-way-csv.js';
 import { aligned, apart, difference, differences, placeOfB } from '../../static/js/drive/compare-way-model.js';
+import { summaryOf } from '../../static/js/drive/compare-way-summary.js';
 import { ticksTo } from '../../static/js/drive/logbook-plots.js';
 
 const METRE = 1 / 111_319.49;
@@ -69,7 +70,7 @@ test('where they differ most', () => {
 });
 
 test('metres between two places', () => {
-  const at = { t: 0, m: 0, speed: 0, steering: 0, lat: 48, lon: 11 };
+  const at = { t: 0, m: 0, speed: 0, steering: 0, follow: null, gps: null, lat: 48, lon: 11 };
   assert.ok(Math.abs((apart(at, { ...at, lat: 48.001 }) ?? 0) - 111.19) < 0.1);
   assert.equal(apart(at, { ...at, lat: null }), null);
 });
@@ -87,10 +88,32 @@ test('the table has a row for each place of A, and no cell is a formula', () => 
   b.events = [{ t: 0, m: 0, kind: '=1+1', text: 'x' }];
   const rows = aligned(a, b, 'way');
   const lines = csvOf(rows, 'way', a, b).split('\r\n');
-  assert.equal(lines.length, 14);
-  assert.equal(lines[0]?.split(',').length, 22); // two heads have a comma
-  assert.equal(lines[1], "0,1970-01-01T00:00:00.000Z,0,0,10,0,0,0,,1970-01-01T00:00:01.000Z,0,0,8,0,0,0,'=1+1: x,0,-2,0");
-  assert.equal(lines[2], '2,1970-01-01T00:00:00.200Z,0.2,2,10,0,0,0.000018,"mark: a ""b"", c\nd",1970-01-01T00:00:01.250Z,0.25,2,8,0,0,0.000018,,0,-2,0');
+  assert.equal(lines.length, 14 + 8); // the summary: a head and seven lines
+  assert.equal(lines[0]?.split(',').length, 26); // two heads have a comma
+  assert.equal(lines[1], "0,1970-01-01T00:00:00.000Z,0,0,10,0,,,0,0,,1970-01-01T00:00:01.000Z,0,0,8,0,,,0,0,'=1+1: x,0,-2,0");
+  assert.equal(lines[2], '2,1970-01-01T00:00:00.200Z,0.2,2,10,0,,,0,0.000018,"mark: a ""b"", c\nd",1970-01-01T00:00:01.250Z,0.25,2,8,0,,,0,0.000018,,0,-2,0');
   assert.match(lines[4] ?? '', /^6,.*,intervention,1970/);
   assert.match(lines[9] ?? '', /^16,[^B]*,,,,,,,,,,,,$/); // B sent nothing
+});
+
+test('did the change help: what happened, means and largest differences, where both drove', () => {
+  const [a, b] = [course(), course({ lost: [50, 100] })];
+  for (const [one, follow] of /** @type {[typeof a, number][]} */ ([[a, -0.5], [b, 0.2]])) {
+    one.way.follow = one.way.t.map(() => follow);
+    one.way.gps = one.way.t.map((_, i) => (one === a ? 0.4 : i === 10 ? 2 : 0.6));
+  }
+  for (let i = 20; i < 30; i += 1) b.way.speed[i] = 6;
+  const at = (/** @type {number} */ i, /** @type {string} */ kind) => ({ t: a.way.t[i] ?? 0, m: 2 * i, kind, text: '' });
+  a.events = [at(10, 'intervention'), at(20, 'critical'), at(80, 'intervention'), at(80, 'warning'), at(15, 'mark')];
+  b.events = [at(30, 'warning'), at(31, 'advisory')];
+  const lines = Object.fromEntries(summaryOf(aligned(a, b, 'way'), 'way', a, b).map(({ name, ...line }) => [name, line]));
+  assert.deepEqual(lines['Interventions'], { unit: '', a: 1, b: 0, mean: -1, most: null, words: '1 fewer in B' }); // the other was where B sent nothing
+  assert.deepEqual([lines['Alarms']?.a, lines['Alarms']?.b, lines['Alarms']?.words], [1, 2, '1 more in B']);
+  assert.equal(lines['Speed']?.words, 'B − A: mean −0.8, largest −4.0 m/s');
+  assert.equal(lines['Following error']?.words, 'smaller in B by 0.30 m/s; largest A 0.50, B 0.20');
+  assert.match(lines['GPS error']?.words ?? '', /^larger in B by 0\.2\d m; largest A 0\.40, B 2\.00$/);
+  assert.equal(lines['Steering']?.words, 'B − A: mean 0.0, largest 0.0 %');
+  const none = summaryOf(aligned(course(), course(), 'way'), 'way', course(), course());
+  assert.deepEqual(none.filter(({ name }) => / error/.test(name)).map(({ words }) => words), ['not known in both', 'not known in both']);
+  assert.equal(none[0]?.words, 'as many in both');
 });

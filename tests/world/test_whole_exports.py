@@ -105,10 +105,10 @@ def test_a_bag_without_the_messages_kept_as_json_is_not_whole(
 @pytest.mark.field
 async def test_a_server_s_export_says_whether_it_is_whole(tmp_path: Path) -> None:
     path = drive(tmp_path, [*GOOD, ("/tf", "tf2_msgs/TFMessage", {"transforms": []})])
-    made = await make_export(path, "csv", tmp_path)
+    made = await make_export([path], "csv", tmp_path)
     assert made.is_whole is False
     assert made.notes == ["/tf (tf2_msgs/TFMessage, 1 messages) fills no signal and has no table."]
-    assert (await make_export(path, "gpx", tmp_path)).is_whole is True
+    assert (await make_export([path], "gpx", tmp_path)).is_whole is True
 
 
 async def test_a_mail_names_what_is_not_in_it(tmp_path: Path) -> None:

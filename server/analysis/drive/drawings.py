@@ -1,4 +1,4 @@
-"""The drawings of a drive's report as SVG: map, speed, delay of the link. Only numbers of ours are put into them."""
+"""The drawings of a drive's report as SVG: map and speed. Only numbers of ours are put into them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from monitor.geo import Plane
 from server.analysis.drive.axis import Scale, nice_step, ticks, time_ticks
-from server.recording.drive.facts import DriveFacts
+from server.recording.drive.facts import DriveFacts, modes_of
 from server.recording.drive.modes import ModeSpan
 
 THICKNESS = ((2.5, 1.5), (5.0, 3.0), (7.5, 5.0), (10.0, 7.5), (math.inf, 10.5))  # below m/s → px
@@ -56,12 +56,12 @@ def drive_map(facts: DriveFacts, width: float, height: float) -> Markup | None:
     for sign in signs_of(facts):
         place = bisect_right(times, sign.at_s) - 1
         if 0 <= place and (sign.at_s - times[place] <= GAP_S):
-            parts.append(_sign(sign.kind, *points[place]))
+            parts.append(sign_at(sign.kind, *points[place]))
     parts.append(
         f'<path class="ink fill" d="M{width - 18:.1f} 8l5 13-5-3-5 3z"/>'
         f'<text class="b" x="{width - 18:.1f}" y="36" text-anchor="middle">N</text>'
     )
-    return _svg(width, height, parts, "The track of the car, north up; thicker is faster, hollow is manual")
+    return svg(width, height, parts, "The track of the car, north up; thicker is faster, hollow is manual")
 
 
 def speed_plot(facts: DriveFacts, width: float, height: float) -> Markup | None:
@@ -75,49 +75,26 @@ def speed_plot(facts: DriveFacts, width: float, height: float) -> Markup | None:
     marks = ticks(0.0, 1.04 * highest, 3)
     x = Scale(0.0, max(facts.length_s, 0.1), left, right)
     y = Scale(0.0, marks[-1], bottom, top)
-    parts = _manual(facts, x, top, bottom) + _horizontal(marks, y, left, right)
-    parts += [_hatch(x(from_s), x(to_s), top, bottom) for from_s, to_s in facts.motion.blind_spans()[:200]]
+    parts = _manual(facts, x, top, bottom) + horizontal(marks, y, left, right)
+    parts += not_known(facts, x, top, bottom)
     parts += _limit(facts, x, y)
     pairs = [(at_s, abs(value)) for at_s, value in zip(course.at_s, course.values, strict=True)]
-    for piece in _pieces(_extremes(pairs)):
-        parts.append(f'<path class="line" d="{_path([(x(a), y(v)) for a, v in piece])}"/>')
+    for piece in _pieces(extremes(pairs)):
+        parts.append(f'<path class="line" d="{path([(x(a), y(v)) for a, v in piece])}"/>')
     parts += _above(facts, pairs, x, y)
-    parts += _time_axis(facts, x, bottom, width) + _mode_bar(facts, x, height - 14)
+    parts += time_axis(facts, x, bottom, width) + _mode_bar(facts, x, height - 14)
     for sign in signs_of(facts):
         if 0 <= sign.at_s <= facts.length_s:
-            parts.append(_sign(sign.kind, x(sign.at_s), 32.0 if sign.kind == "mark" else 12.0))
+            parts.append(sign_at(sign.kind, x(sign.at_s), 32.0 if sign.kind == "mark" else 12.0))
     parts.append(f'<text x="{left - 6:.1f}" y="{top - 8:.1f}" text-anchor="end">m/s</text>')
-    return _svg(width, height, parts, "Speed over time, with its limit, what happened above it and the mode below it")
+    return svg(width, height, parts, "Speed over time, with its limit, what happened above it and the mode below it")
 
 
-def link_plot(facts: DriveFacts, width: float, height: float) -> Markup | None:
-    """The delay of the link over time; None: it was not recorded."""
-    if not facts.late:
-        return None
-    top, bottom, left, right = 10.0, height - 24.0, 42.0, width - 8
-    pairs = [(max(0.0, at_s), late_s * 1000) for at_s, late_s in facts.late if at_s <= facts.length_s]
-    if not pairs:
-        return None
-    marks = ticks(0.0, max(max(value for _, value in pairs), 20.0), 3)
-    x, y = Scale(0.0, max(facts.length_s, 0.1), left, right), Scale(0.0, marks[-1], bottom, top)
-    parts = _horizontal(marks, y, left, right)
-    parts += [_hatch(x(from_s), x(to_s), top, bottom) for from_s, to_s in facts.motion.blind_spans()[:200]]
-    steps: list[Point] = []
-    for at_s, value in _extremes(pairs):  # a delay holds until the next one is written
-        if steps:
-            steps.append((x(at_s), steps[-1][1]))
-        steps.append((x(at_s), y(value)))
-    steps.append((x(facts.length_s), steps[-1][1]))
-    parts.append(f'<path class="line thin" d="{_path(steps)}"/>')
-    parts += _time_axis(facts, x, bottom, width)
-    return _svg(width, height, parts, "Delay of the link over time, in milliseconds")
-
-
-def _svg(width: float, height: float, parts: Iterable[str], words: str) -> Markup:
+def svg(width: float, height: float, parts: Iterable[str], words: str) -> Markup:
     return Markup(f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{words}">{"".join(parts)}</svg>')
 
 
-def _path(points: Sequence[Point]) -> str:
+def path(points: Sequence[Point]) -> str:
     return "M" + "L".join(f"{px:.1f} {py:.1f}" for px, py in points)
 
 
@@ -127,7 +104,7 @@ def _thinned(places: Sequence[tuple[float, float, float]]) -> list[tuple[float, 
     return kept if not places or kept[-1] is places[-1] else [*kept, places[-1]]
 
 
-def _extremes(pairs: Sequence[Point]) -> list[Point]:
+def extremes(pairs: Sequence[Point]) -> list[Point]:
     """Each stretch's lowest and highest, so that no peak is lost."""
     if len(pairs) <= MOST_POINTS:
         return list(pairs)
@@ -194,9 +171,9 @@ def _track(facts: DriveFacts, times: Sequence[float], points: Sequence[Point]) -
             pieces.append((thick, manual, [points[index - 1], points[index]]))
     parts = []
     for thick, manual, line in pieces:
-        parts.append(f'<path class="track" stroke-width="{max(thick, 4.0) if manual else thick}" d="{_path(line)}"/>')
+        parts.append(f'<path class="track" stroke-width="{max(thick, 4.0) if manual else thick}" d="{path(line)}"/>')
         if manual:
-            parts.append(f'<path class="track hollow" stroke-width="{max(thick, 4.0) - 2.4:.1f}" d="{_path(line)}"/>')
+            parts.append(f'<path class="track hollow" stroke-width="{max(thick, 4.0) - 2.4:.1f}" d="{path(line)}"/>')
     return parts
 
 
@@ -204,7 +181,7 @@ def _mode_at(spans: Sequence[ModeSpan], at_ms: float) -> str:
     return next((span.mode for span in spans if span.from_ms <= at_ms <= span.to_ms), "unknown")
 
 
-def _horizontal(marks: Sequence[float], y: Scale, left: float, right: float) -> list[str]:
+def horizontal(marks: Sequence[float], y: Scale, left: float, right: float) -> list[str]:
     return [
         f'<path class="{"axis" if mark == marks[0] else "grid"}" d="M{left:g} {y(mark):.1f}H{right:.1f}"/>'
         f'<text x="{left - 6:g}" y="{y(mark) + 4.5:.1f}" text-anchor="end">{mark:g}</text>'
@@ -212,7 +189,7 @@ def _horizontal(marks: Sequence[float], y: Scale, left: float, right: float) -> 
     ]
 
 
-def _time_axis(facts: DriveFacts, x: Scale, bottom: float, width: float) -> list[str]:
+def time_axis(facts: DriveFacts, x: Scale, bottom: float, width: float) -> list[str]:
     parts = []
     for at_ms, name in time_ticks(facts.start_ms, facts.end_ms, 7 if width > 500 else 4):
         px = x(facts.at_s(at_ms))
@@ -245,8 +222,8 @@ def _above(facts: DriveFacts, pairs: Sequence[Point], x: Scale, y: Scale) -> lis
             over.append((at_s, value))
     if not over:
         return []
-    pieces = _pieces(_extremes(over))
-    return [f'<path class="above" d="{_path([(x(a), y(v)) for a, v in piece])}"/>' for piece in pieces]
+    pieces = _pieces(extremes(over))
+    return [f'<path class="above" d="{path([(x(a), y(v)) for a, v in piece])}"/>' for piece in pieces]
 
 
 def _manual(facts: DriveFacts, x: Scale, top: float, bottom: float) -> list[str]:
@@ -260,13 +237,11 @@ def _manual(facts: DriveFacts, x: Scale, top: float, bottom: float) -> list[str]
 
 
 def _mode_bar(facts: DriveFacts, x: Scale, y: float) -> list[str]:
-    spans: Sequence[ModeSpan] = facts.log.modes if facts.log is not None else ()
-    spans = spans or [ModeSpan(mode="unknown", from_ms=facts.start_ms, to_ms=facts.end_ms)]
     parts = []
-    for span in spans:
+    for span in modes_of(facts):
         left, right = x(facts.at_s(span.from_ms)), x(facts.at_s(span.to_ms))
         if span.mode == "unknown":
-            parts.append(_hatch(left, right, y, y + 8))
+            parts.append(hatch(left, right, y, y + 8))
         else:
             parts.append(
                 f'<rect class="bar {span.mode}" x="{left:.1f}" y="{y:.1f}" '
@@ -275,7 +250,20 @@ def _mode_bar(facts: DriveFacts, x: Scale, y: float) -> list[str]:
     return parts
 
 
-def _hatch(left: float, right: float, top: float, bottom: float) -> str:
+def not_known(facts: DriveFacts, x: Scale, top: float, bottom: float) -> list[str]:
+    """Hatched where nothing was received; between two parts, in which nothing was recorded, with an edge on both
+    sides."""
+    parts = [hatch(x(from_s), x(to_s), top, bottom) for from_s, to_s in facts.motion.blind_spans()[:200]]
+    for from_s, to_s in facts.gaps[:200]:
+        left, right = x(from_s), max(x(to_s), x(from_s) + 2)
+        parts.append(hatch(left, right, top, bottom))
+        parts.append(
+            f'<path class="part" d="M{left:.1f} {top - 6:.1f}V{bottom:.1f}M{right:.1f} {top - 6:.1f}V{bottom:.1f}"/>'
+        )
+    return parts
+
+
+def hatch(left: float, right: float, top: float, bottom: float) -> str:
     """Slanted lines within a box, each cut at its edges."""
     right = max(right, left + 2)
     height = bottom - top
@@ -296,7 +284,7 @@ def _hatch(left: float, right: float, top: float, bottom: float) -> str:
     )
 
 
-def _sign(kind: str, px: float, py: float) -> str:
+def sign_at(kind: str, px: float, py: float) -> str:
     at = f'transform="translate({px:.1f} {py:.1f})"'
     if kind == "critical":
         return f'<path class="crit" {at} d="M0-6l6 6-6 6-6-6z"/>'

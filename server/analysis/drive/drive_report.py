@@ -40,7 +40,6 @@ class DriveReport:
     ) -> Self:
         """Reads the whole recording. `log`, `verified`: where they are known already. Raises RecordingUnreadable."""
         files = files_of(recording)
-        said = map(annotation_store.read, files)
         facts = read_facts(recording)
         log = log or read_recorded_log(recording)
         found = report_json(
@@ -49,14 +48,16 @@ class DriveReport:
             name=name,
             load=None if log is None else log.load,
             verified=of_files(recording) if verified is None else verified,
-            annotations=next((one for one in said if one != annotation_store.NONE), annotation_store.NONE),
+            annotations=annotation_store.joined([annotation_store.read(file) for file in files]),
         )
         return cls(facts=facts, found=found, files=files)
 
     @property
     def foot(self) -> str:
         """Whether it is as it was recorded, at the foot of each page."""
-        return ", ".join(f"{one['short']}, head {(one['head'] or 'not known')[:16]}" for one in self.found["chain"][:2])
+        chain = self.found["chain"]
+        said = [f"{one['short']}, head {(one['head'] or 'not known')[:16]}" for one in chain[:2]]
+        return ", ".join([*said, f"{len(chain) - 2} more parts"] if len(chain) > 2 else said)
 
     def sheet(self, environment: Environment, template: str) -> Markup:
         """As the first part of the page."""

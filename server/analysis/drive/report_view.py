@@ -6,16 +6,19 @@ What nobody knows is None, and is shown as "not known".
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any
 
 from server.analysis.alarm_load import Load
 from server.recording.catalog.annotations import Annotations
+from server.recording.drive import people
 from server.recording.drive.facts import DriveFacts, DriveLog, figures_of
-from server.recording.drive.people import Span
+from server.recording.drive.link_way import LinkStretch, link_along
+from server.recording.drive.parts import DrivePart, Span, missing_parts
 from server.recording.drive.unseen import UnseenTime, blind_times, late_times
+from server.recording.folder import id_of
 from server.recording.read.read import Recording
 from server.recording.verification import Verification
 from server.version import catgraph_version
@@ -33,13 +36,14 @@ def report_json(
     annotations: Annotations,
 ) -> dict[str, Any]:
     """The whole report. Times are ms since 1970 and ISO 8601, lengths m and s, speeds m/s."""
-    metadata, log = recording.metadata, facts.log
+    log, first = facts.log, recording.metadata
+    every = [part.metadata for part in facts.parts] or [first]
     return {
         "catgraph": catgraph_version(),
         "name": name,
-        "vehicle": metadata.get("vehicle") or None,
-        "session": metadata.get("session") or None,
-        "part": metadata.get("part") or None,
+        "vehicle": first.get("vehicle") or None,
+        "session": first.get("session") or None,
+        "part": first.get("part") or None if len(facts.parts) < 2 else None,
         "start": _iso(facts.start_ms) if recording.count else None,
         "end": _iso(facts.end_ms) if recording.count else None,
         "start_ms": facts.start_ms,
@@ -48,19 +52,51 @@ def report_json(
         "weather": annotations.weather,
         "remarks": annotations.note,
         "tags": list(annotations.tags),
-        "chain": [one.as_json() for one in verified],
+        "parts": [_part(part, facts) for part in facts.parts],
+        "gaps": [_gap(gap, facts) for gap in facts.gaps[:MOST_ROWS]],
+        "parts_missing": missing_parts(facts.parts),
+        "chain": [{"recording": id_of(one.path), **one.as_json()} for one in verified],
         "figures": figures_of(facts),
         "load": None if load is None or log is None else _load(load),
         "blind": [_unseen(one) for one in blind_times(facts)[:MOST_ROWS]],
         "late": [_unseen(one) | {"late_s": one.late_s} for one in late_times(facts)[:MOST_ROWS]],
         "unseen_by": _unseen_by(facts),
         "damage": list(recording.damage),
-        "left_out": [line for line in metadata.get("left_out", "").split("\n") if line][:MOST_ROWS],
-        "not_received": [line for line in metadata.get("not_received", "").split("\n") if line][:MOST_ROWS],
+        "left_out": _lines(every, "left_out"),
+        "not_received": _lines(every, "not_received"),
         "speed_limits": [{"from_s": round(at_s, 2), "max_mps": value} for at_s, value in facts.limits],
         "link_delay": _delay(facts),
+        "link_along": [_stretch(one) for one in link_along(facts)],
         **(_unknown() if log is None else _of_log(log, facts)),
     }
+
+
+def _part(part: DrivePart, facts: DriveFacts) -> dict[str, Any]:
+    from_ms, to_ms = (facts.start_ms + round(at_s * 1000) for at_s in (part.from_s, part.to_s))
+    return {
+        "recording": part.id,
+        "session": part.session or None,
+        "part": part.number,
+        "from_ms": from_ms,
+        "to_ms": to_ms,
+        "ended": part.metadata.get("ended") or None,
+    }
+
+
+def _gap(gap: Span, facts: DriveFacts) -> dict[str, Any]:
+    """A time between two parts; `apart_m`: by how far the positions before and after it are apart."""
+    apart_m = facts.motion.apart_m(*gap)
+    return {
+        "from_s": round(gap[0], 2),
+        "to_s": round(gap[1], 2),
+        "apart_m": None if apart_m is None else round(apart_m, 1),
+    }
+
+
+def _lines(every: Sequence[Mapping[str, str]], name: str) -> list[str]:
+    """The topics that the metadata of any part names."""
+    lines = [line for metadata in every for line in metadata.get(name, "").split("\n") if line]
+    return list(dict.fromkeys(lines))[:MOST_ROWS]
 
 
 def _unknown() -> dict[str, Any]:
@@ -92,7 +128,7 @@ def _of_log(log: DriveLog, facts: DriveFacts) -> dict[str, Any]:
     }
 
 
-def _span(span: Span) -> dict[str, int | None]:
+def _span(span: people.Span) -> dict[str, int | None]:
     return {"from_ms": span.from_ms, "to_ms": span.to_ms}
 
 
@@ -123,18 +159,20 @@ def _unseen_by(facts: DriveFacts) -> dict[str, Any]:
 
 def _delay(facts: DriveFacts) -> dict[str, float] | None:
     """Weighted by how long each delay held; None: it was not recorded."""
-    if not facts.late:
+    held = [(late_s, to_s - from_s) for from_s, to_s, late_s in facts.held_delays()]
+    if not held:
         return None
-    held: list[tuple[float, float]] = []
-    for number, (at_s, late_s) in enumerate(facts.late):
-        until_s = facts.late[number + 1][0] if number + 1 < len(facts.late) else facts.length_s
-        held.append((late_s, max(0.0, until_s - max(0.0, at_s))))
     whole_s = sum(time_s for _, time_s in held)
     return {
         "median_s": _weighted(held, 0.5 * whole_s),
         "p90_s": _weighted(held, 0.9 * whole_s),
         "most_s": round(max(late_s for late_s, _ in held), 3),
     }
+
+
+def _stretch(one: LinkStretch) -> dict[str, float | None]:
+    rounded = {name: None if value is None else round(value, 3) for name, value in asdict(one).items()}
+    return {**rounded, "from_m": round(one.from_m, 1), "to_m": round(one.to_m, 1), "blind_s": round(one.blind_s, 2)}
 
 
 def _weighted(held: Sequence[tuple[float, float]], until_s: float) -> float:

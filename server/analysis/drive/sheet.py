@@ -12,13 +12,15 @@ from markupsafe import Markup
 from monitor.load import BEARABLE_IN_10_MIN, FLOOD_IN_10_MIN
 from monitor.unseen import unseen_words
 from server.analysis import report_text
-from server.analysis.drive import drawings
+from server.analysis.drive import drawings, link_drawing, sheet_things
 from server.analysis.drive.axis import day_time
 from server.analysis.drive.media import Media
+from server.analysis.drive.sheet_things import MOST_ROWS
 from server.recording.drive.facts import DriveFacts
+from server.recording.drive.link_way import LinkStretch, link_along
 from server.version import catgraph_version
 
-MOST_ROWS = 300  # of one table; the CSV has all of them
+MOST_CHAINS = 3  # at the top of the report; each part has its own in the list of parts
 _MODES = {"autonomous": "Autonomous", "manual": "Manual", "unknown": "Not known"}
 _RESULTS = {"failed": "critical", "not_applicable": "na", "open": "unknown", "done": "ok"}
 
@@ -29,11 +31,12 @@ def sheet(environment: Environment, template: str, facts: DriveFacts, found: Map
 
 
 def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str, Any]:
-    alarms = _alarms(found["alarms"])
+    alarms, stretches = _alarms(found["alarms"]), link_along(facts)
     return {
         "about": _about(found),
         **{name: found[name] for name in ("title", "weather", "remarks", "tags")},
-        "chain": [(_state(one), _head(one)) for one in found["chain"]],
+        "chain": _chain(found["chain"]),
+        "parts": sheet_things.parts(found),
         "chain_is_bad": any(one["is_broken"] for one in found["chain"]),
         "figures": _figures(found),
         "people": None if found["people"] is None else _people(found["people"]),
@@ -46,12 +49,14 @@ def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str
         "has_limit": bool(facts.limits),
         "alarms": None if alarms is None else alarms[:MOST_ROWS],
         "alarms_left": 0 if alarms is None else max(0, len(alarms) - MOST_ROWS),
-        "interventions": _interventions(found["interventions"]),
-        "marks": _marks(found["marks"], media),
+        "interventions": sheet_things.interventions(found["interventions"]),
+        "marks": sheet_things.marks(found["marks"], media),
         "media_left": media.left_out,
-        "slow_downs": _slow_downs(found["slow_downs"]),
-        "planned_stops": _planned_stops(found["planned_stops"], found["end_ms"]),
-        "link": drawings.link_plot(facts, 340, 150),
+        "slow_downs": sheet_things.slow_downs(found["slow_downs"]),
+        "planned_stops": sheet_things.planned_stops(found["planned_stops"], found["end_ms"]),
+        "link": link_drawing.over_time(facts, 340, 150),
+        "link_way": link_drawing.along_way(facts, stretches, 340, 150),
+        "link_step": _stretch(stretches),
         "link_head": _link_head(found["link_delay"]),
         "blind": _blind(found, facts.start_ms),
         "blind_head": _blind_head(found),
@@ -75,8 +80,18 @@ def _about(found: Mapping[str, Any]) -> str:
     if found["start"] is None:
         return f"{car}, time not known"
     begin = datetime.fromtimestamp(found["start_ms"] / 1000, UTC)
-    part = f", part {found['part']}" if found["part"] not in (None, "1") else ""
+    parts = len(found["parts"])
+    part = f", in {parts} parts" if parts > 1 else f", part {found['part']}" if found["part"] not in (None, "1") else ""
     return f"{car}, {begin:%-d %b %Y}, {day_time(found['start_ms'])} to {day_time(found['end_ms'])} UTC{part}"
+
+
+def _chain(chain: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
+    """State and head of each file; of many, those that are broken and how many are not."""
+    if len(chain) <= MOST_CHAINS:
+        return [(_state(one), _head(one)) for one in chain]
+    broken = [(f"{one['recording']}: {_state(one)}", _head(one)) for one in chain if one["is_broken"]]
+    intact = sum(one["state"] == "intact" and not one["is_broken"] for one in chain)
+    return [(f"{intact} of {len(chain)} parts intact", "heads below"), *broken[:MOST_CHAINS]]
 
 
 def _state(one: Mapping[str, Any]) -> str:
@@ -97,9 +112,10 @@ def _figures(found: Mapping[str, Any]) -> list[tuple[str, str | None, str, str]]
     auto_m = modes["autonomous"]["m"]
     is_known = found["modes"] is not None and metres is not None
     share = f"{100 * auto_m / metres:.0f} % of the distance" if is_known and metres else ""
-    is_counted = is_known and auto_m > 0 and f["interventions"] is not None
-    per_km = f"{f['interventions'] / auto_m * 1000:.2f} per autonomous km" if is_counted else ""
-    alarms_per_km = f"{f['alarms'] / km:.2f} per km" if km and f["alarms"] is not None else ""
+    per_km, alarms_per_km = (
+        "" if f[name] is None else f"{f[name]:.2f} {unit}"
+        for name, unit in (("interventions_per_autonomous_km", "per autonomous km"), ("alarms_per_km", "per km"))
+    )
     in_10_min = f"{load['in_10_min']:.1f} in 10 min" if load else ""
     marks = found["marks"] or []
     voices, photos = sum(one["voice"] for one in marks), sum(one["photo"] for one in marks)
@@ -112,8 +128,14 @@ def _figures(found: Mapping[str, Any]) -> list[tuple[str, str | None, str, str]]
         ("Alarms", _whole(f["alarms"]), "", ", ".join(filter(None, (alarms_per_km, in_10_min)))),
         ("To acknowledge", None if p50 is None else f"{p50:.1f}", "s", waited),
         ("Marks", _whole(f["marks"]), "", f"{voices} with voice, {photos} with photo" if marks else ""),
-        ("Data lost", f"{f['blind_s']:.1f}", "s", f"in {report_text.counted(f['blind'], 'gap')}"),
+        ("Data lost", f"{f['blind_s']:.1f}", "s", f"in {report_text.counted(f['blind'], 'gap')}{_not_recorded(found)}"),
     ]
+
+
+def _not_recorded(found: Mapping[str, Any]) -> str:
+    """The time between the parts, which is not among what was lost."""
+    seconds = sum(one["to_s"] - one["from_s"] for one in found["gaps"])
+    return f", and {report_text.length(seconds)} not recorded" if seconds else ""
 
 
 def _people(people: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
@@ -201,81 +223,15 @@ def _alarms(alarms: Sequence[Mapping[str, Any]] | None) -> list[tuple[str, str, 
     ]
 
 
-def _interventions(found: Sequence[Mapping[str, Any]] | None) -> list[tuple[str, str, str, str]] | None:
-    if found is None:
-        return None
-    rows = []
-    for one in found[:MOST_ROWS]:
-        initiator = "by whom not known" if one["initiated_by"] == "unknown" else f"by the {one['initiated_by']}"
-        speed = "speed not known" if one["speed_mps"] is None else f"{one['speed_mps']:.1f} m/s"
-        kind = f"{one['kind'].capitalize()}, {initiator}, {speed}"
-        what = ": ".join(filter(None, (one["category"], one["what"]))) or "not described"
-        place = (
-            "place not known"
-            if one["lat_deg"] is None or one["lon_deg"] is None
-            else f"{one['lat_deg']:.6f}, {one['lon_deg']:.6f}"
-        )
-        active = f"alarms then: {', '.join(one['active'][:6])}" if one["active"] else "no alarm was active"
-        described = f"described by {one['described_by']}" if one["described_by"] else ""
-        rows.append((day_time(one["at_ms"]), kind, what, "; ".join(filter(None, (place, active, described)))))
-    return rows
-
-
-def _marks(marks: Sequence[Mapping[str, Any]] | None, media: Media) -> list[dict[str, Any]] | None:
-    if marks is None:
-        return None
-    rows = []
-    for one in marks[:MOST_ROWS]:
-        voice, photo = media.get(one["mark"], "voice"), media.get(one["mark"], "photo")
-        has = [kind for kind in ("voice", "photo") if one[kind]]
-        rows.append(
-            {
-                "at": day_time(one["marked_ms"]),
-                **{name: one[name] or "" for name in ("category", "words", "by")},
-                "has": ", ".join(has),
-                "voice": voice if one["voice"] else None,
-                "photo": photo if one["photo"] else None,
-            }
-        )
-    return rows
-
-
-def _slow_downs(found: Sequence[Mapping[str, Any]] | None) -> list[tuple[str, str, str, str]] | None:
-    if found is None:
-        return None
-    rows = []
-    for one in found[:MOST_ROWS]:
-        title = f"Ordered by {one['by'] or 'nobody known'}" + (f": {one['why']}" if one["why"] else "")
-        slows = one["slows_ms"]
-        proof = one["proof"] or ("the car slowed" if slows else "no proof was recorded that the car slowed")
-        rows.append(
-            (
-                day_time(one["ordered_ms"]),
-                title,
-                proof,
-                f"{(slows - one['ordered_ms']) / 1000:.1f} s" if slows else "not proven",
-            )
-        )
-    return rows
-
-
-def _planned_stops(found: Sequence[Mapping[str, Any]] | None, end_ms: int) -> list[tuple[str, str, str, str]] | None:
-    """When, why and by whom, how it ended, how long."""
-    if found is None:
-        return None
-    rows = []
-    for one in found[:MOST_ROWS]:
-        until_ms = end_ms if one["to_ms"] is None else one["to_ms"]
-        ended = "it was in force to the end" if one["to_ms"] is None else one["ended"] or "another reason followed"
-        by = f" By {one['ended_by']}." if one["ended_by"] else ""
-        title = f"{one['reason'].capitalize()}, by {one['by'] or 'nobody known'}"
-        lasted = report_text.length((until_ms - one["from_ms"]) / 1000)
-        rows.append((day_time(one["from_ms"]), title, f"{ended}{by}", lasted))
-    return rows
-
-
 def _link_head(delay: Mapping[str, float] | None) -> str:
     return "" if delay is None else f"delay in ms; p90 {delay['p90_s'] * 1000:.0f}, most {delay['most_s'] * 1000:.0f}"
+
+
+def _stretch(stretches: Sequence[LinkStretch]) -> str:
+    """How long each stretch of the way is."""
+    if not stretches:
+        return ""
+    return f"mean of each {stretches[0].to_m - stretches[0].from_m:.0f} m, dotted: the most; hatched: nothing received"
 
 
 def _blind(found: Mapping[str, Any], start_ms: int) -> list[tuple[str, str, str, str]]:
@@ -305,7 +261,7 @@ def _blind_head(found: Mapping[str, Any]) -> str:
 
 def _lost(found: Mapping[str, Any]) -> list[str]:
     """What else is missing, in lines."""
-    lines = list(found["damage"][:20])
+    lines = [*found["parts_missing"][:20], *found["damage"][:20]]
     for name, what in (("left_out", "not recorded"), ("not_received", "not received")):
         if found[name]:
             shown = ", ".join(found[name][:5])

@@ -51,6 +51,11 @@ def report_rows(found: Mapping[str, Any]) -> Iterator[list[Any]]:
         yield _row("mode", what=mode, value=row["s"], unit="s")
     for name in ("vehicle", "title", "weather", "remarks"):
         yield _row("drive", what=name, value=found[name])
+    for one in found["parts"]:
+        yield _row("part", one["from_ms"], one["to_ms"], what=one["recording"], value=one["part"])
+    for one in found["gaps"]:
+        moments = (found["start_ms"] + one[end] * 1000 for end in ("from_s", "to_s"))
+        yield _row("not recorded", *moments, what="the car moved by", value=one["apart_m"], unit="m")
     for one in found["chain"]:
         yield _row("chain", what=one["state"], value=one["head"], details=one["sentence"])
     for name, value in (found["load"] or {}).items():
@@ -107,6 +112,11 @@ def _things(found: Mapping[str, Any]) -> Iterator[list[Any]]:
         )
     for one in found["planned_stops"] or ():
         yield _row("planned stop", one["from_ms"], one["to_ms"], what=one["reason"], by=one["by"], details=_ended(one))
+    for one in found["link_along"]:
+        about = {"what": f"{one['from_m']:g} to {one['to_m']:g} m", "value": one["delay_s"], "unit": "s of delay"}
+        yield _row(
+            "link along the way", details=f"most {_or_unknown(one['most_s'])}, blind {one['blind_s']:g} s", **about
+        )
     for section, what in (("blind", "no message"), ("late", "messages late")):
         for one in found[section]:
             start = found["start_ms"]
@@ -116,13 +126,17 @@ def _things(found: Mapping[str, Any]) -> Iterator[list[Any]]:
                 "details": unseen_words(one["unseen_m"]),
             }
             yield _row(section, start + one["from_s"] * 1000, start + one["to_s"] * 1000, what=what, **about)
-    for name in ("damage", "left_out", "not_received"):
+    for name in ("parts_missing", "damage", "left_out", "not_received"):
         for line in found[name]:
             yield _row("missing", what=name, value=line)
 
 
 def _ended(one: Mapping[str, Any]) -> str:
     return " ".join(filter(None, (one["ended"], one["ended_by"] and f"By {one['ended_by']}.")))
+
+
+def _or_unknown(seconds: float | None) -> str:
+    return "not known" if seconds is None else f"{seconds:g} s"
 
 
 def _row(

@@ -71,6 +71,16 @@ NONE = Annotations()
 LATE = ("marks", "removed", "described")  # came after the recording was complete
 
 
+def joined(several: Sequence[Annotations]) -> Annotations:
+    """Title, note, weather and tags of the parts of a drive, each text once."""
+    return Annotations(
+        title=next((one.title for one in several if one.title), ""),
+        note="\n".join(dict.fromkeys(one.note for one in several if one.note)),
+        weather="; ".join(dict.fromkeys(one.weather for one in several if one.weather)),
+        tags=tuple(dict.fromkeys(tag for one in several for tag in one.tags)),
+    )
+
+
 def beside(recording: Path) -> Path:
     """The file of a recording's annotations: copied with it, they go with it."""
     return recording.with_name(recording.name + ".json")

@@ -27,10 +27,12 @@ from server.recording.catalog.rows import Page, page_of, row_of
 from server.recording.catalog.survey_task import SurveyTask
 from server.recording.catalog.trash import Trash
 from server.recording.catalog.verifications import Verifications
-from server.recording.drive.course import with_marks
+from server.recording.drive.course import joined, with_marks
 from server.recording.drive.logbook import drives_of
+from server.recording.folder import first_part
 
 MOST_IN_LOGBOOK = 20_000  # recordings
+AROUND_MS = 7 * 86_400_000  # no drive takes longer
 
 MAX_LATE = 200  # late marks of a recording that is asked for alone
 
@@ -131,6 +133,13 @@ class Catalog:
 
     def course(self, id: str) -> bytes | None:
         """The course of its drive as JSON, late marks among its events; None: it is not there, or not read yet."""
+        if self._course(id) is None:
+            return None
+        parts = [part for one in self.drive_of(id) if (part := self._course(one)) is not None]
+        return parts[0] if len(parts) == 1 else orjson.dumps(joined(list(map(orjson.loads, parts))))
+
+    def _course(self, id: str) -> bytes | None:
+        """Of one recording."""
         entry = self._listing.entry(id)
         sha256 = (entry.found or {}).get("sha256") if entry is not None else None
         body = self._entries.course(sha256) if sha256 is not None else None
@@ -144,6 +153,20 @@ class Catalog:
         """The drives for the logbook, oldest first; those that are yet to be read are not among them."""
         self._listing.list_fresh()
         return drives_of(self._entries.figures(which, MOST_IN_LOGBOOK))
+
+    def drive_of(self, id: str) -> list[str]:
+        """The recordings of the drive of which it is a part, oldest first; those that are yet to be read where their
+        names say so. A clip, and what is not there, is of no other."""
+        entry = self._listing.entry(id)
+        if entry is None or entry.found is None or entry.found.get("is_clip"):
+            return [id]
+        since_ms, until_ms = entry.started_ms - AROUND_MS, entry.started_ms + AROUND_MS
+        near = self.drives(Which(vehicle=entry.vehicle, since_ms=since_ms, until_ms=until_ms))
+        found = next((drive["recordings"] for drive in near if id in drive["recordings"]), [id])
+        firsts = {first_part(one) for one in found}
+        unread = self._entries.select("WHERE trashed_ms IS NULL AND vehicle = ? AND found IS NULL", [entry.vehicle])
+        waiting = [one for one in unread if first_part(one.id) in firsts]
+        return [*found, *(one.id for one in sorted(waiting, key=lambda one: one.started_ms) if one.id not in found)]
 
     def path(self, id: str) -> Path | None:
         """Its file, of a split bag its folder; None: it is not there. No id leads out of the folder."""

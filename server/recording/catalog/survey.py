@@ -14,7 +14,7 @@ import os
 import resource
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,13 +36,14 @@ from server.recording.catalog.sketch import sketch
 from server.recording.drive.course import course_of
 from server.recording.drive.facts import facts_of, figures_of, limits_of, undescribed_of
 from server.recording.drive.motion import Motion
+from server.recording.drive.parts import Span, gaps_of
 from server.recording.event_channels import read_recorded_events
 from server.recording.marks.of_drive import in_recording
 from server.recording.mcap.chain import read_head
 from server.recording.read.errors import NoRoom
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
 
-VERSION = 11  # of what is found: with another one, files are read again
+VERSION = 12  # of what is found: with another one, files are read again
 PRIORITIES = ("critical", "warning", "advisory")
 MAX_RAISED = 200  # alarms listed one by one; all are counted
 MAX_SENTENCES = 10
@@ -134,13 +135,13 @@ def _count(metadata: Mapping[str, str], name: str) -> int:
 class _Motion(Observer):
     """The highest speed of a run, its course, and that of all other signals."""
 
-    def __init__(self, speed: str, drive: Drive) -> None:
-        """`speed`: the signal that has it."""
+    def __init__(self, speed: str, drive: Drive, gaps: Sequence[Span]) -> None:
+        """`speed`: the signal that has it; `gaps`: between the files of a split bag."""
         length_s = drive.length_s
         self.limits = limits_of(drive)
         self.top_mps: float | None = None
         self.trace = SpeedTrace(length_s)
-        self.motion = Motion(length_s, speed=speed)
+        self.motion = Motion(length_s, speed=speed, gaps=gaps)
         self._speed = speed
         self._trends = DriveTrends(0.0)
 
@@ -177,7 +178,7 @@ def _drive(recording: Recording) -> tuple[State, _Motion, list[str]]:
     recorded = read_recorded_events(recording)
     drive = Drive(recording, recorded, signals=DRAWN)
     has_speed = any("speed" in epoch.published for epoch in drive.epochs)
-    motion = _Motion("speed" if has_speed else "odometry", drive)
+    motion = _Motion("speed" if has_speed else "odometry", drive, gaps_of(recording))
     run = OfflineRun(recording, drive, observer=motion, with_checks=False)
     broke_off = []
     try:

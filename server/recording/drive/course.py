@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 from server.protocol.logbook import Course, CourseEvent, CoursePoints
 from server.protocol.marks import DriveMark
@@ -16,6 +16,7 @@ LEAST_S = 0.2  # by time
 PLACE_S = 1.5  # between two positions: what lies in a longer gap is not known
 Place = tuple[float, float, float]  # s, latitude, longitude
 MOST_EVENTS = 300
+NUMBERS = ("speed", "steering", "follow", "gps", "lat", "lon")  # beside time and distance
 
 
 def course_of(facts: DriveFacts) -> Course:
@@ -27,10 +28,8 @@ def course_of(facts: DriveFacts) -> Course:
     step_m = LEAST_M
     if length_m:
         step_m = max(LEAST_M, length_m / POINTS)
-        times, metres = facts.motion.odometer()
-        for number in range(int(length_m / step_m) + 1):
-            place = min(bisect_left(metres, number * step_m), len(times) - 1)
-            by_way.append(_moment(times, metres, place, number * step_m))
+        places = (facts.motion.when(min(number * step_m, length_m)) for number in range(int(length_m / step_m) + 1))
+        by_way = [at_s for at_s in places if at_s is not None]
     return {
         "start_ms": facts.start_ms,
         "length_s": round(facts.length_s, 2),
@@ -42,6 +41,65 @@ def course_of(facts: DriveFacts) -> Course:
         "events": _events(facts),
         "limit_mps": facts.limits[0][1] if facts.limits else None,
     }
+
+
+def joined(courses: Sequence[Course]) -> Course:
+    """That of a drive, from those of its parts, oldest first; between two parts nothing is known. The distance goes on
+    where it was: what was driven between two parts is not counted."""
+    if len(courses) == 1:
+        return courses[0]
+    first, last = courses[0], courses[-1]
+    begins_s = [(one["start_ms"] - first["start_ms"]) / 1000 for one in courses]
+    length_s = begins_s[-1] + last["length_s"]
+    lengths_m = [one["length_m"] for one in courses]
+    begins_m = [sum(m or 0.0 for m in lengths_m[:number]) for number in range(len(courses))]
+    length_m = None if None in lengths_m else round(sum(m or 0.0 for m in lengths_m), 1)
+    step_s, step_m = max(LEAST_S, length_s / POINTS), max(LEAST_M, (length_m or 0.0) / POINTS)
+    parts = list(zip(courses, begins_s, begins_m, strict=True))
+    way, time = _empty(), _empty()
+    for number in range(int(length_s / step_s) + 1):
+        at_s = number * step_s
+        course, begin_s, begin_m = parts[max(0, bisect_right(begins_s, at_s) - 1)]
+        _copy(course["time"], round((at_s - begin_s) / course["step_s"]), time, (at_s, None), (begin_s, begin_m))
+    for number in range(int(length_m / step_m) + 1 if length_m else 0):
+        at_m = number * step_m
+        course, begin_s, begin_m = parts[max(0, bisect_right(begins_m, at_m) - 1)]
+        index = min(round((at_m - begin_m) / course["step_m"]), len(course["way"]["t"]) - 1)
+        _copy(course["way"], index, way, (begin_s, at_m), (begin_s, begin_m))
+    events: list[CourseEvent] = []
+    for course, begin_s, begin_m in parts:
+        for event in course["events"]:
+            at_m = None if event["m"] is None or length_m is None else round(event["m"] + begin_m, 1)
+            events.append({**event, "t": round(event["t"] + begin_s, 2), "m": at_m})
+    return {
+        **first,
+        "length_s": round(length_s, 2),
+        "length_m": length_m,
+        "step_m": round(step_m, 4),
+        "step_s": round(step_s, 4),
+        "way": way,
+        "time": time,
+        "events": events[:MOST_EVENTS],
+    }
+
+
+def _empty() -> CoursePoints:
+    found: Any = {name: [] for name in ("t", "m", *NUMBERS)}
+    return cast("CoursePoints", found)
+
+
+def _copy(
+    of: CoursePoints, index: int, into: CoursePoints, otherwise: tuple[float, float | None], begin: tuple[float, float]
+) -> None:
+    """One point of a part, as one of the drive; in none of its points nothing is known."""
+    is_there = 0 <= index < len(of["t"])
+    source, target = cast("Any", of), cast("Any", into)
+    target["t"].append(round(of["t"][index] + begin[0] if is_there else otherwise[0], 2))
+    at_m = of["m"][index] if is_there else None
+    target["m"].append(otherwise[1] if at_m is None else round(at_m + begin[1], 1))
+    for name in NUMBERS:
+        values = source.get(name) or []  # a course of an older version lacks some
+        target[name].append(values[index] if is_there and index < len(values) else None)
 
 
 def with_marks(course: Course, marks: Sequence[DriveMark]) -> Course:
@@ -57,23 +115,17 @@ def with_marks(course: Course, marks: Sequence[DriveMark]) -> Course:
     return {**course, "events": sorted(events, key=lambda event: event["t"])[:MOST_EVENTS]}
 
 
-def _moment(times: Sequence[float], metres: Sequence[float], place: int, at_m: float) -> float:
-    """When the car was there; between two numbers its distance grew evenly."""
-    if place == 0 or metres[place] <= metres[place - 1]:
-        return times[place]
-    share = (at_m - metres[place - 1]) / (metres[place] - metres[place - 1])
-    return times[place - 1] + min(1.0, max(0.0, share)) * (times[place] - times[place - 1])
-
-
 def _points(facts: DriveFacts, moments: list[float]) -> CoursePoints:
     motion, places = facts.motion, facts.motion.places
-    found: CoursePoints = {"t": [], "m": [], "speed": [], "steering": [], "lat": [], "lon": []}
+    found = _empty()
     place_times = [place[0] for place in places]
     for at_s in moments:
         found["t"].append(round(at_s, 2))
         found["m"].append(_rounded(motion.until(at_s), 1))
         found["speed"].append(_rounded(motion.speed.at(at_s), 2))
         found["steering"].append(_rounded(motion.steering.at(at_s), 1))
+        found["follow"].append(_rounded(motion.following_mps(at_s), 2))
+        found["gps"].append(_rounded(motion.sigma_m.at(at_s), 2))
         place = _place(places, place_times, at_s)
         found["lat"].append(None if place is None else round(place[0], 7))
         found["lon"].append(None if place is None else round(place[1], 7))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import islice
+from dataclasses import dataclass
+from itertools import chain, islice
 from typing import Any
 
 import orjson
 
+from server.recording.drive.parts import DrivePart, parts_of
 from server.recording.read.read import Recording
 from server.recording.standing import read_standing
 from server.system.clean_text import clean
@@ -20,16 +23,51 @@ MOST_LATE_MS = 3_600_000  # between what happened and its event
 Event = Mapping[str, Any]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartEvents:
+    """The log of one part: what stood when it began, the signed departure check, and what was logged in it."""
+
+    stood: Sequence[Event]
+    signed: Sequence[Event]
+    logged: Sequence[Event]
+
+    @property
+    def all(self) -> list[Event]:
+        return [*self.stood, *self.signed, *self.logged]
+
+
 def read_drive_events(recording: Recording) -> list[Event] | None:
     """What stood when the recording began, then what was logged in it; None: it has no log. Invalid ones are left out.
 
     Reads the whole channel. Raises RecordingUnreadable.
     """
-    rows = [event for _, event in islice(recording.own(ALARMS), MOST)]
+    parts = read_part_events(recording)
+    return None if parts is None else joined(parts)
+
+
+def joined(parts: Sequence[PartEvents]) -> list[Event]:
+    """Of the whole drive: what stood before a later part is in the log of the part before it."""
+    first, *later = parts
+    return [*first.all, *chain.from_iterable((*part.signed, *part.logged) for part in later)]
+
+
+def read_part_events(recording: Recording, parts: Sequence[DrivePart] | None = None) -> list[PartEvents] | None:
+    """One of each part, and one where there are none; None: no log. As `read_drive_events`."""
+    rows = list(islice(recording.own(ALARMS), MOST))
     if not rows and not recording.metadata:
         return None
-    stood = [*read_standing(recording.metadata), *_signature(recording.metadata)]
-    return [event for event in (*stood, *rows) if _is_event(event)]
+    parts = parts_of(recording) if parts is None else parts
+    begins = [recording.start_s + part.from_s for part in parts]
+    logged: list[list[Event]] = [[] for _ in parts or [None]]
+    for at_s, event in rows:
+        if _is_event(event):
+            logged[max(0, bisect_right(begins, at_s + 1e-6) - 1)].append(event)
+    found = []
+    for metadata, events in zip([part.metadata for part in parts] or [recording.metadata], logged, strict=True):
+        stood = [event for event in read_standing(metadata) if _is_event(event)]
+        signed = [event for event in _signature(metadata) if _is_event(event)]
+        found.append(PartEvents(stood=stood, signed=signed, logged=events))
+    return found
 
 
 def _signature(metadata: Mapping[str, str]) -> list[dict[str, Any]]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from monitor.driving_summary import per_km
 from server.judge.active_settings import ActiveSettings
 from server.judge.drive import Drive
 from server.judge.offline import OfflineRun
@@ -15,10 +16,11 @@ from server.protocol.marks import DriveMark
 from server.recording.delay import RecordedDelay
 from server.recording.drive.alarms import AlarmInDrive, alarms_of, by_component, percentile
 from server.recording.drive.departure import Departure, check_of, departure_of
-from server.recording.drive.drive_events import Event, of_change, read_drive_events
+from server.recording.drive.drive_events import PartEvents, joined, of_change, read_part_events
 from server.recording.drive.modes import MODES, Intervention, ModeSpan, are_modes_known, interventions_of, mode_spans
 from server.recording.drive.motion import Motion
-from server.recording.drive.people import PersonInDrive, names_of, people_of
+from server.recording.drive.parts import DrivePart, Span, gaps_of, outside, parts_of
+from server.recording.drive.people import PersonInDrive, joined_people, names_of, people_of
 from server.recording.drive.planned_stops import PlannedStopInDrive, planned_stops_of
 from server.recording.drive.slow_downs import SlowDownInDrive, slow_downs_of
 from server.recording.event_channels import read_recorded_events
@@ -26,7 +28,7 @@ from server.recording.marks.described import as_event
 from server.recording.marks.of_drive import described_late, marks_of
 from server.recording.read.read import Recording
 
-SIGNALS = ("speed", "odometry", "position", "steering")
+SIGNALS = ("speed", "odometry", "position", "steering", "command")
 MOST_NAMES = 20
 
 
@@ -48,7 +50,7 @@ class DriveLog:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveFacts:
-    """Of one recording. `log` None: it has none, so nobody knows."""
+    """Of one recording, or of several parts of a drive. `log` None: it has none, so nobody knows."""
 
     start_ms: int
     end_ms: int
@@ -58,10 +60,31 @@ class DriveFacts:
     limits: Sequence[tuple[float, float]] = ()  # s since the beginning, speed limit in force from then on [m/s]
     accelerations: Sequence[tuple[float, float]] = ()  # the same of what the car can do [m/s²]
     are_settings_recorded: bool = False  # else they are those of today
+    parts: Sequence[DrivePart] = ()  # files of ours
+    gaps: Sequence[Span] = ()  # between the parts [s since the beginning]
 
     @property
     def length_s(self) -> float:
         return (self.end_ms - self.start_ms) / 1000
+
+    @property
+    def recorded_s(self) -> float:
+        """Without the times between the parts."""
+        return self.length_s - sum(to_s - from_s for from_s, to_s in self.gaps)
+
+    def held_delays(self) -> list[tuple[float, float, float]]:
+        """From when to when the delay of the link was which [s]; between two parts nobody knows it."""
+        found = []
+        ends = [at_s for at_s, _ in self.late[1:]] + [self.length_s]
+        for (at_s, late_s), end_s in zip(self.late, ends, strict=False):
+            for from_s, to_s in outside((max(0.0, at_s), min(end_s, self.length_s)), self.gaps)[:1]:
+                found.append((from_s, to_s, late_s))
+        return found
+
+    def last_speed(self, at_s: float) -> tuple[float, float] | None:
+        """The last moment not after this one that has a speed, in the same part, and the speed."""
+        last = self.motion.speed.last(at_s)
+        return None if last is None or any(last[0] <= gap[0] and gap[1] <= at_s for gap in self.gaps) else last
 
     def at_s(self, at_ms: float) -> float:
         """A time of day as seconds since the beginning."""
@@ -72,7 +95,7 @@ def read_facts(recording: Recording) -> DriveFacts:
     """Reads the whole recording, with what is beside it; a judge is not asked. Raises RecordingUnreadable."""
     drive = Drive(recording, read_recorded_events(recording), signals=SIGNALS)
     has_speed = any("speed" in epoch.published for epoch in drive.epochs)
-    motion = Motion(drive.length_s, speed="speed" if has_speed else "odometry")
+    motion = Motion(drive.length_s, speed="speed" if has_speed else "odometry", gaps=gaps_of(recording))
     OfflineRun(recording, drive, observer=motion, with_checks=False).advance(math.inf, to_last_message=True)
     return replace(
         facts_of(recording, motion),
@@ -99,29 +122,42 @@ def facts_of(recording: Recording, motion: Motion) -> DriveFacts:
     """With a motion that was followed already; the limits are left out."""
     start_ms = round(recording.start_s * 1000)
     end_ms = start_ms + round(recording.duration_s * 1000)
-    events = read_drive_events(recording)
+    parts = parts_of(recording)
+    events = read_part_events(recording, parts)
     delay = RecordedDelay(recording)
     return DriveFacts(
         start_ms=start_ms,
         end_ms=end_ms,
-        log=None if events is None else _log_of(recording, events, start_ms, end_ms),
+        log=None if events is None else _log_of(recording, events, _spans_ms(parts, start_ms, end_ms)),
         motion=motion,
         late=delay.course(),
+        parts=parts,
+        gaps=gaps_of(recording),
     )
 
 
-def _log_of(recording: Recording, events: Sequence[Event], start_ms: int, end_ms: int) -> DriveLog:
+def _spans_ms(parts: Sequence[DrivePart], start_ms: int, end_ms: int) -> list[tuple[int, int]]:
+    """From when to when each part was recorded [ms since 1970]."""
+    if len(parts) < 2:
+        return [(start_ms, end_ms)]
+    return [(start_ms + round(part.from_s * 1000), start_ms + round(part.to_s * 1000)) for part in parts]
+
+
+def _log_of(recording: Recording, parts: Sequence[PartEvents], spans: Sequence[tuple[int, int]]) -> DriveLog:
+    """`spans`: from when to when each part was recorded. Who was on duty and the mode are known within a part alone."""
+    events = joined(parts)
+    each = [(part.all, *span) for part, span in zip(parts, spans, strict=True)]
     return DriveLog(
-        people=people_of(events, start_ms),
+        people=joined_people([(start_ms, end_ms, people_of(of, start_ms)) for of, start_ms, end_ms in each]),
         departure=departure_of(events),
-        modes=mode_spans(events, start_ms, end_ms),
-        are_modes_known=are_modes_known(events),
+        modes=[span for of, start_ms, end_ms in each for span in mode_spans(of, start_ms, end_ms)],
+        are_modes_known=all(are_modes_known(of) for of, _, _ in each),
         interventions=interventions_of([*events, *map(as_event, described_late(recording))]),
         marks=marks_of(recording),
         alarms=alarms_of(events),
         slow_downs=slow_downs_of(events),
         planned_stops=planned_stops_of(events),
-        resumes=any(event.get("resumes") is True for event in of_change(events, "started")),
+        resumes=any(event.get("resumes") is True for event in of_change(parts[0].all, "started")),
     )
 
 
@@ -132,7 +168,7 @@ def figures_of(facts: DriveFacts) -> dict[str, Any]:
     found: dict[str, Any] = {
         "distance_m": _rounded(motion.distance_m, 1),
         "distance_by": motion.source,
-        "driven_s": round(facts.length_s, 1),
+        "driven_s": round(facts.recorded_s, 1),
         "blind_s": round(sum(to_s - from_s for from_s, to_s in blind), 1),
         "blind": len(blind),
         "modes": by_mode(facts),
@@ -160,6 +196,9 @@ def figures_of(facts: DriveFacts) -> dict[str, Any]:
             "components": by_component(log.alarms),
             "people": names_of(log.people)[:MOST_NAMES],
         }
+    rates = per_km(found["modes"]["autonomous"]["m"], motion.distance_m, found["interventions"], found["alarms"])
+    found["interventions_per_autonomous_km"] = _rounded(rates["interventions"], 3)
+    found["alarms_per_km"] = _rounded(rates["alarms"], 3)
     return found
 
 
@@ -170,9 +209,7 @@ def undescribed_of(log: DriveLog) -> list[str]:
 
 def by_mode(facts: DriveFacts) -> Mapping[str, dict[str, float | None]]:
     """Metres and seconds of each mode; without a log all of it is unknown."""
-    spans = [ModeSpan(mode="unknown", from_ms=facts.start_ms, to_ms=facts.end_ms)]
-    if facts.log is not None and facts.log.modes:
-        spans = list(facts.log.modes)
+    spans = modes_of(facts)
     is_known = facts.motion.source is not None
     found: dict[str, dict[str, float | None]] = {mode: {"m": 0.0 if is_known else None, "s": 0.0} for mode in MODES}
     for span in spans:
@@ -182,6 +219,15 @@ def by_mode(facts: DriveFacts) -> Mapping[str, dict[str, float | None]]:
             until_m, from_m = facts.motion.until(facts.at_s(span.to_ms)), facts.motion.until(facts.at_s(span.from_ms))
             row["m"] = (row["m"] or 0.0) + (until_m or 0.0) - (from_m or 0.0)
     return {mode: {"m": _rounded(row["m"], 1), "s": _rounded(row["s"], 1)} for mode, row in found.items()}
+
+
+def modes_of(facts: DriveFacts) -> Sequence[ModeSpan]:
+    """All that was recorded; without a log all of it is unknown."""
+    if facts.log is not None and facts.log.modes:
+        return facts.log.modes
+    pieces = outside((0.0, facts.length_s), facts.gaps)
+    ms = [tuple(facts.start_ms + round(at_s * 1000) for at_s in piece) for piece in pieces]
+    return [ModeSpan(mode="unknown", from_ms=from_ms, to_ms=to_ms) for from_ms, to_ms in ms]
 
 
 def _rounded(value: float | None, digits: int) -> float | None:

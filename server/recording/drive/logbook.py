@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence, Set
 from statistics import median
-from typing import Any
+from typing import Any, Literal
 
 import orjson
 
+from monitor.driving_summary import per_km
 from server.protocol.logbook import LogbookAnswer, LogbookDrive, LogbookTotals, LogbookWeek
 from server.recording.drive.checks import checks_of
 from server.recording.drive.modes import MODES
@@ -19,6 +20,8 @@ MEDIAN_OF = 5
 LEAST_M = 100.0  # in a week: of less, a rate on 100 km says nothing
 MOST_WEEKS = 520
 MOST_STOPPED_MS = 3_600_000  # between two recordings of one drive, with a restart of the server between them
+
+Rated = Literal["interventions", "alarms"]
 
 
 def drives_of(rows: Iterable[Sequence[Any]]) -> list[LogbookDrive]:
@@ -120,21 +123,21 @@ def weeks_of(drives: Sequence[LogbookDrive]) -> list[LogbookWeek]:
     return weeks
 
 
-def rate(drives: Sequence[LogbookDrive], what: str, least_m: float = 0.0) -> float | None:
+def rate(drives: Sequence[LogbookDrive], what: Rated, least_m: float = 0.0) -> float | None:
     """How many on 100 km, over the drives that know: alarms of all that was driven, interventions of what the car
     drove by itself. None: too short a distance."""
     known = [drive for drive in drives if _count(drive, what) is not None and drive["distance_m"] is not None]
     metres = sum(_metres(drive, what) for drive in known)
-    if metres <= least_m:
-        return None
-    return round(sum(_count(drive, what) or 0 for drive in known) / metres * 100_000, 2)
+    count = sum(_count(drive, what) or 0 for drive in known)
+    on_km = per_km(metres, metres, count, count)[what]
+    return None if on_km is None or metres <= least_m else round(on_km * 100, 2)
 
 
-def _metres(drive: LogbookDrive, what: str) -> float:
+def _metres(drive: LogbookDrive, what: Rated) -> float:
     return (drive["modes_m"].get("autonomous") if what == "interventions" else drive["distance_m"]) or 0.0
 
 
-def _count(drive: LogbookDrive, what: str) -> int | None:
+def _count(drive: LogbookDrive, what: Rated) -> int | None:
     return drive["interventions"] if what == "interventions" else drive["alarms"]
 
 
@@ -179,6 +182,7 @@ def _drive(
     return {
         "id": id,
         "parts": 1,
+        "recordings": [id],
         "vehicle": vehicle,
         "started_ms": started_ms,
         "title": title,
@@ -213,6 +217,7 @@ def _joined(drive: LogbookDrive, part: LogbookDrive) -> LogbookDrive:
     return {
         **drive,
         "parts": drive["parts"] + part["parts"],
+        "recordings": [*drive["recordings"], *part["recordings"]],
         "title": drive["title"] or part["title"],
         "tags": list(dict.fromkeys([*drive["tags"], *part["tags"]])),
         "people": list(dict.fromkeys([*drive["people"], *part["people"]])),

@@ -8,14 +8,16 @@ from __future__ import annotations
 import math
 from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from monitor.drive_trends import BLIND_S
+from monitor.geo import distance_m
 from monitor.state import State
-from monitor.values import GpsFix, Steering
+from monitor.values import GpsFix, MotionCommand, Steering
 from server.judge.offline import Observer
+from server.recording.drive.parts import Span, outside
 
 LEAST_STEP_S = 0.1  # two numbers of a course are at least so far apart
 FASTEST_MPS = 1000.0  # what is faster is no speed of a car
@@ -55,13 +57,18 @@ class Course:
 class Motion(Observer):
     """Follows a run through a recording, without judging it."""
 
-    def __init__(self, length_s: float, *, speed: str = "speed") -> None:
-        """`speed`: the signal that has it."""
+    def __init__(self, length_s: float, *, speed: str = "speed", gaps: Sequence[Span] = ()) -> None:
+        """`speed`: the signal that has it; `gaps`: times between two parts, whose way is not counted as driven."""
         self.speed = Course()
         self.steering = Course()  # percent, negative = left
+        self.commanded = Course()  # speed
+        self.sigma_m = Course()  # of the positions
         self.places: list[tuple[float, float, float]] = []  # s, latitude, longitude [deg]
         self.blind: list[tuple[float, float]] = []  # no message of any signal came
         self._length_s = length_s
+        self._gaps = gaps
+        self._left_out_m = 0.0  # the way over the gaps
+        self._last_track: tuple[float, float] | None = None
         self._speed = speed
         self._by_position = Course()
         self._by_speed = Course()
@@ -99,10 +106,30 @@ class Motion(Observer):
         share = (at_s - times[place - 1]) / (times[place] - times[place - 1])
         return values[place - 1] + share * (values[place] - values[place - 1])
 
+    def when(self, at_m: float) -> float | None:
+        """When the car had driven so far; between two numbers its distance grew evenly. None: not known, or never."""
+        times, metres = self.odometer()
+        place = bisect_left(metres, at_m)
+        if place == len(times):
+            return None
+        if place == 0 or metres[place] <= metres[place - 1]:
+            return times[place]
+        share = (at_m - metres[place - 1]) / (metres[place] - metres[place - 1])
+        return times[place - 1] + share * (times[place] - times[place - 1])
+
+    def apart_m(self, from_s: float, to_s: float) -> float | None:
+        """How far apart the car was, as the crow flies, before and after a time without positions; None: not known."""
+        times = [place[0] for place in self.places]
+        before, after = bisect_right(times, from_s) - 1, bisect_left(times, to_s)
+        if before < 0 or after == len(times):
+            return None
+        return distance_m(*self.places[before][1:], *self.places[after][1:])
+
     def blind_spans(self) -> list[tuple[float, float]]:
         """When nothing was heard, the end of the recording included."""
-        end = [(self._heard_s, self._length_s)] if self._length_s - self._heard_s > BLIND_S else []
-        return self.blind + end
+        spans = [*self.blind, (self._heard_s, self._length_s)]
+        pieces = [piece for span in spans for piece in outside(span, self._gaps)]
+        return [(from_s, to_s) for from_s, to_s in pieces if to_s - from_s > BLIND_S]
 
     def message_received(self, topic: str, now_s: float) -> None:
         """Notes when nothing was heard."""
@@ -116,7 +143,20 @@ class Motion(Observer):
             self._drive(getattr(value, "speed_mps", math.nan), now_s)
         elif isinstance(value, Steering) and math.isfinite(value.percent):
             self.steering.add(now_s, value.percent)
-        elif isinstance(value, GpsFix) and value.status >= 0 and len(self.places) < MOST_PLACES:
+        elif isinstance(value, MotionCommand) and value.speed_mps is not None:
+            self.commanded.add(now_s, value.speed_mps)
+        elif isinstance(value, GpsFix) and value.status >= 0:
+            self._place(value, now_s)
+
+    def following_mps(self, at_s: float) -> float | None:
+        """The speed minus the commanded speed; None: one of them is not known then."""
+        speed, wanted = self.speed.at(at_s), self.commanded.at(at_s)
+        return None if speed is None or wanted is None else speed - wanted
+
+    def _place(self, value: GpsFix, now_s: float) -> None:
+        if value.sigma_m is not None and math.isfinite(value.sigma_m):
+            self.sigma_m.add(now_s, value.sigma_m)
+        if len(self.places) < MOST_PLACES:
             if math.isfinite(value.lat_deg) and math.isfinite(value.lon_deg):
                 if not self.places or now_s - self.places[-1][0] >= LEAST_STEP_S:
                     self.places.append((now_s, value.lat_deg, value.lon_deg))
@@ -124,7 +164,11 @@ class Motion(Observer):
     def signals_changed(self, changed: Collection[str], state: State, now_s: float) -> None:
         """The distance as the operator saw it."""
         if "position" in changed and (track_m := state.track_m) is not None:
-            self._by_position.add(now_s, track_m)
+            last_s, last_m = self._last_track or (now_s, track_m)
+            if any(last_s <= from_s and to_s <= now_s for from_s, to_s in self._gaps):
+                self._left_out_m += track_m - last_m
+            self._last_track = now_s, track_m
+            self._by_position.add(now_s, track_m - self._left_out_m)
 
     def _drive(self, speed_mps: float, now_s: float) -> None:
         if not abs(speed_mps) < FASTEST_MPS:

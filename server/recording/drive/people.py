@@ -47,6 +47,26 @@ def people_of(events: Sequence[Event], start_ms: int) -> list[PersonInDrive]:
     return list(found.values())
 
 
+def joined_people(parts: Sequence[tuple[int, int, Sequence[PersonInDrive]]]) -> list[PersonInDrive]:
+    """Of a drive of several parts: when each began and ended, and its people. A time that goes on in the next part is
+    one time; else it ends with its part, as nobody knows what was between."""
+    found: dict[str, PersonInDrive] = {}
+    for number, (start_ms, end_ms, people) in enumerate(parts):
+        is_last = number == len(parts) - 1
+        for one in people:
+            known = found.setdefault(one.name, PersonInDrive(name=one.name, role=one.role))
+            known.role = known.role or one.role
+            for spans, more in ((known.on_duty, one.on_duty), (known.in_control, one.in_control)):
+                for span in more:
+                    from_ms = start_ms if span.from_ms is None and number else span.from_ms
+                    to_ms = end_ms if span.to_ms is None and not is_last else span.to_ms
+                    if span.from_ms is None and spans and number and spans[-1].to_ms == parts[number - 1][1]:
+                        spans[-1].to_ms = to_ms
+                    else:
+                        spans.append(Span(from_ms=from_ms, to_ms=to_ms))
+    return list(found.values())
+
+
 def names_of(people: Sequence[PersonInDrive]) -> list[str]:
     """The people by name, without devices at which nobody had signed on."""
     return list(dict.fromkeys(one.name for one in people if one.role))

@@ -27,7 +27,7 @@ def blind_times(facts: DriveFacts) -> list[UnseenTime]:
     """Each time without any message, with the way since the last speed before it."""
     found = []
     for from_s, to_s in facts.motion.blind_spans()[:MOST_TIMES]:
-        last = facts.motion.speed.last(from_s)
+        last = facts.last_speed(from_s)
         late_s = _in_force(facts.late, from_s)
         age_s = None if last is None else to_s - last[0] + (late_s or 0.0)
         metres = unseen_m(None if last is None else last[1], age_s, _most(facts.accelerations, from_s, to_s))
@@ -38,10 +38,8 @@ def blind_times(facts: DriveFacts) -> list[UnseenTime]:
 def late_times(facts: DriveFacts) -> list[UnseenTime]:
     """Each time in which messages came so late that the page covers their values, with the longest way there."""
     spans: list[tuple[float, float, float]] = []
-    ends = [at_s for at_s, _ in facts.late[1:]] + [facts.length_s]
-    for (at_s, late_s), to_s in zip(facts.late, ends, strict=False):
-        from_s, to_s = max(0.0, at_s), min(to_s, facts.length_s)
-        if late_s <= AGEING_FLOOR_S or to_s <= from_s:
+    for from_s, to_s, late_s in facts.held_delays():
+        if late_s <= AGEING_FLOOR_S:
             continue
         if spans and spans[-1][1] == from_s:
             spans[-1] = (spans[-1][0], to_s, max(spans[-1][2], late_s))
@@ -54,7 +52,7 @@ def late_times(facts: DriveFacts) -> list[UnseenTime]:
 
 def _farthest_m(facts: DriveFacts, from_s: float, to_s: float, late_s: float) -> float | None:
     """The most of all speeds that were shown, each until the next one came."""
-    before = facts.motion.speed.last(from_s)
+    before = facts.last_speed(from_s)
     shown = ([] if before is None else [before]) + facts.motion.speed.between(from_s, to_s)
     limit = _most(facts.accelerations, from_s, to_s)
     ways = (unseen_m(v, next_s - at_s + late_s, limit) for (at_s, v), (next_s, _) in pairwise([*shown, (to_s, 0.0)]))

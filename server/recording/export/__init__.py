@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from server.recording.export.export_format import ExportRefused, Progress, nothing
@@ -11,13 +12,13 @@ from server.recording.export.worker import Made, run_worker
 __all__ = ["ExportRefused", "Made", "make_export"]
 
 
-async def make_export(path: Path, format: str, into: Path, progress: Progress = nothing) -> Made:
-    """Writes a recording in a format of FORMATS into a folder, by a process of its own.
+async def make_export(paths: Sequence[Path], format: str, into: Path, progress: Progress = nothing) -> Made:
+    """Writes a recording in a format of FORMATS into a folder, by a process of its own; several files are one.
 
     `progress` is called with 0 to 1. Raises ExportRefused with one sentence, ValueError for an unknown format,
     OSError. Where it is cancelled the process is ended and leaves nothing behind.
     """
     if format not in FORMATS:
         raise ValueError(f"There is no format {format[:40]!r}.")
-    out = into / f"{path.name.partition('.')[0]}.{FORMATS[format].extension}"
-    return await run_worker([str(path), "--format", format, "--out", str(out)], progress)
+    out = into / f"{paths[0].name.partition('.')[0]}.{FORMATS[format].extension}"
+    return await run_worker([*map(str, paths), "--format", format, "--out", str(out)], progress)

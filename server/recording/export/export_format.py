@@ -19,6 +19,7 @@ class ExportFormat:
     media_type: str
     writer: str  # "module:function", loaded when it is needed; see docs/extending.md
     options: tuple[str, ...] = ()  # which of `compression`, `with_own` and `name` the writer takes
+    of_drive: bool = False  # made of all parts of the drive of which a recording is one
     ros_version: int | None = None  # only recordings of this ROS can be exported; None: all of them
     order: int = 100  # on the page
 

@@ -103,12 +103,14 @@ class Exports:
         *,
         now: Callable[[], float],
         wall_ms: Callable[[], int],
+        drive_of: Callable[[str], Sequence[str]] = lambda id: [id],
     ) -> None:
-        """`folder` belongs to this class: existing files are deleted. `path_of` finds finished recordings, in any
-        thread; `on_clip` is called for each new one."""
+        """`folder` belongs to this class: existing files are deleted. `path_of` finds finished recordings and
+        `drive_of` all those of the same drive, in any thread; `on_clip` is called for each new one."""
         self._folder = folder
         self._recordings = recordings
         self._path_of = path_of
+        self._drive_of = drive_of
         self._on_clip = on_clip
         self._now = now
         self._wall_ms = wall_ms
@@ -137,10 +139,11 @@ class Exports:
         return list(self._jobs.values())
 
     async def begin(self, of: str, format: str) -> Job:
-        """Exports a recording, or answers the job that does so already. Raises NoSuchRecording, TooMany."""
-        source = await asyncio.to_thread(self._source, of)
-        changed = await asyncio.to_thread(_state_of, source)
-        return self._begin(of, format, (of, format, changed), lambda job: self._export(job, source))
+        """Exports a recording, or answers the job that does so already; a format of the drive is made of all its parts,
+        whichever of them is named. Raises NoSuchRecording, TooMany."""
+        first, sources = await asyncio.to_thread(self._sources, of, format)
+        changed = await asyncio.to_thread(lambda: tuple(map(_state_of, sources)))
+        return self._begin(first, format, (first, format, changed), lambda job: self._export(job, sources))
 
     async def clip(self, of: str, window: Window) -> Job:
         """Cuts a recording, one being written too. Raises NoSuchRecording, NotYet, TooMany."""
@@ -198,10 +201,10 @@ class Exports:
         self._tasks.pop(job.id, None)
         job.finished.set()
 
-    async def _export(self, job: Job, source: Path) -> None:
+    async def _export(self, job: Job, sources: Sequence[Path]) -> None:
         async with self._turn:
             out = await self._place(job, f"{job.of}.{FORMATS[job.format].extension}")
-            made = await self._work(job, [source], ["--format", job.format, "--name", job.of, "--out", str(out)])
+            made = await self._work(job, sources, ["--format", job.format, "--name", job.of, "--out", str(out)])
             job.path = made.path
             job.size = (await asyncio.to_thread(made.path.stat)).st_size
             job.sentence = "It is ready." if made.is_whole else NOT_WHOLE
@@ -251,6 +254,14 @@ class Exports:
         folder = self._folder / job.id
         await asyncio.to_thread(folder.mkdir, parents=True, exist_ok=True)
         return folder / name
+
+    def _sources(self, of: str, format: str) -> tuple[str, list[Path]]:
+        """What is exported: its name and its files."""
+        source = self._source(of)
+        ids = list(self._drive_of(of)) if FORMATS[format].of_drive else [of]
+        others = {id: source if id == of else self._path_of(id) for id in ids}
+        found = {id: path for id, path in others.items() if path is not None}
+        return next(iter(found)), list(found.values())
 
     def _source(self, id: str) -> Path:
         path = self._path_of(id)

@@ -10,6 +10,7 @@ from typing import Annotated
 from fastapi import APIRouter, HTTPException, Query, Request, Response
 from fastapi import Path as InPath
 
+from monitor.driving_summary import per_km
 from server.bus.event_table import safe_cell
 from server.protocol.logbook import Course, LogbookAnswer, LogbookDrive
 from server.recording.catalog.catalog_db import Which
@@ -27,6 +28,7 @@ To = Annotated[int | None, Query(alias="to", ge=-(2**53), le=2**53, description=
 _HEADS = (
     *("recording", "vehicle", "started", "title", "tags", "people", "parts"),
     *("distance [m]", "recorded [s]", "interventions", "not described", "alarms", "marks", "blind [s]"),
+    *("interventions per autonomous km", "alarms per km"),
     *("autonomous [m]", "manual [m]", "mode not known [m]", "autonomous [s]", "manual [s]", "mode not known [s]"),
     *("departure check", "check signed", "signed by", "items failed", "failed items", "alarms by component"),
 )
@@ -82,6 +84,7 @@ def _drives(
 def _row(drive: LogbookDrive) -> list[object]:
     modes = ("autonomous", "manual", "unknown")
     signed_ms = drive["departure_ms"]
+    rates = per_km(drive["modes_m"].get("autonomous"), drive["distance_m"], drive["interventions"], drive["alarms"])
     components = "; ".join(f"{name}: {number}" for name, number in drive["components"].items())
     return [
         *(drive["id"], drive["vehicle"], when(drive["started_ms"] / 1000), drive["title"]),
@@ -89,6 +92,7 @@ def _row(drive: LogbookDrive) -> list[object]:
         *(drive["distance_m"], drive["driven_s"], drive["interventions"], drive["undescribed"]),
         *(drive["alarms"], drive["marks"]),
         drive["blind_s"],
+        *(None if rate is None else round(rate, 3) for rate in (rates["interventions"], rates["alarms"])),
         *(drive["modes_m"].get(mode) for mode in modes),
         *(drive["modes_s"][mode] for mode in modes),
         *(drive["departure"], None if signed_ms is None else when(signed_ms / 1000), drive["departure_by"]),

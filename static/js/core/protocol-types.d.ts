@@ -361,7 +361,7 @@ export interface Countdown {
   left_s: number;
 }
 
-/** `GET /api/recordings/{id}/course`. */
+/** `GET /api/recordings/{id}/course`: of the whole drive of which the recording is a part. */
 export interface Course {
   start_ms: number;
   length_s: number;
@@ -389,7 +389,7 @@ export interface CourseEvent {
 
 /** Numbers at evenly spaced places or moments; null: not known there. */
 export interface CoursePoints {
-  /** s since the recording began */
+  /** s since the drive began */
   t: Array<number>;
   /** distance driven */
   m: Array<number | null>;
@@ -397,6 +397,10 @@ export interface CoursePoints {
   speed: Array<number | null>;
   /** %, negative = left */
   steering: Array<number | null>;
+  /** m/s, speed minus the commanded speed */
+  follow: Array<number | null>;
+  /** m, error of the position as the receiver says it, one sigma */
+  gps: Array<number | null>;
   lat: Array<number | null>;
   lon: Array<number | null>;
 }
@@ -1181,6 +1185,8 @@ export interface LogbookDrive {
   /** of its first recording */
   id: string;
   parts: number;
+  /** its parts, oldest first */
+  recordings: Array<string>;
   vehicle: string;
   started_ms: number;
   title: string;

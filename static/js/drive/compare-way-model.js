@@ -6,7 +6,7 @@ import { fixed } from '../core/format.js';
  * @typedef {import('../core/protocol-types.js').Course} Course
  * @typedef {import('../core/protocol-types.js').CoursePoints} Points
  * @typedef {'way' | 'time'} By
- * @typedef {{t: number, m: number | null, speed: number | null, steering: number | null, lat: number | null, lon: number | null}} Point
+ * @typedef {{t: number, m: number | null, speed: number | null, steering: number | null, follow: number | null, gps: number | null, lat: number | null, lon: number | null}} Point
  * @typedef {object} Row
  * @property {number} x metres or seconds
  * @property {Point} a
@@ -72,7 +72,7 @@ function isEdge({ j, aside }, b) {
 
 /** @param {Points} points @param {number} i @returns {Point} */
 function pointOf(points, i) {
-  return { t: points.t[i] ?? 0, m: points.m[i] ?? null, speed: points.speed[i] ?? null, steering: points.steering[i] ?? null, lat: points.lat[i] ?? null, lon: points.lon[i] ?? null };
+  return { t: points.t[i] ?? 0, m: points.m[i] ?? null, speed: points.speed[i] ?? null, steering: points.steering[i] ?? null, follow: points.follow?.[i] ?? null, gps: points.gps?.[i] ?? null, lat: points.lat[i] ?? null, lon: points.lon[i] ?? null };
 }
 
 /** Metres between two places that are near each other. @param {Point} one @param {Point | null} other */

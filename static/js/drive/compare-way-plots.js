@@ -46,14 +46,16 @@ export function differencePlot(rows, width, what) {
   return plot(frame, [...rowsOf([-top, 0, top], y, frame), ...noData(rows, px, frame), area(rows, (row) => difference(row, what), px, y), line('cw-a', rows, (row) => difference(row, what), px, y)], 'B minus A');
 }
 
-/** Steering of both. @param {Row[]} rows @param {number} width */
-export function steeringPlot(rows, width) {
+/** One number of both; null: neither knows it. @param {Row[]} rows @param {number} width @param {'steering' | 'follow' | 'gps'} what @param {string} name @param {number} least at the end of the axis */
+export function bothPlot(rows, width, what, name, least) {
+  const values = rows.flatMap(({ a, b }) => [a[what], b?.[what] ?? null]).filter((value) => value !== null);
+  if (!values.length) return null;
   const frame = frameOf(width, 130);
-  const most = Math.max(5, ...rows.flatMap(({ a, b }) => [Math.abs(a.steering ?? 0), Math.abs(b?.steering ?? 0)]));
-  const top = ticksTo(most, 1).at(-1) ?? 1;
-  const y = scale(top, frame);
+  const top = ticksTo(Math.max(least, ...values.map(Math.abs)), 1).at(-1) ?? 1;
+  const isSigned = what !== 'gps';
+  const y = isSigned ? scale(top, frame) : (/** @type {number} */ value) => frame.bottom - (value / top) * (frame.bottom - frame.top);
   const { px } = axisOf(rows, width);
-  return plot(frame, [...rowsOf([-top, 0, top], y, frame), ...noData(rows, px, frame), line('cw-b', rows, ({ b }) => b?.steering ?? null, px, y), line('cw-a', rows, ({ a }) => a.steering, px, y)], 'Steering, A solid and B dotted');
+  return plot(frame, [...rowsOf(isSigned ? [-top, 0, top] : [0, top], y, frame), ...noData(rows, px, frame), line('cw-b', rows, ({ b }) => b?.[what] ?? null, px, y), line('cw-a', rows, ({ a }) => a[what], px, y)], `${name}, A solid and B dotted`);
 }
 
 /** Alarms, marks and interventions of both, and the axis. @param {Row[]} rows @param {number} width @param {By} by @param {CourseEvent[]} ofA @param {CourseEvent[]} ofB */

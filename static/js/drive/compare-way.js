@@ -1,8 +1,9 @@
 // Two drives compared along the way or over time: speed, steering, what happened, B − A, one cursor through all.
 
 import { csvOf } from './compare-way-csv.js';
+import { summaryOf } from './compare-way-summary.js';
 import { aligned, difference, differences } from './compare-way-model.js';
-import { axisOf, differencePlot, eventsPlot, speedPlot, steeringPlot, waysMap } from './compare-way-plots.js';
+import { axisOf, bothPlot, differencePlot, eventsPlot, speedPlot, waysMap } from './compare-way-plots.js';
 import { dayOf, figure, openBoard, options, select } from './drive-board.js';
 import { styled } from '../core/style-sheet.js';
 import { request, sentenceOf } from '../control/request.js';
@@ -11,14 +12,12 @@ import { duration, fixed, signed } from '../core/format.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').Course} Course
- * @typedef {import('../core/protocol-types.js').Recording} Recording
+ * @typedef {import('../core/protocol-types.js').LogbookDrive} Drive
  * @typedef {import('./compare-way-model.js').By} By
  * @typedef {import('./compare-way-model.js').Row} Row
  */
 
-const MOST = 200; // drives to choose among
-
-/** @param {string} vehicle "": of all cars @param {string | null} first the drive A; null: the newest @param {import('../core/store.js').Store} store */
+/** @param {string} vehicle "": of all cars @param {string | null} first a recording of drive A; null: the newest @param {import('../core/store.js').Store} store */
 export async function openCompareWay(vehicle, first, store) {
   if (document.querySelector('.compareway-board')) return;
   await styled('logbook');
@@ -72,11 +71,9 @@ class CompareWay {
   /** @param {string} vehicle @param {string | null} first */
   async #begin(vehicle, first) {
     try {
-      const query = new URLSearchParams({ limit: String(MOST), ...(vehicle ? { vehicle } : {}) });
-      const { recordings } = /** @type {{recordings: Recording[]}} */ (await request(`/api/recordings?${query}`));
-      const drives = recordings.filter(({ state, is_clip }) => state === 'read' && !is_clip);
+      const { drives } = /** @type {import('../core/protocol-types.js').LogbookAnswer} */ (await request(`/api/logbook?${new URLSearchParams(vehicle ? { vehicle } : {})}`));
       const choices = drives.map((one) => /** @type {[string, string]} */ ([one.id, nameOf(one)]));
-      const a = drives.find(({ id }) => id === first) ?? drives[0];
+      const a = drives.find(({ id, recordings = [] /* of an older agent */ }) => id === first || (first !== null && recordings.includes(first))) ?? drives[0];
       const b = drives.find(({ id }) => id !== a?.id);
       options(this.a, choices, a?.id ?? '');
       options(this.b, choices, b?.id ?? a?.id ?? '');
@@ -132,12 +129,15 @@ class CompareWay {
     }
     setAttribute(this.csv, 'disabled', null);
     const caption = (/** @type {string} */ text) => html('p', {}, text);
+    const both = (/** @type {string} */ text, /** @type {SVGElement | null} */ drawing) => (drawing ? [caption(text), drawing] : [caption(`${text}: not known`)]);
     this.plots.replaceChildren(caption('speed, m/s: A solid, B dotted, hatched where B has no data'), speedPlot(rows, width, a.limit_mps), caption('B − A, m/s'), differencePlot(rows, width, 'speed'),
-      caption('steering, % (− left)'), steeringPlot(rows, width), caption('steering, B − A, %'), differencePlot(rows, width, 'steering'),
+      ...both('steering, % (− left)', bothPlot(rows, width, 'steering', 'Steering', 5)), caption('steering, B − A, %'), differencePlot(rows, width, 'steering'),
+      ...both('following error, m/s: speed minus the commanded speed', bothPlot(rows, width, 'follow', 'Following error', 1)), ...both('GPS error, m: one sigma, as the receiver says it', bothPlot(rows, width, 'gps', 'GPS error', 1)),
       caption('alarms, marks, interventions'), eventsPlot(rows, width, this.#by, a.events, b.events), this.cursor, this.slider);
     this.#map = waysMap(rows, Math.max(200, Math.floor(this.side.clientWidth) - 32));
     const most = differences(rows);
     this.side.replaceChildren(
+      html('section', {}, html('h3', {}, 'Did the change help?', html('span', {}, `where both drove, ${this.#metWords()}`)), summaryList(summaryOf(rows, this.#by, a, b))),
       html('section', {}, html('h3', {}, 'Both ways', html('span', {}, 'A solid, B dotted')), this.#map?.drawing ?? html('p', { class: 'sub' }, 'not known: one has no position')),
       html('section', {}, html('h3', {}, 'Where they differ most'), most.length ? html('ul', { class: 'cw-most' }, ...most.map((one) => this.#difference(one))) : html('p', { class: 'sub' }, 'nowhere by much')));
     this.#point(Math.min(Number(this.slider.value), rows.length - 1));
@@ -196,6 +196,12 @@ class CompareWay {
     this.slider.setAttribute('aria-valuetext', `${this.#axisWords(row.x)}, A ${number(row.a.speed) ?? 'not known'} m/s`);
   }
 
+  /** How much of A has B beside it. */
+  #metWords() {
+    const step = (this.#rows[1]?.x ?? 0) - (this.#rows[0]?.x ?? 0);
+    return this.#axisWords(step * this.#rows.filter(({ b }) => b).length);
+  }
+
   /** @param {number} x */
   #axisWords(x) {
     if (this.#by === 'time') return `${duration(x)} min`;
@@ -203,10 +209,17 @@ class CompareWay {
   }
 }
 
-/** @param {Recording} one */
-function nameOf({ started_ms, title, distance_m, length_s }) {
+/** @param {import('./compare-way-summary.js').Line[]} lines */
+function summaryList(lines) {
+  const number = (/** @type {import('./compare-way-summary.js').Line} */ { unit }, /** @type {number | null} */ value) => (value === null ? 'not known' : unit ? `${fixed(value, unit === '%' ? 0 : 2)} ${unit}` : String(value));
+  return html('dl', { class: 'lb-check' }, ...lines.map((line) => html('div', {}, html('dt', {}, line.name), html('dd', {},
+    ...(line.a === null && line.b === null ? [] : [html('b', {}, `A ${number(line, line.a)}, B ${number(line, line.b)}`)]), html('small', {}, ...words(line.words))))));
+}
+
+/** @param {Drive} one */
+function nameOf({ started_ms, title, distance_m, driven_s, parts }) {
   const way = distance_m === null ? '' : ` · ${fixed(distance_m / 1000, 2)} km`;
-  return `${dayOf(started_ms)}${title ? ` · ${title}` : ''}${way}${length_s === null ? '' : ` · ${duration(length_s)}`}`;
+  return `${dayOf(started_ms)}${title ? ` · ${title}` : ''}${way} · ${duration(driven_s)}${parts > 1 ? ` · ${parts} parts` : ''}`;
 }
 
 /** @param {string} name @param {HTMLElement} choice */

@@ -127,10 +127,10 @@ class Logbook {
     const share = (/** @type {number} */ part) => (distance_m > 0 ? (100 * part / distance_m).toFixed(0) : null);
     this.figures.replaceChildren(
       figure('Distance', fixed(distance_m / 1000, distance_m < 1e5 ? 1 : 0), 'km', `${hours(driven_s)} h`),
-      figure('Autonomous', share(autonomous), '%', `of the distance, ${hours(modes_s['autonomous'])} h`),
+      figure('Autonomous', share(autonomous), '%', `of the distance; ${hours(modes_s['autonomous'])} h, manual ${hours(modes_s['manual'])} h`),
       figure('Not known', share(unknown), '%', `mode of the car, ${hours(modes_s['unknown'])} h`),
-      figure('Interventions', totals.interventions === null ? null : numberOf(totals.interventions), 'per 100 km', 'autonomous'),
-      figure('Alarms', totals.alarms === null ? null : numberOf(totals.alarms), 'per 100 km', ''),
+      figure('Interventions', totals.interventions === null ? null : numberOf(totals.interventions), 'per 100 km', 'that it drove by itself'),
+      figure('Alarms', totals.alarms === null ? null : numberOf(totals.alarms), 'per 100 km', 'of all'),
       overdueFigure(mine) ?? figure('Checks missing', totals.checks_known ? String(totals.checks_missing) : null, '', totals.checks_known ? `of ${counted(totals.checks_known, 'drive')}` : '', totals.checks_missing > 0));
     this.#drawPlots();
     this.side.replaceChildren(

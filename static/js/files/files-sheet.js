@@ -142,7 +142,7 @@ export class FileSheet {
 
   /** The drive's report as a page of its own, which can be printed and saved. */
   #report() {
-    return html('li', {}, html('a', { href: keptAt(addressOf(this.row.id, '/report')), target: '_blank', rel: 'noopener', 'data-f': 'file-report' }, icon('files'), 'Drive report', html('span', { class: 'end' }, 'A4 · offline')));
+    return html('li', {}, html('a', { href: keptAt(addressOf(this.row.id, '/report')), target: '_blank', rel: 'noopener', 'data-f': 'file-report' }, icon('files'), 'Drive report', html('span', { class: 'end' }, 'whole drive · A4')));
   }
 
   get isAtActions() {

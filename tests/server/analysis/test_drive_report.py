@@ -24,7 +24,7 @@ from server.recording.drive.departure import Departure
 from server.recording.export.export_format import ExportRefused
 from server.recording.marks.media import MediaName
 from server.recording.read.read import open_recording
-from tests.server.recording.drive.story import EVIL, PHOTO, logged, recorded
+from tests.server.recording.drive.story import EVIL, PHOTO, in_two_parts, logged, recorded
 from tests.server.recording.drive.test_facts import BEGIN_MS
 
 
@@ -123,6 +123,69 @@ def test_a_planned_stop_is_in_it_with_its_times_its_reason_and_who(tmp_path: Pat
     assert [row[2] for row in stops] == ["2023-11-14T22:14:30.000000Z", ""]
 
 
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The report of a drive of two parts."""
+    folder = tmp_path_factory.mktemp("parts")
+    paths = in_two_parts(folder)
+    annotations.write(paths[0], annotations.Annotations(note="first", weather="dry", tags=("a",)))
+    annotations.write(paths[1], annotations.Annotations(note="second", weather="dry", tags=("a", "b")))
+    with open_recording(paths) as recording:
+        write_drive_page(recording, folder / "page.html", name="drive")
+        write_report_json(recording, folder / "report.json", name="drive")
+        write_report_csv(recording, folder / "report.csv", name="drive")
+    return folder
+
+
+def test_a_drive_of_several_parts_is_one_report(parts: Path) -> None:
+    words = words_of(parts / "page.html")
+    for said in (
+        *("in 2 parts", "Parts of the drive", "Part 1, s1", "Part 2, s1_p2", "1.79 km 3:00 min"),
+        "22:15:20 Not recorded the car was 300 m away after it; not counted as driven 30.0 s",
+        "in 1 gap, and 30.0 s not recorded",
+        *("in the second part", "told later", "2.23 per autonomous km"),
+    ):
+        assert said in words, said
+    assert words.count("Intact, head ") == 2
+    found = json.loads((parts / "report.json").read_text())
+    assert [(one["recording"], one["part"]) for one in found["parts"]] == [("s1", 1), ("s1_p2", 2)]
+    assert found["gaps"] == [{"from_s": 120.0, "to_s": 150.0, "apart_m": pytest.approx(300, abs=3)}]
+    assert (found["weather"], found["remarks"], found["tags"]) == ("dry", "first\nsecond", ["a", "b"])
+    assert (found["figures"]["driven_s"], found["load"]["announced"], found["part"]) == (180.0, 4, None)
+    rows = list(csv.reader(io.StringIO((parts / "report.csv").read_text(encoding="utf-8"), newline="")))
+    assert [row[3] for row in rows if row[0] == "part"] == ["s1", "s1_p2"]
+    (gap,) = [row for row in rows if row[0] == "not recorded"]
+    assert gap[1:3] == ["2023-11-14T22:15:20.000000Z", "2023-11-14T22:15:50.000000Z"]
+
+
+def test_rates_curve_and_link_are_in_it(parts: Path) -> None:
+    text = (parts / "page.html").read_text()
+    assert "Speed in the 10 s before it" in text
+    assert "Delay of the link over the distance driven" in text
+    assert "2.23 per autonomous km" in words_of(parts / "page.html")
+    found = json.loads((parts / "report.json").read_text())
+    rates = [found["figures"][name] for name in ("interventions_per_autonomous_km", "alarms_per_km")]
+    assert rates == [pytest.approx(2 / 0.9, rel=0.03), pytest.approx(4 / 1.8, rel=0.02)]
+    assert [found["link_along"][0][name] for name in ("from_m", "to_m", "blind_s")] == [0.0, 50.0, 0.0]
+    rows = list(csv.reader(io.StringIO((parts / "report.csv").read_text(encoding="utf-8"), newline="")))
+    along = [row for row in rows if row[0] == "link along the way"]
+    assert (along[0][3], along[0][5], len(along)) == ("0 to 50 m", "s of delay", len(found["link_along"]))
+    assert 0.020 <= float(along[0][4]) <= 0.025
+    assert [row[4] for row in rows if row[3] == "interventions_per_autonomous_km"] == [str(rates[0])]
+
+
+def test_a_part_that_is_missing_is_said(tmp_path: Path) -> None:
+    with open_recording(in_two_parts(tmp_path)[1:]) as recording:
+        write_drive_page(recording, tmp_path / "page.html", name="drive")
+    assert "Part 1 of the drive of s1_p2 is not in this report" in words_of(tmp_path / "page.html")
+
+
+def words_of(path: Path) -> str:
+    """What the page says, without its tags."""
+    text = re.sub(r"<style>.*?</style>|<script.*?</script>", "", path.read_text(), flags=re.S)
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
+
+
 def test_the_authority_gets_its_columns(folder: Path) -> None:
     with zipfile.ZipFile(folder / "forms.zip") as packed:
         tables = {name: list(csv.reader(io.StringIO(packed.read(name).decode()))) for name in packed.namelist()}
@@ -194,6 +257,12 @@ def test_only_a_signed_check_has_a_tick(
     done, failed, not_applicable = counts
     check = Departure(state=state, done=done, failed=failed, not_applicable=not_applicable, of=3)
     assert sheet._departure(asdict(check)) == rows
+
+
+def test_a_drive_without_a_departure_check_says_so(tmp_path: Path) -> None:
+    with open_recording([recorded(tmp_path, [logged(1.0, "connected")])]) as recording:
+        write_drive_page(recording, tmp_path / "page.html", name="drive")
+    assert "Departure check No departure check was made." in words_of(tmp_path / "page.html")
 
 
 def test_media_are_bounded() -> None:

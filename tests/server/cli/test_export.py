@@ -141,13 +141,13 @@ def test_what_is_damaged_is_left_out_and_said(drive: Path, tmp_path: Path, capsy
 async def test_for_a_mail_it_is_made_into_a_folder(drive: Path, tmp_path: Path) -> None:
     (tmp_path / "into").mkdir()
     reported: list[float] = []
-    made = await make_export(drive, "csv", tmp_path / "into", reported.append)
+    made = await make_export([drive], "csv", tmp_path / "into", reported.append)
     assert made.path == tmp_path / "into" / f"{ID}.csv.zip"
     assert reported == sorted(reported)
     with pytest.raises(ExportRefused, match="does not exist"):
-        await make_export(tmp_path / "nope.mcap", "csv", tmp_path / "into")
+        await make_export([tmp_path / "nope.mcap"], "csv", tmp_path / "into")
     with pytest.raises(ValueError, match="no format"):
-        await make_export(drive, "exe", tmp_path / "into")
+        await make_export([drive], "exe", tmp_path / "into")
 
 
 def test_the_worker_ends_with_the_server_and_sweeps_up(tmp_path: Path) -> None:

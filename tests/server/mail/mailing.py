@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import shutil
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,8 @@ class Shelf:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.notes: list[str] = []  # what of a recording its exports do not hold
+        self.drives: list[list[str]] = []  # recordings that are parts of one drive
+        self.exported: list[list[str]] = []  # of which recordings each export was made
         folder.mkdir(parents=True, exist_ok=True)
 
     def put(self, name: str, content: bytes = b"a drive") -> Path:
@@ -34,9 +36,14 @@ class Shelf:
         path = self.folder / f"{recording}.mcap"
         return path if path.is_file() else None
 
-    async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Made:
+    def drive_of(self, recording: str) -> list[str]:
+        return next((drive for drive in self.drives if recording in drive), [recording])
+
+    async def export(self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None]) -> Made:
         if format == "bag":
             raise ValueError("its messages have no definition")
+        path = paths[0]
+        self.exported.append([one.stem for one in paths])
         made = into / f"{path.stem}.{'zip' if format == 'csv' else format}"
         shutil.copyfile(path, made)
         progress(1.0)

@@ -15,7 +15,7 @@ import pytest
 from server.app.build import build
 from server.app.config import Config
 from server.app.lifespan import lifespan
-from server.mail.drive_reports import MOST_PARTS, DriveReports
+from server.mail.drive_reports import DriveReports
 from server.mail.mailer import Mailer
 from server.mail.settings import BadMailSetting, MailSettings, MailSettingsFile, checked
 from server.recording.folder import WRITING, part_id
@@ -68,7 +68,7 @@ async def test_a_drive_that_ended_is_mailed_once_where_wished(tmp_path: Path, re
             await asyncio.sleep(4 * QUIET_S)
         letters = await mailer.letters(None, 10)
         assert [(one.order.recordings, one.order.format, one.order.to) for one in letters] == (
-            [(("20261119T140303Z", "20261119T140303Z_p2"), "html", TO)] if report_to else []
+            [(("20261119T140303Z",), "html", TO)] if report_to else []
         )
     finally:
         await reports.stop()
@@ -159,22 +159,39 @@ async def mailed(reports: DriveReports) -> list[tuple[str, ...]]:
     return [one.order.recordings for one in (await reports._mailer.letters(None, 100))[::-1]]
 
 
-async def test_each_session_has_mails_of_its_own_and_all_its_parts(tmp_path: Path) -> None:
-    """Yesterday's recovered drive is mailed at once though today's is being written, and in several mails."""
+async def test_each_drive_has_one_mail(tmp_path: Path) -> None:
+    """Yesterday's recovered drive is mailed at once though today's is being written."""
     shelf, watch = Shelf(tmp_path / "car"), Watch()
-    yesterday = [part_id("car_20261118T140303Z", part) for part in range(1, 2 * MOST_PARTS + 6)]
-    today = shelf.folder / f"car_20261119T140303Z_p2{WRITING}"
-    today.write_bytes(b"")
+    yesterday = [part_id("car_20261118T140303Z", part) for part in range(1, 46)]
+    today = shelf.folder / f"car_20261119T140303Z{WRITING}"
+    record(today, seconds=2.0)
     async with reporting(tmp_path, shelf, watch) as reports:
-        for id in [*yesterday, "car_20261119T140303Z"]:
+        for id in [*yesterday, "car_20261119T140303Z_p2"]:
             reports.finished(shelf.put(id))
         await until(lambda: len(reports._waiting) == 1)
-        parts = [tuple(yesterday[first : first + MOST_PARTS]) for first in (0, MOST_PARTS, 2 * MOST_PARTS)]
-        assert await mailed(reports) == parts
+        assert await mailed(reports) == [(yesterday[0],)]
         today.unlink()
         watch.s = 100.0
         await until(lambda: not reports._waiting)
-        assert await mailed(reports) == [*parts, ("car_20261119T140303Z",)]
+        assert await mailed(reports) == [(yesterday[0],), ("car_20261119T140303Z_p2",)]
+
+
+async def test_a_drive_that_goes_on_after_a_restart_is_mailed_as_one_when_it_ends(tmp_path: Path) -> None:
+    shelf, watch = Shelf(tmp_path / "car"), Watch()
+    before, after = "car_20261119T140303Z", "car_20261119T141500Z"
+    going_on = shelf.folder / f"{after}{WRITING}"
+    record(going_on, seconds=2.0, own=[{"n": 1, "at_ms": 5, "alarm": None, "change": "started", "resumes": True}])
+    async with reporting(tmp_path, shelf, watch) as reports:
+        reports.finished(shelf.put(before))
+        watch.s = 100.0
+        await until(lambda: (shelf.folder, after) in reports._resumed)
+        await asyncio.sleep(4 * QUIET_S)
+        assert await mailed(reports) == []  # the server was started again, and the drive goes on
+        reports.finished(going_on.rename(shelf.folder / f"{after}.mcap"))
+        await until(lambda: len(reports._waiting) == 2)
+        watch.s = 200.0
+        await until(lambda: not reports._waiting)
+        assert await mailed(reports) == [(before, after)]
 
 
 async def test_what_waits_is_mailed_after_kills(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import hashlib
 import logging
 import sqlite3
 import zipfile
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
 import psutil
@@ -323,11 +323,30 @@ async def test_mails_of_reports_quote_the_head_of_the_chain(tmp_path: Path, shel
     assert "hash chain" not in file
 
 
+async def test_a_drive_is_in_one_page_whichever_of_its_parts_are_ordered(
+    tmp_path: Path, shelf: Shelf, post: Post
+) -> None:
+    for name in ("drive_p2", "other"):
+        shelf.put(name)
+    shelf.drives = [["drive", "drive_p2"]]
+    async with mailing(tmp_path / "mail", shelf) as mailer:
+        await mailer.change(settings(post.port))
+        for number, format in enumerate(("html", "csv"), 1):
+            ordered = await mailer.order(f"key-000{number}", order("drive_p2", "drive", "other", format=format))
+            assert (await over(mailer, ordered.n)).state == "sent"
+    report, table = (next(mail.iter_parts()).get_content().replace("\r\n", "\n") for mail in post.mails())
+    assert shelf.exported == [["drive", "drive_p2"], ["other"], ["drive_p2"], ["drive"], ["other"]]
+    assert "recording:\ndrive: not known\ndrive_p2: not known\nother: not known\n" in report
+    assert "not known" not in table
+
+
 async def test_what_is_made_can_be_cancelled(tmp_path: Path, shelf: Shelf, post: Post) -> None:
     begun, ended = asyncio.Event(), asyncio.Event()
 
     class Slow(Shelf):
-        async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Made:
+        async def export(
+            self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None]
+        ) -> Made:
             progress(0.5)
             begun.set()
             try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from dataclasses import replace
 from typing import Any
 
@@ -10,9 +11,16 @@ import pytest
 from monitor.alarm import AlarmState
 from monitor.alarm_spec import Priority
 from monitor.restoring import restore
+from server.bus.journal import Journal
+from server.bus.local import LocalBus
+from server.simulator.car import SimulatedCar
 from server.vehicle import handover_lines
 from server.vehicle.restore import recall
+from server.vehicle.session import Session
+from server.vehicle.vehicle import Vehicle
 from tests.server.vehicle.attended import ANN, BEN, PROGRAM, SEEN, WALL_MS, Attended
+from tests.server.vehicle.car_source import CarSource
+from tests.world.played import run
 
 AK = {"person": {"name": "A. K.", "role": "operator", "device": "dev-a"}}
 MR = {"person": {"name": "M. R.", "role": "safety_driver"}}
@@ -71,6 +79,48 @@ async def test_what_a_person_does_is_logged_with_their_name_and_role() -> None:
     assert "person" not in events["shelved"]
 
 
+async def test_a_mark_bears_the_person_who_made_it() -> None:
+    car = Attended()
+    await car.obeyed(ANN | AK, "mark", mark="m-1", at_ms=WALL_MS)
+    await car.obeyed(BEN, "mark", mark="m-2", at_ms=WALL_MS)
+    second, first = car.bus.past_events(car.name, change="mark")
+    assert (first["by"], first["person"], first["role"]) == ("A. K. (Ann)", "A. K.", "operator")
+    assert (second["by"], "person" in second) == ("Ben", False)
+
+
+def test_a_slow_down_bears_the_person_who_ordered_it() -> None:
+    assert run(slowed()) == [("ordered", "A. K. (Ann)", "A. K.", "operator")]
+
+
+async def slowed() -> list[tuple[str, str, str, str]]:
+    """A simulated car that drives and is slowed: who ordered it, as its log has it."""
+    loop = asyncio.get_running_loop()
+    simulated = SimulatedCar(seed=3, start_s=WALL_MS / 1000)
+    bus, source = LocalBus(Journal(None), now=loop.time), CarSource(simulated)
+    session = Session(
+        Vehicle(name="ocelot", address="ws://192.0.2.1:9090"),
+        bus,
+        now=loop.time,
+        wall_ms=lambda: WALL_MS + round(loop.time() * 1000),
+        server=dict,  # type: ignore[arg-type]
+        open_source=source,
+    )
+    await session.start()
+    orders = [(8.0, "arm"), (9.0, "slow_down")]
+    for step in simulated.steps():
+        now_s = step.at_s - WALL_MS / 1000
+        if now_s > 10.0:
+            break
+        await asyncio.sleep(max(0.0, now_s - loop.time()))
+        if orders and now_s >= orders[0][0]:
+            answer = await session._commands.handle(ANN | AK | {"kind": orders.pop(0)[1]})
+            assert answer["ok"], answer
+        source.publish(step.messages)
+    found = reversed(bus.past_events("ocelot", change="slow_down"))
+    await session.stop()
+    return [(one["step"], one["by"], one["person"], one["role"]) for one in found if one["step"] == "ordered"]
+
+
 async def test_coming_and_going_at_a_page_of_the_car_is_logged_once() -> None:
     car = Attended()
     for who in (ANN, ANN | AK, ANN | AK, ANN | MR, ANN):
@@ -95,6 +145,24 @@ async def test_a_request_for_control_is_in_the_summary_until_it_is_answered() ->
     assert car.summary["requests"] == [{"page": "page-b", "name": "Ben", "left_s": 10.0}]
     await car.obeyed(ANN | AK, "control", do="keep", to="page-b")
     assert car.summary["requests"] == []
+
+
+async def test_shelved_and_acknowledged_alarms_are_lines_of_the_hand_over() -> None:
+    shift = Shift()
+    await shift.seen()
+    car = shift.car
+    car.faults = {Priority.WARNING, Priority.ADVISORY}
+    car.tick(0.5)
+    await car.obeyed(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
+    await car.obeyed(ANN | AK, "shelve", alarm="test_advisory", occurrence=1, minutes=5.0)
+    await shift.begin()
+    assert shift.state is not None
+    warning, advisory = (line for line in shift.state["lines"] if line["kind"] in ("alarm", "shelved"))
+    assert (warning["kind"], warning["title"]) == ("alarm", "Test warning")
+    assert warning["text"].endswith("Acknowledged by A. K. (Ann).")
+    assert (advisory["kind"], advisory["title"]) == ("shelved", "Shelved: Test advisory")
+    assert advisory["text"].endswith("By A. K. (Ann).")
+    assert advisory["until_ms"] == WALL_MS + 500 + 5 * 60_000
 
 
 class Shift:

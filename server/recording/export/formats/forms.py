@@ -12,5 +12,6 @@ FORMAT = ExportFormat(
     media_type="application/zip",
     writer="server.analysis.drive.form:write_forms",
     options=("name",),
+    of_drive=True,
     order=63,
 )

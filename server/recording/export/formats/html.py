@@ -7,10 +7,11 @@ from server.recording.export.export_format import ExportFormat
 FORMAT = ExportFormat(
     name="html",
     label="Drive report",
-    use="one page, works offline, prints on A4",
+    use="one page of the whole drive, works offline, prints on A4",
     extension="html",
     media_type="text/html; charset=utf-8",
     writer="server.analysis.drive_page:write_drive_page",
     options=("name",),
+    of_drive=True,
     order=60,
 )

@@ -12,5 +12,6 @@ FORMAT = ExportFormat(
     media_type="application/json",
     writer="server.analysis.drive.tables:write_report_json",
     options=("name",),
+    of_drive=True,
     order=62,
 )

@@ -19,11 +19,11 @@ PHOTO = b"\x89PNG\r\n\x1a\n" + bytes(60)
 METRE_DEG = 1 / 111_319.49  # of longitude at the equator
 
 
-def rows(length_s: float = LENGTH_S, speed_mps: float = SPEED_MPS) -> list[Row]:
+def rows(length_s: float = LENGTH_S, speed_mps: float = SPEED_MPS, from_s: float = 0.0) -> list[Row]:
     """Speed at 20 Hz, positions at 5 Hz due east along the equator, but for 0.1 m: 0, 0 is no place."""
     found: list[Row] = []
     for n in range(round(length_s * 20) + 1):
-        at_s = n / 20
+        at_s = from_s + n / 20
         if LOST_S[0] < at_s < LOST_S[1]:
             continue
         found.append((at_s, "/catvehicle/vel", "geometry_msgs/msg/Twist", {"linear": {"x": speed_mps}}))
@@ -105,10 +105,42 @@ STORY: Sequence[Own] = (
 )
 
 
-def recorded(folder: Path, own: Sequence[Own] = STORY, *, name: str = "ours.mcap", **metadata: str) -> Path:
-    """A recording of ours with these events in its log, and the settings in force."""
-    source = write_ros1(folder / f"{name}.bag", Drive(messages=sorted(rows(), key=lambda row: row[0])))
-    settings = (BEGIN_S * NS, "/catgraph/settings", {"version": 1, "toml": TOML, "in_force": {}})
-    delays = [(BEGIN_S * NS + n * NS, "/catgraph/delay", {"late_s": 0.02 + n / 1000, "delays": {}}) for n in range(100)]
+def recorded(
+    folder: Path,
+    own: Sequence[Own] = STORY,
+    *,
+    name: str = "ours.mcap",
+    from_s: float = 0.0,
+    length_s: float = LENGTH_S,
+    **metadata: str,
+) -> Path:
+    """A recording of ours with these events in its log, and the settings in force; a later part begins at `from_s`."""
+    messages = sorted(rows(length_s, from_s=from_s), key=lambda row: row[0])
+    source = write_ros1(folder / f"{name}.bag", Drive(messages=messages))
+    begin_ns = BEGIN_S * NS + round(from_s * NS)
+    settings = (begin_ns, "/catgraph/settings", {"version": 1, "toml": TOML, "in_force": {}})
+    late = [0.02 + n / 1000 for n in range(100) if n < length_s]
+    delays = [(begin_ns + n * NS, "/catgraph/delay", {"late_s": s, "delays": {}}) for n, s in enumerate(late)]
     ordered = sorted([settings, *delays, *own], key=lambda one: one[0])
     return as_ours(source, folder / name, ordered, **metadata)
+
+
+BEFORE = [{"at_s": -n / 2, "speed_mps": 10.0 - n / 10} for n in range(20, -1, -1)]
+SECOND = (150.0, 60.0)  # the second part of the drive: after 30 s in which nothing was recorded
+LATER: Sequence[Own] = (
+    logged(150.5, "acknowledged", "gps_drift", by="M. R. (Tablet)", state="ACKED"),
+    mode(170.0, "manual", "autonomous"),
+    logged(170.0, "intervention", intervention="i2", kind_of="to_manual", speed_mps=10.0, active=[], before=BEFORE),
+    logged(175.0, "intervention_described", intervention="i1", what="told later", by="A. K. (Pixel)"),
+    mark(180.0, "m9", words="in the second part"),
+    logged(190.0, "raised", "speed_limit", text="12.0 m/s", state="UNACKED"),
+)
+
+
+def in_two_parts(folder: Path, *, session: str = "s1") -> list[Path]:
+    """A drive of two recordings, the second after a lost link."""
+    raised = logged(118.0, "raised", "gps_drift", text="0.4 m", state="UNACKED")
+    first = recorded(folder, [*STORY, raised], name=f"{session}.mcap", session=session)
+    from_s, length_s = SECOND
+    more = {"session": session, "part": "2"}
+    return [first, recorded(folder, LATER, name=f"{session}_p2.mcap", from_s=from_s, length_s=length_s, **more)]

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from monitor.values import GpsFix, MotionCommand
 from server.protocol.marks import DriveMark
-from server.recording.drive.course import course_of, with_marks
-from server.recording.drive.facts import read_facts
+from server.recording.drive.course import course_of, joined, with_marks
+from server.recording.drive.facts import DriveFacts, read_facts
+from server.recording.drive.motion import Motion
 from server.recording.read.read import open_recording
-from tests.server.recording.drive.story import LOST_S, METRE_DEG, SPEED_MPS, recorded
+from tests.server.recording.drive.story import LOST_S, METRE_DEG, SECOND, SPEED_MPS, in_two_parts, recorded
 
 
 def test_it_is_where_the_car_was(tmp_path: Path) -> None:
@@ -52,3 +54,37 @@ def test_marks_that_came_later_are_on_the_way(tmp_path: Path) -> None:
     marks = [event for event in with_marks(found, rows)["events"] if event["kind"] == "mark"]
     assert [(event["t"], event["text"]) for event in marks] == [(30.0, "late")]
     assert marks[0]["m"] == pytest.approx(300, abs=5)
+
+
+def test_the_errors_are_on_the_way() -> None:
+    motion = Motion(10.0)
+    for n in range(100):
+        if n < 50:
+            motion.value_decoded("command", MotionCommand(speed_mps=2.5, tyre_angle_rad=None), n / 10, None)
+        motion._drive(2.0, n / 10)
+        motion.value_decoded("position", GpsFix(lat_deg=0, lon_deg=0, sigma_m=0.4 if n < 80 else None), n / 10, None)
+    found = course_of(DriveFacts(start_ms=0, end_ms=10_000, log=None, motion=motion, late=[]))["time"]
+    at = {
+        round(at_s, 1): (follow, gps)
+        for at_s, follow, gps in zip(found["t"], found["follow"], found["gps"], strict=True)
+    }
+    assert (at[2.0], at[7.0], at[9.6]) == ((-0.5, 0.4), (None, 0.4), (None, None))
+
+
+def test_the_parts_of_a_drive_are_one_course(tmp_path: Path) -> None:
+    courses = []
+    for path in in_two_parts(tmp_path):
+        with open_recording([path]) as recording:
+            courses.append(course_of(read_facts(recording)))
+    found = joined(courses)
+    assert (found["length_s"], found["length_m"]) == (210.0, pytest.approx(1800, abs=15))
+    time, way = found["time"], found["way"]
+    between = [n for n, at_s in enumerate(time["t"]) if 121 < at_s < SECOND[0] - 1]
+    assert len(between) > 30
+    assert {(time["speed"][n], time["lat"][n], time["m"][n]) for n in between} == {(None, None, None)}
+    i = next(n for n, at_s in enumerate(time["t"]) if at_s > 180)
+    assert (time["lon"][i] or 0) / METRE_DEG == pytest.approx(time["t"][i] * SPEED_MPS, abs=5)
+    metres = [at_m for at_m in way["m"] if at_m is not None]
+    assert metres == sorted(metres)
+    assert way["t"][-1] == pytest.approx(210, abs=1.5)
+    assert [event["t"] for event in found["events"] if event["kind"] == "intervention"] == [80.0, 170.0]

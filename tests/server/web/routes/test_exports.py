@@ -21,6 +21,7 @@ from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
 from server.vehicle.vehicle import Vehicle
 from tests.server.conftest import serving
+from tests.server.recording.drive.story import in_two_parts, recorded
 from tests.server.recording.export.ours import OurFile
 from tests.server.recording.made import BEGAN_MS, record
 
@@ -166,6 +167,38 @@ async def test_a_clip_is_a_recording_and_a_page(client: httpx.AsyncClient, data:
 
 
 @pytest.mark.field
+async def test_the_report_of_any_part_is_that_of_the_whole_drive(tmp_path: Path) -> None:
+    car = tmp_path / "recordings" / "car"
+    car.mkdir(parents=True)
+    for name, path in zip((DRIVE, f"{DRIVE}_p2"), in_two_parts(tmp_path), strict=True):
+        path.rename(car / f"{name}.mcap")
+    (tmp_path / "other").mkdir()
+    recorded(tmp_path / "other", name=f"{STILL}.mcap", session="another").rename(car / f"{STILL}.mcap")
+
+    def are_read(rows: list[dict[str, Any]]) -> bool:
+        return [row["state"] for row in rows] == ["read"] * 3
+
+    async with (
+        serving(Config(vehicles=(Vehicle(name="car"),), data=tmp_path)) as base,
+        httpx.AsyncClient(base_url=base, timeout=60) as client,
+    ):
+        async with asyncio.timeout(60):
+            while not are_read((await client.get("/api/recordings")).json()["recordings"]):
+                await asyncio.sleep(0.05)
+        second, first = [await begin(client, "report_json", id) for id in (f"{DRIVE}_p2", DRIVE)]
+        assert first["job"] == second["job"]
+        await over(client, first)
+        found = (await client.get(f"/api/exports/{first['job']}/file")).json()
+        assert [part["recording"] for part in found["parts"]] == [DRIVE, f"{DRIVE}_p2"]
+        assert (found["name"], found["figures"]["driven_s"], len(found["gaps"])) == (DRIVE, 180.0, 1)
+        alone = (await client.get(f"/api/recordings/{STILL}/export/report_json")).json()
+        assert [part["recording"] for part in alone["parts"]] == [STILL]
+        track = (await client.get(f"/api/recordings/{DRIVE}_p2/export/geojson")).json()
+        assert track["features"], "other formats are of one recording"
+        drives = (await client.get("/api/logbook")).json()["drives"]
+        assert sorted(drive["recordings"] for drive in drives) == [[DRIVE, f"{DRIVE}_p2"], [STILL]]
+
+
 async def test_clips_that_cannot_be(client: httpx.AsyncClient) -> None:
     async def clip(**body: Any) -> httpx.Response:
         return await client.post(f"/api/recordings/{DRIVE}/clip", json=body)

@@ -1,0 +1,124 @@
+"""A drive of several parts is one: what was recorded is added up, and the time between two parts is not driven."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from server.recording.drive.facts import DriveFacts, DriveLog, figures_of, read_facts
+from server.recording.drive.modes import ModeSpan
+from server.recording.drive.parts import DrivePart, missing_parts, outside
+from server.recording.drive.people import PersonInDrive, Span, joined_people
+from server.recording.drive.unseen import blind_times, late_times
+from server.recording.read.read import open_recording
+from tests.server.recording.drive.story import BEGIN_MS, LENGTH_S, SECOND, in_two_parts, recorded
+
+
+@pytest.fixture(scope="module")
+def paths(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return in_two_parts(tmp_path_factory.mktemp("parts"))
+
+
+def read(*paths: Path) -> DriveFacts:
+    with open_recording(paths) as recording:
+        return read_facts(recording)
+
+
+@pytest.fixture(scope="module")
+def drive(paths: list[Path]) -> DriveFacts:
+    return read(*paths)
+
+
+@pytest.fixture(scope="module")
+def log(drive: DriveFacts) -> DriveLog:
+    assert drive.log is not None
+    return drive.log
+
+
+def test_the_figures_of_the_parts_are_added_up(paths: list[Path], drive: DriveFacts) -> None:
+    whole = figures_of(drive)
+    one, other = (figures_of(read(path)) for path in paths)
+    assert whole["driven_s"] == 180.0
+    for name in ("distance_m", "driven_s", "blind_s"):
+        assert whole[name] == pytest.approx(one[name] + other[name], abs=3.0), name
+    for name in ("alarms", "interventions", "marks", "slow_downs", "blind"):
+        assert whole[name] == one[name] + other[name], name
+    for mode in ("autonomous", "manual", "unknown"):
+        for unit in ("m", "s"):
+            sum_of_parts = one["modes"][mode][unit] + other["modes"][mode][unit]
+            assert whole["modes"][mode][unit] == pytest.approx(sum_of_parts, abs=3.0), (mode, unit)
+    assert sum(row["s"] for row in whole["modes"].values()) == 180.0
+
+
+def test_the_time_between_two_parts_is_said_and_neither_driven_nor_lost(drive: DriveFacts) -> None:
+    (gap,) = drive.gaps
+    assert gap == pytest.approx((LENGTH_S, SECOND[0]), abs=0.1)
+    assert drive.motion.apart_m(*gap) == pytest.approx(300.0, abs=3.0)
+    assert (drive.motion.until(gap[1] + 0.3) or 0.0) - (drive.motion.until(gap[0]) or 0.0) < 5.0
+    for from_s, to_s in [*drive.motion.blind_spans(), *((a, b) for a, b, _ in drive.held_delays())]:
+        assert to_s <= gap[0] + 0.1 or from_s >= gap[1] - 0.1
+    assert [(one.from_s, one.to_s) for one in blind_times(drive)] == [pytest.approx((60.0, 64.0), abs=0.1)]
+    assert late_times(drive) == []
+
+
+def test_what_begins_in_one_part_goes_on_in_the_next(log: DriveLog) -> None:
+    assert [(one.alarm, one.to_acknowledge_s) for one in log.alarms[2:]] == [("gps_drift", 32.5), ("speed_limit", None)]
+    described = {one.intervention: one.what for one in log.interventions}
+    assert described["i1"] == "told later"
+    assert list(described) == ["i1", "i2"]
+    assert [row["mark"] for row in log.marks] == ["m1", "m3", "m9"]
+    assert log.departure.state == "signed"
+
+
+def test_a_mode_holds_within_its_part(log: DriveLog) -> None:
+    later = [span for span in log.modes if span.from_ms >= BEGIN_MS + 149_000]
+    assert later == [
+        ModeSpan(mode="autonomous", from_ms=BEGIN_MS + 150_000, to_ms=BEGIN_MS + 170_000),
+        ModeSpan(mode="manual", from_ms=BEGIN_MS + 170_000, to_ms=BEGIN_MS + 210_000),
+    ]
+    assert max(span.to_ms for span in log.modes if span not in later) == BEGIN_MS + 120_000
+
+
+def test_a_part_that_does_not_know_the_mode_makes_no_figure_better(tmp_path: Path, paths: list[Path]) -> None:
+    without = recorded(tmp_path, [], name="s1_p3.mcap", from_s=300.0, length_s=10.0, session="s1", part="3")
+    assert figures_of(read(*paths, without))["interventions"] is None
+
+
+def test_people_are_on_duty_through_the_time_between_only_where_both_parts_say_so() -> None:
+    def person(name: str, *spans: tuple[int | None, int | None]) -> PersonInDrive:
+        return PersonInDrive(name=name, role="operator", on_duty=[Span(from_ms=a, to_ms=b) for a, b in spans])
+
+    first = [person("A", (10, None)), person("B", (20, None)), person("C", (None, 50))]
+    second = [person("A", (None, 250)), person("C", (None, None))]
+    found = {
+        one.name: [(s.from_ms, s.to_ms) for s in one.on_duty]
+        for one in joined_people([(0, 100, first), (200, 300, second)])
+    }
+    assert found == {"A": [(10, 250)], "B": [(20, 100)], "C": [(None, 50), (200, None)]}
+
+
+@pytest.mark.parametrize(
+    ("span", "gaps", "left"),
+    [
+        ((0, 10), [(2, 3), (5, 7)], [(0, 2), (3, 5), (7, 10)]),
+        ((2.5, 6), [(2, 3), (5, 7)], [(3, 5)]),
+        ((0, 2), [(2, 3)], [(0, 2)]),
+        ((2, 3), [(1, 4)], []),
+        ((4, 4), [], []),
+    ],
+)
+def test_what_is_in_no_gap(span: Any, gaps: Any, left: Any) -> None:
+    assert outside(span, gaps) == left
+
+
+def test_a_part_that_is_not_there_is_named() -> None:
+    def part(session: str, number: int | None, **metadata: str) -> DrivePart:
+        return DrivePart(id=f"{session}_{number}", session=session, number=number, from_s=0, to_s=1, metadata=metadata)
+
+    assert missing_parts([part("a", 1), part("a", 2), part("b", 1)]) == []
+    assert missing_parts([part("a", 2, clip_of="x"), part("", 5)]) == []
+    (one, other) = missing_parts([part("a", 1), part("a", 3), part("b", 4)])
+    assert one.startswith("Part 2 of the drive of a_1 is not in this report")
+    assert other.startswith("Parts 1, 2, 3 of the drive of b_4 are not in this report")
