@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help demo fleet test test-field check world format lint types imports compiled tsc node bench soak mutation sbom screenshots clean vendor-missing
+.PHONY: help demo fleet test test-field peers check world format lint types imports compiled tsc node bench soak mutation sbom screenshots clean vendor-missing
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -29,7 +29,15 @@ test: $(VENV)/.ready-test static/built/built.json ## the gate: what must pass be
 test-field: $(VENV)/.ready-test static/built/built.json ## all tests of processes, real time, widths and real ROS nodes
 	$(PY) -m tests.chromium
 	$(PY) -m tests.vehicle.ros2_environment
+	$(PY) -m tests.peers.environment
 	$(PY) -m tests.stages test-field
+
+peers: $(VENV)/.ready-test static/built/built.json ## other people's programs against the bridge, files, interface and page, and a table
+	$(PY) -m tests.chromium
+	$(PY) -m tests.peers.environment
+	rm -f out/tests/peers.jsonl
+	status=0; $(PYTEST) --report-log=out/tests/peers.jsonl tests/peers -m peers || status=$$?; \
+	$(PY) -m tests.peers.table out/tests/peers.jsonl && exit $$status
 
 check: $(VENV)/.ready-test ## the quick part of the gate, without a browser
 	$(MAKE) --no-print-directory -j 2 --output-sync types compiled format lint imports tsc node
@@ -82,7 +90,7 @@ node: $(VENV)/.ready-test
 	files=$$(find tests/page -name '*.test.js' | sort); [ -z "$$files" ] || node --test --test-reporter dot $$files
 
 clean: ## back to a fresh clone; recordings in data/ stay
-	rm -rf $(VENV) .venv-ros2 node_modules static/vendor static/built static/drawn build dist out *.egg-info
+	rm -rf $(VENV) .venv-ros2 .venv-peers node_modules tests/peers/node_modules static/vendor static/built static/drawn build dist out *.egg-info
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find monitor server tests -name __pycache__ -type d -prune -exec rm -rf {} +
 

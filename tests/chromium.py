@@ -46,7 +46,7 @@ def find_chromium() -> str:
 
 def install_chromium() -> None:
     """Install one: from the system's packages as root on Debian, else Playwright's build in the user's cache."""
-    if _is_debian() and _apt_install("chromium", "fonts-dejavu-core", "fonts-roboto-unhinted", "libatomic1"):
+    if _is_debian() and apt_install("chromium", "fonts-dejavu-core", "fonts-roboto-unhinted", "libatomic1"):
         return
     command = [sys.executable, "-m", "playwright", "install", "chromium"]
     if _has_apt():
@@ -57,7 +57,7 @@ def install_chromium() -> None:
 def check_driver() -> None:
     """Make sure that Playwright's own Node starts: it needs a library that a bare system lacks. Raises NoChromium."""
     if not _driver_starts():
-        _apt_install("libatomic1")
+        apt_install("libatomic1")
         if not _driver_starts():
             raise NoChromium(
                 "Playwright does not start on this machine: install libatomic1 with the system's packages."
@@ -69,7 +69,7 @@ def bring_readers() -> None:
     packages = {"certutil": "libnss3-tools", "zbarimg": "zbar-tools"}
     missing = [package for command, package in packages.items() if shutil.which(command) is None]
     if missing:
-        _apt_install(*missing)
+        apt_install(*missing)
 
 
 def _driver_starts() -> bool:
@@ -81,7 +81,7 @@ def _has_apt() -> bool:
     return os.geteuid() == 0 and shutil.which("apt-get") is not None
 
 
-def _apt_install(*packages: str) -> bool:
+def apt_install(*packages: str) -> bool:
     """Whether they are there now; False where apt is not ours to use."""
     if not _has_apt():
         return False

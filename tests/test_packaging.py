@@ -49,11 +49,13 @@ def test_every_package_has_its_reason() -> None:
     assert sorted(reasons) == sorted(names)
 
 
-def test_javascript_packages_are_pinned_without_naming_a_registry() -> None:
-    lock = json.loads((PROJECT / "package-lock.json").read_text(encoding="utf-8"))["packages"]
+@pytest.mark.parametrize("folder", [PROJECT, PROJECT / "tests" / "peers"], ids=["project", "peers"])
+def test_javascript_packages_are_pinned_without_naming_a_registry(folder: Path) -> None:
+    lock = json.loads((folder / "package-lock.json").read_text(encoding="utf-8"))["packages"]
+    package = json.loads((folder / "package.json").read_text(encoding="utf-8"))
     assert [name for name, entry in lock.items() if "resolved" in entry] == []
     assert [name for name, entry in lock.items() if name and "integrity" not in entry] == []
-    wanted = {**PACKAGE["dependencies"], **PACKAGE["devDependencies"]}
+    wanted = {**package["dependencies"], **package.get("devDependencies", {})}
     assert {name: lock[f"node_modules/{name}"]["version"] for name in wanted} == wanted
 
 

@@ -21,7 +21,7 @@ class Health(TypedDict):
     status: Literal["ok", "cars lost", "impaired"]
     version: str
     problems: NotRequired[Annotated[list[str], doc("a sentence each")]]
-    lost: NotRequired[Annotated[list[str], doc("cars that send nothing")]]
+    lost: NotRequired[Annotated[dict[str, str], doc("cars that send nothing → a sentence")]]
     off: NotRequired[Annotated[list[str], doc("cars that are off on purpose")]]
     boot: NotRequired[Annotated[str, doc("another one after each start of the server")]]
     up_for_s: NotRequired[float]

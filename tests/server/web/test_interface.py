@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import pytest
 from openapi_spec_validator import OpenAPIV31SpecValidator
+from pydantic import TypeAdapter
 
 from server.app.app import create_app
 from server.app.config import Config
+from server.protocol.http_answers import Health
 from server.web.interface import PROBLEM_TYPE, PROBLEMS
+from tests.http import http_client
+from tests.server.conftest import serving
 
 PROBLEM = {"$ref": "#/components/schemas/ProblemDocument"}
 
@@ -71,3 +76,10 @@ def test_what_is_not_json_has_its_own_media_type(name: str, media_type: str) -> 
     content = dict(operations())[name]["responses"]["200"]["content"]
     assert media_type in content
     assert "application/json" not in content or "{format}" in name
+
+
+async def test_the_answer_about_the_servers_health_is_as_described(tmp_path: Path) -> None:
+    async with serving(Config(data=tmp_path)) as base, http_client(base_url=base) as client:
+        answer = await client.get("/api/health")
+    TypeAdapter(Health).validate_json(answer.content, strict=True)
+    assert "lost" in answer.json()

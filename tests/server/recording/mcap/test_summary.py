@@ -3,7 +3,6 @@ a doctor of MCAP finds nothing wrong."""
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -23,6 +22,7 @@ from server.recording.folder import writing_path
 from server.recording.mcap.write import PartFile
 from server.recording.read.read import open_recording
 from server.recording.recover import recover
+from tests.server.recording.mcap.doctor import REMARKS, examined
 from tests.server.recording.mcap.test_write import AT_NS, written
 from tests.tree import PROJECT
 
@@ -110,22 +110,10 @@ def test_each_group_of_the_summary_has_its_offset_and_no_offset_is_empty(
     assert offsets[-1].group_start + offsets[-1].group_length == footer.summary_offset_start
 
 
-# What the doctor of pymcap-cli remarks, and why it is so on purpose.
-REMARKS = {
-    "METADATA_NAME_DUPLICATE": "what is known of a drive is written at its beginning and again later, so that a kill "
-    "does not lose it; the specification allows several records of one name",
-    "NO_ATTACHMENTS": "a drive without voice notes and photos has none",
-}
-
-
 @pytest.mark.parametrize("make", [closed, killed, cut_out])
 def test_a_doctor_finds_nothing_wrong(tmp_path: Path, make: Callable[[Path], Path]) -> None:
     path = make(tmp_path / "car_1.mcap")
-    doctor = Path(sys.executable).with_name("pymcap-cli")
-    found = subprocess.run(
-        [doctor, "doctor", "--quiet", "--format", "jsonl", path], capture_output=True, text=True, check=False
-    )
-    rows = [json.loads(line) for line in found.stdout.splitlines()]
-    assert [row for row in rows if row["type"] == "finding" and row["code"] not in REMARKS] == []
-    assert (found.returncode, rows[-1]["type"], rows[-1]["errors"], rows[-1]["complete"]) == (0, "summary", 0, True)
-    assert rows[-1]["messages"] == 20
+    findings, summary = examined(path)
+    assert [row for row in findings if row["code"] not in REMARKS] == []
+    assert (summary["exit_code"], summary["type"], summary["errors"], summary["complete"]) == (0, "summary", 0, True)
+    assert summary["messages"] == 20

@@ -1,0 +1,1 @@
+"""Other people's programs against our bridge, recordings, exports, interface and page (docs/peers.md)."""
