@@ -14,7 +14,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, expect
 
 from server.recording.catalog.annotations import media_beside
-from tests.page.barriers import fits, no_barrier
+from tests.page.barriers import fits, fits_all, no_barrier
 from tests.page.conftest import Phone
 from tests.page.drives import steady
 from tests.page.processes import Process, replay, running, server, watching
@@ -22,6 +22,12 @@ from tests.server.recording.drive.story import EVIL, PHOTO, recorded
 
 pytestmark = [pytest.mark.browser, pytest.mark.asyncio(loop_scope="session")]
 
+A4_PX, MARGIN_PX = 794, 48
+BEYOND = """(width) => [...document.querySelectorAll('article.drive *')]
+  .filter((one) => one.getClientRects().length && !one.closest('svg'))
+  .filter((one) => one.getBoundingClientRect().right > width + 1
+    || one.clientWidth > 0 && one.scrollWidth > one.clientWidth + 1)
+  .map((one) => `${one.tagName} ${one.className} ${one.textContent.trim().slice(0, 40)}`)"""
 ASKED = re.compile(r"/api/logbook\?")
 
 
@@ -61,13 +67,31 @@ async def test_two_taps_lead_to_the_report(saved: Phone, browser: Browser, watch
     await expect(report.get_by_role("heading", name="Drive report")).to_be_visible(timeout=40_000)
     await expect(report.locator("article.drive")).to_contain_text(EVIL)
     await expect(report.locator("article.drive img[src^=x]")).to_have_count(0)
-    assert await report.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    for width in (320, 360, 412, 820, 1440):
+        await report.set_viewport_size({"width": width, "height": 900})
+        assert await report.evaluate("document.documentElement.scrollWidth") <= width
+        assert await report.evaluate(BEYOND, width) == [], width
+    await no_barrier(report, "the report", "article.drive")
     assert await report.evaluate("origin") == "null"  # in a sandbox
-    await report.emulate_media(media="print")
-    await expect(report.locator(".after-report").first).to_be_hidden()
     assert complaints == []
     await context.close()
     await page.keyboard.press("Escape")
+
+
+async def test_the_report_prints_on_a4(browser: Browser, watch: Process) -> None:
+    """A drive of two minutes is on a few sheets, with nothing cut at the right edge, and without the analysis."""
+    context = await browser.new_context(viewport={"width": A4_PX - 2 * MARGIN_PX, "height": 1123})
+    report = await context.new_page()
+    await report.goto(f"{watch.address}/api/recordings/car_20231114T221320Z/report", timeout=90_000)
+    await report.emulate_media(media="print")
+    await expect(report.locator(".after-report").first).to_be_hidden()
+    assert await report.evaluate(BEYOND, A4_PX - 2 * MARGIN_PX) == []
+    printed = await report.pdf(prefer_css_page_size=True, print_background=True)
+    sheets = [tuple(map(float, box.split())) for box in re.findall(rb"/MediaBox \[([\d. ]+)\]", printed)]
+    assert len(sheets) == len(re.findall(rb"/Type /Page\b", printed))
+    assert 2 <= len(sheets) <= 4
+    assert {(round(box[2]), round(box[3])) for box in sheets} == {(595, 842)}  # pt
+    await context.close()
 
 
 @pytest.mark.own_phone
@@ -99,7 +123,9 @@ async def test_the_logbook_and_two_drives_along_the_way(saved: Phone) -> None:
     await fits(page, "the logbook")
     await page.locator('[data-f="logbook-compare"]').tap()
     compare = page.locator(".compareway-board")
-    await expect(compare.locator(".cw-plots svg")).to_have_count(5)
+    await expect(compare.locator(".cw-plots svg")).to_have_count(6)
+    await expect(compare.locator(".cw-plots")).to_contain_text("commanded speed: not known")
+    await expect(compare.locator(".cw-side .lb-check")).to_contain_text("as many in both")
     await compare.get_by_role("slider").press("End")
     await expect(compare.locator(".lb-figures")).to_contain_text("1.19")
     await no_barrier(page, "two drives", ".compareway-board")
@@ -108,7 +134,11 @@ async def test_the_logbook_and_two_drives_along_the_way(saved: Phone) -> None:
     table = list(csv.reader(io.StringIO(Path(await (await saving.value).path()).read_bytes().decode())))
     assert table[0][0] == "distance along A [m]"
     assert len(table) > 500
-    assert {len(line) for line in table} == {20}
+    assert {len(line) for line in table} == {24}
+    assert [line[0] for line in table[-8:]] == [
+        *("summary", "Interventions", "Alarms", "Speed [m/s]", "Steering [%]"),
+        *("Following error [m/s]", "GPS error [m]", "Aside [m]"),
+    ]
     assert any(EVIL in cell for line in table for cell in line)
     await compare.get_by_role("button", name="By time").tap()
     await expect(compare.locator(".lb-figures")).to_contain_text("2:00")
@@ -130,9 +160,13 @@ async def test_a_replay_leads_to_marks_and_interventions(phone: Phone, watch: Pr
     await expect(jumps.locator("#jumps-title")).to_contain_text("2 marks, 1 intervention", timeout=40_000)
     await expect(jumps.locator('[data-kind="flag"]').first).to_contain_text(EVIL)  # as text
     await no_barrier(page, "the jumps", "#sheet-jumps")
-    await fits(page, "the jumps")
+    await fits_all(page, "the jumps", "#sheet-jumps")
     await jumps.locator('[data-kind="wheel"]').tap()
     await expect(page.locator(".scrub .clock b")).to_have_text("01:15")  # 5 s before
+    await page.goto(f"{watch.address}/?replay=car_20231114T221320Z&t=33.6#home")
+    await expect(page.locator(".mark-card")).to_contain_text(EVIL, timeout=40_000)
+    await no_barrier(page, "the card of a mark", ".mark-card")
+    await fits_all(page, "the card of a mark", ".mark-card")
 
 
 async def test_an_alarm_over_the_logbook_of_a_car_that_drives_is_acknowledged(

@@ -69,8 +69,8 @@ def joined(courses: Sequence[Course]) -> Course:
     events: list[CourseEvent] = []
     for course, begin_s, begin_m in parts:
         for event in course["events"]:
-            at_m = None if event["m"] is None or length_m is None else round(event["m"] + begin_m, 1)
-            events.append({**event, "t": round(event["t"] + begin_s, 2), "m": at_m})
+            event_m = None if event["m"] is None or length_m is None else round(event["m"] + begin_m, 1)
+            events.append({**event, "t": round(event["t"] + begin_s, 2), "m": event_m})
     return {
         **first,
         "length_s": round(length_s, 2),

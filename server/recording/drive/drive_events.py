@@ -58,7 +58,7 @@ def read_part_events(recording: Recording, parts: Sequence[DrivePart] | None = N
         return None
     parts = parts_of(recording) if parts is None else parts
     begins = [recording.start_s + part.from_s for part in parts]
-    logged: list[list[Event]] = [[] for _ in parts or [None]]
+    logged: list[list[Event]] = [[] for _ in range(max(1, len(parts)))]
     for at_s, event in rows:
         if _is_event(event):
             logged[max(0, bisect_right(begins, at_s + 1e-6) - 1)].append(event)
