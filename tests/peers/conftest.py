@@ -27,7 +27,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @dataclass(frozen=True)
 class Tally:
-    """What a suite tried and found; `unexplained` are the findings for which its table has no reason."""
+    """Items tried and findings of a suite; `unexplained` are those for which its row has no reason."""
 
     suite: Suite
     kept: dict[str, Any]  # what goes into the log of the run, and from there into the table
@@ -36,7 +36,7 @@ class Tally:
         self.kept["run"] += count
 
     def found(self, finding: str, item: str = "", *, is_advice: bool = False) -> None:
-        """What the suite said, in its words, of one of what was tried; that did not pass, unless it is advice."""
+        """A finding about one item, in the suite's own text. The item did not pass, unless the finding is advice."""
         if not is_advice and (item or finding) not in self.kept["failed"]:
             self.kept["failed"].append(item or finding)
         for pattern, reason in self.suite.explained.items():

@@ -1,7 +1,7 @@
 """Installs what only `make peers` needs, apart from the project's own: `python -m tests.peers.environment`.
 
 PyPI's packages go to `.venv-peers`, npm's to `node_modules` of this folder, Debian's to the system where this user may
-install them. What cannot be installed is said; its suites are skipped with the reason.
+install them. What cannot be installed is printed; its suites are skipped with the reason.
 """
 
 from __future__ import annotations

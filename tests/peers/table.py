@@ -21,7 +21,7 @@ from tests.peers.suites import NOT_RUN, SUITES, Suite
 from tests.tree import PROJECT
 
 DOCUMENT = PROJECT / "docs" / "peers.md"
-HEAD = "| suite | from | version | what it does | run | passed | what it said, and why that is right |"
+HEAD = "| suite | from | version | what it does | run | passed | findings, and why they are right |"
 PART = re.compile(r"^\| suite \|.*\n(?:\|.*\n)*", re.MULTILINE)
 
 
@@ -44,11 +44,11 @@ class Row:
 
     def line(self) -> str:
         suite = self.suite
-        said = [f"{count}: {why}" for why, count in self.explained.items()]
-        said += [f"UNEXPLAINED: {' '.join(one.split())[:200]}" for one in self.unexplained]
-        said += [f"not run: {why}" for why in sorted(self.skipped)]
+        findings = [f"{count}: {why}" for why, count in self.explained.items()]
+        findings += [f"UNEXPLAINED: {' '.join(one.split())[:200]}" for one in self.unexplained]
+        findings += [f"not run: {why}" for why in sorted(self.skipped)]
         counts = (f"{self.run:,}", f"{self.run - self.failed:,}") if self.run else ("not run", "")
-        return _line(suite.name, suite.registry, version(suite), suite.checks, *counts, "; ".join(said))
+        return _line(suite.name, suite.registry, version(suite), suite.checks, *counts, "; ".join(findings))
 
 
 def rows(reports: Iterable[dict[str, Any]]) -> list[Row]:
