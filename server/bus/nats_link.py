@@ -56,7 +56,7 @@ class BrokerLink:
         """`name`: of this program in the broker's own lists; `unsent`: what was too large for the broker, as a
         sentence. Raises BrokerRefused."""
         self._broker = broker
-        self.unsent = unsent
+        self._unsent = unsent
         self._parts = parts
         self._name = name
         self._seed = _seed(broker.key)
@@ -78,6 +78,11 @@ class BrokerLink:
             return None
         what = "; ".join(self._refused)
         return f"The broker {self._broker.address} refuses a part of what this program needs: {what}."
+
+    @property
+    def unsent(self) -> str | None:
+        """What of late was too large for the broker, in sentences; None: nothing."""
+        return self._unsent()
 
     @property
     def complaint(self) -> str | None:

@@ -47,6 +47,10 @@ class Link(Protocol):
     def refused(self) -> str | None:
         """What it does not allow, as a sentence; None: nothing."""
 
+    @property
+    def unsent(self) -> str | None:
+        """What was too large for it, in sentences; None: nothing."""
+
     def start(self) -> None:
         """Begin to connect, in the background."""
 
@@ -145,7 +149,7 @@ class Services:
         """What is wrong with the server, a sentence each; those of a vehicle begin with its name."""
         found = [f"{name}: {what}" for name, session in self.sessions.items() for what in problems(session.vitals())]
         if self.link is not None:
-            said = (self.link.complaint, self.link.refused, self.link.unsent())
+            said = (self.link.complaint, self.link.refused, self.link.unsent)
             found += [one for one in said if one is not None]
         if self.people.complaint is not None:
             found.append(self.people.complaint)
