@@ -17,7 +17,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, Locator, async_playwright, expect
 
 from tests.chromium import FLAGS
-from tests.page.barriers import fits, no_barrier
+from tests.page.barriers import fits, fits_all, no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, free_port, running, server, simulate
 
@@ -134,7 +134,7 @@ async def test_a_mark_with_voice_photo_and_words(hearing: Browser, car: Process,
         panel = page.locator(".fresh")
         await expect(panel).to_contain_text("stored")
         await no_barrier(page, "a fresh mark", ".ledge")
-        await fits(page, "a fresh mark")
+        await fits_all(page, "a fresh mark", ".ledge")
 
         await one.hold(1.6)
         *_, mark = await one.stored(2, voice=True)
