@@ -36,10 +36,12 @@ export function speedPlot(rows, width, limit) {
   ], 'Speed, A solid and B dotted');
 }
 
-/** B − A. @param {Row[]} rows @param {number} width @param {'speed' | 'steering'} what */
+/** B − A; null: known nowhere. @param {Row[]} rows @param {number} width @param {'speed' | 'steering'} what */
 export function differencePlot(rows, width, what) {
+  const known = rows.map((row) => difference(row, what)).filter((value) => value !== null);
+  if (!known.length) return null;
   const frame = frameOf(width, 110);
-  const most = Math.max(1, ...rows.map((row) => Math.abs(difference(row, what) ?? 0)));
+  const most = Math.max(1, ...known.map(Math.abs));
   const top = ticksTo(most, 1).at(-1) ?? 1;
   const y = scale(top, frame);
   const { px } = axisOf(rows, width);
