@@ -90,6 +90,8 @@ class ProofFollower:
         """The clock went back: what was measured does not fit what comes."""
         self._speeds.clear()
         self._motion = None
+        if self.proof.shown is None and self._ordered_s is not None:
+            self.proof = replace(self.proof, is_before_known=False)
 
     def order(self, facts: SlowingFacts) -> None:
         """What is known of the order now."""

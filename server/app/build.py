@@ -179,7 +179,7 @@ def _fleet(
             now=now, read=RemoteFrames(wall_ms), read_event=event, expected=expected,
             on_new=known.note, on_heard=off.heard,
         )  # fmt: skip
-        agents = HttpNode(remote.trouble, now=now)
+        agents = HttpNode(remote.link_trouble, now=now)
         if not config.is_open:
             bucket = DevicesBucket(SharedDevices(access, wall_ms=wall_ms, people=SharedPeople(people)))
             access.devices.on_kept = people.on_changed = bucket.changed

@@ -92,8 +92,12 @@ class NatsBus:
     def grows(self) -> bool:
         return True
 
+    def link_trouble(self, vehicle: str) -> str | None:
+        """Why its agent cannot be asked; None: it can, whatever its values are."""
+        return self._heard.trouble(vehicle)
+
     def trouble(self, vehicle: str) -> str | None:
-        trouble = self._heard.trouble(vehicle)
+        trouble = self.link_trouble(vehicle)
         if trouble is not None:
             return trouble
         if not self._watchers.viewers(vehicle):

@@ -52,6 +52,8 @@ class EventFeed:
         """These were sent to the page."""
         self._sent_s = self._now()
         self._is_catching_up = len(events) == self._batch
+        if not self._is_catching_up:
+            self._batch = LEAST_A_BATCH
 
     def acknowledged(self) -> bool:
         """The page has them. Returns whether it is catching up: more of them wait."""
@@ -83,7 +85,7 @@ class EventFeed:
         if reading.cancelled():
             return
         if isinstance(reading.exception(), NotServed):  # they are at an agent that does not answer
-            self._reading = None
+            self._reading, self._batch = None, LEAST_A_BATCH
             self._again = asyncio.get_running_loop().call_later(AGAIN_S, self._on_read)
         else:
             self._on_read()

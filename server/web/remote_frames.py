@@ -1,7 +1,8 @@
 """What a web node makes of frames and events that came from an agent: no page gets what is not of this vehicle, or not
 of the declared types.
 
-A word that is not declared, as a priority of a newer version, is taken: the page knows what to make of it.
+A word that is not declared, as a priority of a newer version, is taken, and a field that an older version does not
+have may be missing: the page knows what to make of them.
 """
 
 from __future__ import annotations
@@ -19,10 +20,16 @@ from server.protocol.cars_state import CarSummary
 from server.protocol.slow_down_state import FORMER_PHASES
 from server.protocol.state import LiveState
 
+Place = tuple[int | str, ...]  # in a body, as ("alarms", 0, "title")
+
 LONGEST_SUMMARY = 6000  # bytes; it goes to every page
 _SUMMARY: TypeAdapter[CarSummary] = TypeAdapter(CarSummary)
 _STATE: TypeAdapter[LiveState] = TypeAdapter(LiveState)
 _EVENT: TypeAdapter[LogEvent] = TypeAdapter(LogEvent)
+# Without these parts of a state, and without a part of an alarm, no page can show the car.
+PARTS = "server session link signals nearest checks alarms limits recording decelerate control".split()
+NEEDED: frozenset[Place] = frozenset([("signals", "speed"), *((name,) for name in PARTS)])
+ALARMS = frozenset(("alarms", "suppressed"))
 # What a page needs of each event, and what it gets where an event has it not, or as another type.
 _UNREAD = {"at_ms": 0, "alarm": None, "change": "unread", "text": "This event of the agent cannot be read."}
 
@@ -50,8 +57,9 @@ def state(vehicle: str, payload: str | bytes, time_ms: int) -> str:
     found = _loaded(payload)
     if found.get("kind") != "state" or found.get("vehicle") != vehicle or not isinstance(found.get("server"), dict):
         raise wire.Malformed(f"no state of {vehicle}")
-    if wrong := _wrong(_STATE, payload):
-        raise wire.Malformed(f"a state with a wrong {', '.join(wrong)}"[:200])
+    wrong = {str(loc[0]) if loc else "body" for loc, kind in _errors(_STATE, payload) if not _may_lack(loc, kind)}
+    if wrong:
+        raise wire.Malformed(f"a state with a wrong {', '.join(sorted(wrong))}"[:200])
     found = {name: found[name] for name in LiveState.__annotations__ if name in found}
     found["server"]["time_ms"] = time_ms
     if isinstance(slow_down := found.get("decelerate"), dict):
@@ -81,28 +89,42 @@ def summary(payload: str | bytes, time_ms: int) -> str:
 def event(found: dict[str, Any]) -> dict[str, Any]:
     """The event as pages get it: what is of another type than declared is left out, and no event is."""
     try:
-        wrong = _wrong(_EVENT, orjson.dumps(found))
+        errors = _errors(_EVENT, orjson.dumps(found))
     except TypeError:  # nested too deeply to be written
         return {"n": found.get("n"), **_UNREAD}
-    for name, kind in wrong.items():
-        if kind != "missing":
-            del found[name]
+    for loc, kind in errors:
+        if not loc:  # nested too deeply to be read
+            return {"n": found.get("n"), **_UNREAD}
+        name = str(loc[0])
+        if kind != "missing" or len(loc) > 1:
+            found.pop(name, None)
         if name in _UNREAD:
             found[name] = _UNREAD[name]
     return found
 
 
-def _wrong(adapter: TypeAdapter[Any], payload: str | bytes) -> dict[str, str]:
-    """The fields of a body that are not of the declared type, and the kind of the mistake."""
+def _errors(adapter: TypeAdapter[Any], payload: str | bytes) -> list[tuple[Place, str]]:
+    """Where a body is not of the declared type, and the kind of each mistake."""
     try:
         adapter.validate_json(payload, strict=True)
     except ValidationError as error:
-        return {
-            str(one["loc"][0]) if one["loc"] else "body": one["type"]
-            for one in error.errors(include_url=False, include_context=False)
-            if one["type"] not in ("literal_error", "enum") or not isinstance(one["input"], str)
+        found = error.errors(include_url=False, include_context=False)
+        words = {
+            one["loc"] for one in found if one["type"] in ("literal_error", "enum") and isinstance(one["input"], str)
         }
-    return {}
+        # Of a union with a word each member has an error of its own.
+        unions = {loc[:-1] for loc in words if str(loc[-1]).startswith("literal[")}
+        return [
+            (one["loc"], one["type"])
+            for one in found
+            if one["loc"] not in words and not (isinstance(one["input"], str) and one["loc"][:-1] in unions)
+        ]
+    return []
+
+
+def _may_lack(loc: Place, kind: str) -> bool:
+    """Whether this mistake is a field that an older agent does not have."""
+    return kind == "missing" and loc[0] not in ALARMS and loc not in NEEDED
 
 
 def _rename(found: dict[str, Any], field: str) -> None:

@@ -11,6 +11,7 @@ import pytest
 from monitor.check import Verdict
 from monitor.checks.slow_down import BEFORE_UNKNOWN, STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, obeys
 from monitor.shell_facts import SlowingFacts
+from monitor.slow_proof import ProofFollower
 from monitor.state import State
 from monitor.values import Twist
 from tests.monitor.slow_cars import ORDERED_S, SlowCar, random_car
@@ -198,6 +199,16 @@ def test_an_order_before_the_motion_is_known_says_why_nothing_proves_it() -> Non
     verdict, text = judged(state, ORDERED_S + 2.0, 3.0)
     assert verdict is Verdict.FAULT
     assert BEFORE_UNKNOWN in text
+
+
+def test_a_clock_that_goes_back_leaves_the_motion_before_the_order_unknown() -> None:
+    follower = ProofFollower()
+    for n in range(-60, 1):
+        follower.add(ORDERED_S + n * 0.05, 6.0)
+    follower.order(order(ORDERED_S))
+    assert follower.proof.is_before_known
+    follower.forget()
+    assert not follower.proof.is_before_known
 
 
 def test_the_proof_of_one_order_is_not_that_of_the_next() -> None:

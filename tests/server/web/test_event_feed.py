@@ -77,3 +77,13 @@ async def test_batches_grow_while_a_page_has_them_quickly_and_a_slow_one_gets_sm
         assert not feed.acknowledged(), "of one batch once"
     sizes.append(len(feed.after(n)))
     assert sizes == [100, 200, 400, 400, 400, 100, 200, 100]
+
+
+async def test_the_next_gap_begins_with_a_small_batch_again() -> None:
+    feed = EventFeed(cast(PageBus, Long()), "car", time.monotonic, lambda: None)
+    feed.sent(feed.after(0))
+    assert feed.acknowledged()
+    assert len(feed.after(100)) == 200
+    feed.sent([{"n": 101}])  # all that there was
+    assert not feed.acknowledged()
+    assert len(feed.after(101)) == 100

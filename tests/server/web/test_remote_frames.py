@@ -103,6 +103,7 @@ def test_of_an_event_only_what_is_of_another_type_is_left_out() -> None:
     assert event(LOGGED | {"measured": 3, "occurrence": "one"}) == {
         name: value for name, value in LOGGED.items() if name not in ("measured", "occurrence")
     }
+    assert "measured" not in event(LOGGED | {"measured": {"label": "Oil"}}), "also where a part of it is missing"
     unread = {"at_ms": 0, "alarm": None, "change": "unread", "text": "This event of the agent cannot be read."}
     assert event({"n": 7}) == {"n": 7, **unread}
     assert event(LOGGED | {name: {"x": 1} for name in unread}) == LOGGED | unread
@@ -110,6 +111,10 @@ def test_of_an_event_only_what_is_of_another_type_is_left_out() -> None:
     for _ in range(400):
         deep = [deep]
     assert event({"n": 7, "text": deep}) == {"n": 7, **unread}
+    deep = []
+    for _ in range(215):  # one reads it, the other does not
+        deep = [deep]
+    assert event({"n": 7, "at_ms": 5, "text": "x", "why": deep})["n"] == 7
 
 
 def test_a_summary_is_read_whole() -> None:

@@ -15,7 +15,7 @@ from server.web import page_writer
 from server.web.cars_board import CarsBoard
 from server.web.remote_frames import RemoteFrames
 from tests.frames import check_frame
-from tests.page.canned import live, slow
+from tests.page.canned import alarm, live, slow
 
 NOW_MS = 1_800_000_000_000
 READ = RemoteFrames(lambda: NOW_MS)
@@ -68,6 +68,31 @@ def test_a_phase_of_an_older_agent_has_its_present_name(was: str, now: str) -> N
     assert listed(str(READ("ocelot", SUMMARY, summary, 0.0)))["slow_down"] == now
     state = live() | {"vehicle": "ocelot", "decelerate": slow(was)}
     assert orjson.loads(READ("ocelot", "state", orjson.dumps(state), 0.0))["decelerate"]["state"] == now
+
+
+def lacking(*path: Any) -> dict[str, Any]:
+    """A state without one of its fields."""
+    state = live() | {"vehicle": "ocelot", "suppressed": []}
+    state["alarms"] = [alarm("speed_limit", "Speed above limit")]
+    inside: Any = state
+    for name in path[:-1]:
+        inside = inside[name]
+    del inside[path[-1]]
+    return state
+
+
+@pytest.mark.parametrize(
+    "path", [("questions",), ("signals", "brake"), ("signals", "speed", "frame"), ("link", "since_ms")]
+)
+def test_a_state_of_an_older_agent_may_lack_newer_fields(path: tuple[str, ...]) -> None:
+    taken = orjson.loads(READ("ocelot", "state", orjson.dumps(lacking(*path)), 0.0))
+    assert taken["session"]["phase"] == "monitoring"
+
+
+@pytest.mark.parametrize("path", [("alarms",), ("session",), ("alarms", 0, "title")])
+def test_a_state_without_what_a_page_needs_is_refused(path: tuple[Any, ...]) -> None:
+    with pytest.raises(Malformed, match=f"a wrong {path[0]}"):
+        READ("ocelot", "state", orjson.dumps(lacking(*path)), 0.0)
 
 
 def test_a_newer_agent_is_understood() -> None:
