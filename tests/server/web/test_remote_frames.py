@@ -155,6 +155,7 @@ async def test_an_agent_that_sends_anything_harms_no_other_car(caplog: pytest.Lo
                 assert page.newest("margay", "state") is None
                 assert page.newest(ALL, "margay") is None
                 assert page.trouble("margay") == "The agent of margay sends what this server cannot read."
+                assert page.link_trouble("margay") is None, "its recordings can be fetched"
                 assert page.trouble("ocelot") is None
 
 
