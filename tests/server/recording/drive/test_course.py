@@ -8,7 +8,7 @@ import pytest
 
 from monitor.values import GpsFix, MotionCommand
 from server.protocol.marks import DriveMark
-from server.recording.drive.course import course_of, joined, with_marks
+from server.recording.drive.course import MOST_EVENTS, course_of, joined, with_marks
 from server.recording.drive.facts import DriveFacts, read_facts
 from server.recording.drive.motion import Motion
 from server.recording.read.read import open_recording
@@ -88,3 +88,20 @@ def test_the_parts_of_a_drive_are_one_course(tmp_path: Path) -> None:
     assert metres == sorted(metres)
     assert way["t"][-1] == pytest.approx(210, abs=1.5)
     assert [event["t"] for event in found["events"] if event["kind"] == "intervention"] == [80.0, 170.0]
+
+
+def test_a_drive_whose_events_are_not_known_says_so(tmp_path: Path) -> None:
+    with open_recording([recorded(tmp_path)]) as recording:
+        known = course_of(read_facts(recording))
+    of_others = course_of(DriveFacts(start_ms=0, end_ms=10_000, log=None, motion=Motion(10.0), late=[]))
+    said = [
+        (one["are_interventions_known"], one["are_alarms_known"], one["are_events_cut"])
+        for one in (known, of_others, joined([known, of_others]))
+    ]
+    assert said == [(True, True, False), (False, False, False), (False, False, False)]
+    many = joined(
+        [{**known, "events": known["events"][:1] * 200}, known, {**known, "events": known["events"][:1] * 99}]
+    )
+    assert (len(many["events"]), many["are_events_cut"]) == (MOST_EVENTS, True)
+    assert joined([many, known])["are_events_cut"]
+    assert with_marks(many, [])["are_events_cut"]
