@@ -49,7 +49,7 @@ def course_of(facts: DriveFacts) -> Course:
 
 def joined(courses: Sequence[Course]) -> Course:
     """That of a drive, from those of its parts, oldest first; between two parts nothing is known. The distance goes on
-    where it was: what was driven between two parts is not counted."""
+    where it was: what was driven between two parts, or in one without a distance, is not counted."""
     if len(courses) == 1:
         return courses[0]
     first, last = courses[0], courses[-1]
@@ -57,9 +57,10 @@ def joined(courses: Sequence[Course]) -> Course:
     length_s = begins_s[-1] + last["length_s"]
     lengths_m = [one["length_m"] for one in courses]
     begins_m = [sum(m or 0.0 for m in lengths_m[:number]) for number in range(len(courses))]
-    length_m = None if None in lengths_m else round(sum(m or 0.0 for m in lengths_m), 1)
+    length_m = None if lengths_m == [None] * len(courses) else round(sum(m or 0.0 for m in lengths_m), 1)
     step_s, step_m = max(LEAST_S, length_s / POINTS), max(LEAST_M, (length_m or 0.0) / POINTS)
     parts = list(zip(courses, begins_s, begins_m, strict=True))
+    measured = [part for part in parts if part[0]["length_m"]]
     way, time = _empty(), _empty()
     for number in range(int(length_s / step_s) + 1):
         at_s = number * step_s
@@ -67,7 +68,7 @@ def joined(courses: Sequence[Course]) -> Course:
         _copy(course["time"], round((at_s - begin_s) / course["step_s"]), time, (at_s, None), (begin_s, begin_m))
     for number in range(int(length_m / step_m) + 1 if length_m else 0):
         at_m = number * step_m
-        course, begin_s, begin_m = parts[max(0, bisect_right(begins_m, at_m) - 1)]
+        course, begin_s, begin_m = measured[max(0, bisect_right(measured, at_m, key=lambda part: part[2]) - 1)]
         index = min(round((at_m - begin_m) / course["step_m"]), len(course["way"]["t"]) - 1)
         _copy(course["way"], index, way, (begin_s, at_m), (begin_s, begin_m))
     events: list[CourseEvent] = []
