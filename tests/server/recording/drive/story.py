@@ -147,8 +147,15 @@ LATER: Sequence[Own] = (
 
 def in_two_parts(folder: Path, *, session: str = "s1") -> list[Path]:
     """A drive of two recordings, the second after a lost link."""
+    ordered = logged(117.0, "slow_down", step="ordered", order=2, why="obstacle", ordered_by="M. R. (Tablet)")
     raised = logged(118.0, "raised", "gps_drift", text="0.4 m", state="UNACKED")
-    first = recorded(folder, [*STORY, raised], name=f"{session}.mcap", session=session)
+    own = [*STORY, ordered, raised]
+    first = recorded(folder, own, name=f"{session}.mcap", session=session)
     from_s, length_s = SECOND
-    more = {"session": session, "part": "2"}
-    return [first, recorded(folder, LATER, name=f"{session}_p2.mcap", from_s=from_s, length_s=length_s, **more)]
+    _, alarms, changed = mode(140.0, "autonomous", "manual")  # written as soon as the second part begins
+    early = (BEGIN_S * NS + round(from_s * NS), alarms, changed)
+    more = {"session": session, "part": "2", **standing(*own)}
+    return [
+        first,
+        recorded(folder, [early, *LATER], name=f"{session}_p2.mcap", from_s=from_s, length_s=length_s, **more),
+    ]
