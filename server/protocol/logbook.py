@@ -146,4 +146,9 @@ class Course(TypedDict):
     way: CoursePoints
     time: CoursePoints
     events: list[CourseEvent]
+    are_interventions_known: Annotated[
+        bool, doc("false: the mode of the car was not recorded, in a part at least; a missing one is no zero")
+    ]
+    are_alarms_known: Annotated[bool, doc("false: no log was recorded, in a part at least; the same")]
+    are_events_cut: Annotated[bool, doc("there were more than 300: `events` lacks later ones")]
     limit_mps: Annotated[float | None, doc("the speed limit at the beginning; null: not recorded")]

@@ -27,7 +27,7 @@ function course({ points = 100, speed = 10, from_m = 0, aside_m = 0, lost = [-1,
     t: all.map((i) => (2 * i) / speed), m: all.map((i) => 2 * i), speed: all.map((i) => (isLost(i) ? null : speed)), steering: all.map((i) => (isLost(i) ? null : 0)),
     lat: all.map((i) => (isLost(i) || !hasPlaces ? null : aside_m * METRE)), lon: all.map((i) => (isLost(i) || !hasPlaces ? null : (from_m + 2 * i) * METRE)),
   };
-  return /** @type {import('../../static/js/core/protocol-types.js').Course} */ ({ start_ms: 0, length_s: (2 * points) / speed, length_m: 2 * points, step_m: 2, step_s: 2 / speed, way, time: way, events: [], limit_mps: null });
+  return /** @type {import('../../static/js/core/protocol-types.js').Course} */ ({ start_ms: 0, length_s: (2 * points) / speed, length_m: 2 * points, step_m: 2, step_s: 2 / speed, way, time: way, events: [], are_interventions_known: true, are_alarms_known: true, are_events_cut: false, limit_mps: null });
 }
 
 test('each place of A is compared with the nearest of B, wherever B began', () => {
@@ -116,4 +116,17 @@ test('did the change help: what happened, means and largest differences, where b
   const none = summaryOf(aligned(course(), course(), 'way'), 'way', course(), course());
   assert.deepEqual(none.filter(({ name }) => / error/.test(name)).map(({ words }) => words), ['not known in both', 'not known in both']);
   assert.equal(none[0]?.words, 'as many in both');
+});
+
+test('what a drive did not record is no count, nor one of the better', () => {
+  const [a, b] = [course(), course()];
+  a.events = [5, 6, 7].map((i) => ({ t: a.way.t[i] ?? 0, m: 2 * i, kind: 'intervention', text: '' }));
+  const lines = (/** @type {Partial<typeof a>} */ ofA, /** @type {Partial<typeof b>} */ ofB) => (
+    summaryOf(aligned(a, b, 'way'), 'way', { ...a, ...ofA }, { ...b, ...ofB }).slice(0, 2).map((line) => [line.a, line.b, line.mean, line.words]));
+  assert.deepEqual(lines({}, {}), [[3, 0, -3, '3 fewer in B'], [0, 0, 0, 'as many in both']]);
+  assert.deepEqual(lines({}, { are_interventions_known: false }), [[3, null, null, 'not known in B'], [0, 0, 0, 'as many in both']]);
+  assert.deepEqual(lines({ are_alarms_known: false }, { are_alarms_known: false }), [[3, 0, -3, '3 fewer in B'], [null, null, null, 'not known']]);
+  assert.deepEqual(lines({ are_events_cut: true }, {}), [[null, 0, null, 'not known in A'], [null, 0, null, 'not known in A']]);
+  const { are_alarms_known: _, are_interventions_known: __, ...older } = b; // of a server that did not say so
+  assert.deepEqual(summaryOf(aligned(a, b, 'way'), 'way', a, /** @type {any} */ (older))[0]?.words, 'not known in B');
 });

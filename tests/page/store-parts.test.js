@@ -85,7 +85,7 @@ test('what became of a command that was not answered is asked until it is known,
   reply(`${pause}?`, { became: 'done' });
   reply(`${pause}?`, { became: 'done' });
   reply(take, { ok: false, reason: 'Ben has it.' }); // its own answer, late
-  assert.deepEqual(found, [{ kind: 'pause', became: 'done', reason: '', cut: 'page-server' }, { kind: 'take_item', became: 'refused', reason: 'Ben has it.', cut: 'page-server' }]);
+  assert.deepEqual(found, [{ kind: 'pause', became: 'done', reason: '', cut: 'page-server' }, { kind: 'take_item', became: 'refused', reason: 'Ben has it.', cut: null }]);
   sent.length = 0;
   void requests.ask('resume', {});
   requests.broke();
@@ -145,6 +145,27 @@ test('a refusal names no cut, and the later word names the direction', async () 
   };
   assert.equal(lost('done'), '“Release” was carried out. Only its answer was lost: the link was cut in the direction back, between server and agent.');
   assert.equal(lost('never'), '“Release” was lost on its way. It is not carried out any more. The link was cut in the direction to the car, between server and agent.');
+});
+
+test('an answer that is merely late says so, and names the part that it names itself', async (t) => {
+  t.mock.timers.enable({ apis: ['setTimeout'] });
+  const sent = /** @type {any[]} */ ([]);
+  const texts = /** @type {string[]} */ ([]);
+  const requests = new Requests((message) => Boolean(sent.push(message)), () => {}, () => null, ({ kind, became, reason, cut }) => texts.push(laterWords(kind, became, reason, cut).text));
+  const late = (/** @type {object[]} */ ...replies) => {
+    void requests.ask('pause', {});
+    const { id } = sent.at(-1);
+    t.mock.timers.tick(4000);
+    for (const reply of replies) requests.answered(/** @type {any} */ ({ kind: 'reply', id, ...reply }));
+    requests.answered(/** @type {any} */ ({ kind: 'reply', id: `${id}?`, ok: true, became: 'done' }));
+    return texts.splice(0);
+  };
+  assert.deepEqual(late({ ok: true }), ['“Pause” was carried out; its answer came late.']);
+  assert.deepEqual(late({ ok: false, outcome: 'not_delivered', cut: null, reason: 'Too late.' }), ['“Pause” was not carried out: Too late.']);
+  assert.deepEqual(late({ ok: false, outcome: 'not_delivered', cut: 'server-broker', reason: 'Not sent.' }), ['“Pause” was not carried out: Not sent. The link is cut between server and broker.']);
+  const back = '“Pause” was carried out. Only its answer was lost: the link was cut in the direction back, between ';
+  assert.deepEqual(late({ ok: false, outcome: 'unknown', cut: 'broker-agent', reason: 'Lost.' }), [`${back}server and agent.`]);
+  assert.deepEqual(late(), [`${back}this page and the server.`]);
 });
 
 test('what must be signed is sent once it is, in its order, and never late', async (t) => {

@@ -30,6 +30,7 @@ def course_of(facts: DriveFacts) -> Course:
         step_m = max(LEAST_M, length_m / POINTS)
         places = (facts.motion.when(min(number * step_m, length_m)) for number in range(int(length_m / step_m) + 1))
         by_way = [at_s for at_s in places if at_s is not None]
+    events, log = _events(facts), facts.log
     return {
         "start_ms": facts.start_ms,
         "length_s": round(facts.length_s, 2),
@@ -38,14 +39,17 @@ def course_of(facts: DriveFacts) -> Course:
         "step_s": round(step_s, 4),
         "way": _points(facts, by_way),
         "time": _points(facts, by_time),
-        "events": _events(facts),
+        "events": events[:MOST_EVENTS],
+        "are_interventions_known": log is not None and log.are_modes_known,
+        "are_alarms_known": log is not None,
+        "are_events_cut": len(events) > MOST_EVENTS,
         "limit_mps": facts.limits[0][1] if facts.limits else None,
     }
 
 
 def joined(courses: Sequence[Course]) -> Course:
     """That of a drive, from those of its parts, oldest first; between two parts nothing is known. The distance goes on
-    where it was: what was driven between two parts is not counted."""
+    where it was: what was driven between two parts, or in one without a distance, is not counted."""
     if len(courses) == 1:
         return courses[0]
     first, last = courses[0], courses[-1]
@@ -53,9 +57,10 @@ def joined(courses: Sequence[Course]) -> Course:
     length_s = begins_s[-1] + last["length_s"]
     lengths_m = [one["length_m"] for one in courses]
     begins_m = [sum(m or 0.0 for m in lengths_m[:number]) for number in range(len(courses))]
-    length_m = None if None in lengths_m else round(sum(m or 0.0 for m in lengths_m), 1)
+    length_m = None if lengths_m == [None] * len(courses) else round(sum(m or 0.0 for m in lengths_m), 1)
     step_s, step_m = max(LEAST_S, length_s / POINTS), max(LEAST_M, (length_m or 0.0) / POINTS)
     parts = list(zip(courses, begins_s, begins_m, strict=True))
+    measured = [part for part in parts if part[0]["length_m"]]
     way, time = _empty(), _empty()
     for number in range(int(length_s / step_s) + 1):
         at_s = number * step_s
@@ -63,7 +68,7 @@ def joined(courses: Sequence[Course]) -> Course:
         _copy(course["time"], round((at_s - begin_s) / course["step_s"]), time, (at_s, None), (begin_s, begin_m))
     for number in range(int(length_m / step_m) + 1 if length_m else 0):
         at_m = number * step_m
-        course, begin_s, begin_m = parts[max(0, bisect_right(begins_m, at_m) - 1)]
+        course, begin_s, begin_m = measured[max(0, bisect_right(measured, at_m, key=lambda part: part[2]) - 1)]
         index = min(round((at_m - begin_m) / course["step_m"]), len(course["way"]["t"]) - 1)
         _copy(course["way"], index, way, (begin_s, at_m), (begin_s, begin_m))
     events: list[CourseEvent] = []
@@ -80,6 +85,9 @@ def joined(courses: Sequence[Course]) -> Course:
         "way": way,
         "time": time,
         "events": events[:MOST_EVENTS],
+        "are_interventions_known": all(one.get("are_interventions_known") for one in courses),
+        "are_alarms_known": all(one.get("are_alarms_known") for one in courses),
+        "are_events_cut": len(events) > MOST_EVENTS or any(one.get("are_events_cut") for one in courses),
     }
 
 
@@ -112,7 +120,9 @@ def with_marks(course: Course, marks: Sequence[DriveMark]) -> Course:
             place = min(bisect_left(moments, at_s), len(moments) - 1)
             text = (row["words"] or row["category"] or "")[:120]
             events.append({"t": round(at_s, 2), "m": metres[place], "kind": "mark", "text": text})
-    return {**course, "events": sorted(events, key=lambda event: event["t"])[:MOST_EVENTS]}
+    is_cut = course.get("are_events_cut") is True or len(events) > MOST_EVENTS
+    events.sort(key=lambda event: event["t"])
+    return {**course, "events": events[:MOST_EVENTS], "are_events_cut": is_cut}
 
 
 def _points(facts: DriveFacts, moments: list[float]) -> CoursePoints:
@@ -149,13 +159,14 @@ def _place(places: Sequence[Place], times: Sequence[float], at_s: float) -> tupl
 
 
 def _events(facts: DriveFacts) -> list[CourseEvent]:
+    """All of them, in order."""
     if facts.log is None:
         return []
     logged: list[tuple[int, str, str]] = [(one.raised_ms, one.priority, one.title) for one in facts.log.alarms]
     logged += [(row["marked_ms"], "mark", row["words"] or row["category"] or "") for row in facts.log.marks]
     logged += [(one.at_ms, "intervention", one.kind) for one in facts.log.interventions]
     events: list[CourseEvent] = []
-    for at_ms, kind, text in sorted(logged)[:MOST_EVENTS]:
+    for at_ms, kind, text in sorted(logged):
         at_s = facts.at_s(at_ms)
         if 0 <= at_s <= facts.length_s:
             metres = _rounded(facts.motion.until(at_s), 1)

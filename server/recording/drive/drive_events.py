@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, islice
+from itertools import islice
 from typing import Any
 
 import orjson
@@ -46,9 +46,21 @@ def read_drive_events(recording: Recording) -> list[Event] | None:
 
 
 def joined(parts: Sequence[PartEvents]) -> list[Event]:
-    """Of the whole drive: what stood before a later part is in the log of the part before it."""
-    first, *later = parts
-    return [*first.all, *chain.from_iterable((*part.signed, *part.logged) for part in later)]
+    """Of the whole drive. What stood before a later part is taken from there where no part before has it: it came
+    between two parts, or in one that is elsewhere."""
+    found: list[Event] = []
+    before: set[tuple[object, ...]] = set()
+    for part in parts:
+        found += [event for event in part.stood if _key(event) not in before]
+        found += [*part.signed, *part.logged]
+        before.update(map(_key, part.all))
+    return found
+
+
+def _key(event: Event) -> tuple[object, ...]:
+    """By its number in the log, which a step of the clock does not change; events of older versions have none."""
+    number = event.get("n")
+    return number if isinstance(number, int) else event["at_ms"], event["change"], event.get("alarm")
 
 
 def read_part_events(recording: Recording, parts: Sequence[DrivePart] | None = None) -> list[PartEvents] | None:

@@ -16,7 +16,7 @@ from server.protocol.marks import DriveMark
 from server.recording.delay import RecordedDelay
 from server.recording.drive.alarms import AlarmInDrive, alarms_of, by_component, percentile
 from server.recording.drive.departure import Departure, check_of, departure_of
-from server.recording.drive.drive_events import PartEvents, joined, of_change, read_part_events
+from server.recording.drive.drive_events import Event, PartEvents, joined, of_change, read_part_events, whole_of
 from server.recording.drive.modes import MODES, Intervention, ModeSpan, are_modes_known, interventions_of, mode_spans
 from server.recording.drive.motion import Motion
 from server.recording.drive.parts import DrivePart, Span, gaps_of, outside, parts_of
@@ -46,6 +46,19 @@ class DriveLog:
     slow_downs: Sequence[SlowDownInDrive]
     planned_stops: Sequence[PlannedStopInDrive]
     resumes: bool  # the server was started again: the drive is that of the recording before
+    stood: Sequence[Event] = ()  # what stood when it began, where the drive began before
+
+    @property
+    def own_alarms(self) -> list[AlarmInDrive]:
+        """Without those that a part before counts."""
+        stood = {(event["alarm"][:120], event["at_ms"]) for event in of_change(self.stood, "raised") if event["alarm"]}
+        return [alarm for alarm in self.alarms if (alarm.alarm, alarm.raised_ms) not in stood]
+
+    @property
+    def own_slow_downs(self) -> list[SlowDownInDrive]:
+        """The same of orders."""
+        stood = {whole_of(event, "order") for event in of_change(self.stood, "slow_down")}
+        return [order for order in self.slow_downs if order.order not in stood]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +141,7 @@ def facts_of(recording: Recording, motion: Motion) -> DriveFacts:
     return DriveFacts(
         start_ms=start_ms,
         end_ms=end_ms,
-        log=None if events is None else _log_of(recording, events, _spans_ms(parts, start_ms, end_ms)),
+        log=None if events is None else _log_of(recording, events, parts, _spans_ms(parts, start_ms, end_ms)),
         motion=motion,
         late=delay.course(),
         parts=parts,
@@ -143,10 +156,14 @@ def _spans_ms(parts: Sequence[DrivePart], start_ms: int, end_ms: int) -> list[tu
     return [(start_ms + round(part.from_s * 1000), start_ms + round(part.to_s * 1000)) for part in parts]
 
 
-def _log_of(recording: Recording, parts: Sequence[PartEvents], spans: Sequence[tuple[int, int]]) -> DriveLog:
+def _log_of(
+    recording: Recording, logs: Sequence[PartEvents], parts: Sequence[DrivePart], spans: Sequence[tuple[int, int]]
+) -> DriveLog:
     """`spans`: from when to when each part was recorded. Who was on duty and the mode are known within a part alone."""
-    events = joined(parts)
-    each = [(part.all, *span) for part, span in zip(parts, spans, strict=True)]
+    events = joined(logs)
+    each = [(log.all, *span) for log, span in zip(logs, spans, strict=True)]
+    resumes = any(event.get("resumes") is True for event in of_change(logs[0].all, "started"))
+    is_later = resumes or (bool(parts) and (parts[0].number or 1) > 1)
     return DriveLog(
         people=joined_people([(start_ms, end_ms, people_of(of, start_ms)) for of, start_ms, end_ms in each]),
         departure=departure_of(events),
@@ -157,7 +174,8 @@ def _log_of(recording: Recording, parts: Sequence[PartEvents], spans: Sequence[t
         alarms=alarms_of(events),
         slow_downs=slow_downs_of(events),
         planned_stops=planned_stops_of(events),
-        resumes=any(event.get("resumes") is True for event in of_change(parts[0].all, "started")),
+        resumes=resumes,
+        stood=logs[0].stood if is_later else (),
     )
 
 
@@ -180,20 +198,21 @@ def figures_of(facts: DriveFacts) -> dict[str, Any]:
         "people": [],
     }
     if log is not None:
-        waited = [alarm.to_acknowledge_s for alarm in log.alarms if alarm.to_acknowledge_s is not None]
+        alarms = log.own_alarms
+        waited = [alarm.to_acknowledge_s for alarm in alarms if alarm.to_acknowledge_s is not None]
         found |= {
-            "alarms": len(log.alarms),
+            "alarms": len(alarms),
             "interventions": len(log.interventions) if log.are_modes_known else None,
             "undescribed": len(undescribed_of(log)) if log.are_modes_known else None,
             "marks": len(log.marks),
-            "slow_downs": len(log.slow_downs),
+            "slow_downs": len(log.own_slow_downs),
             "departure": log.departure.state,
             "check": check_of(log.departure),
             "resumes": log.resumes,
-            "unacknowledged": len(log.alarms) - len(waited),
+            "unacknowledged": len(alarms) - len(waited),
             "acknowledged_p50_s": _rounded(percentile(waited, 0.5), 1),
             "acknowledged_p90_s": _rounded(percentile(waited, 0.9), 1),
-            "components": by_component(log.alarms),
+            "components": by_component(alarms),
             "people": names_of(log.people)[:MOST_NAMES],
         }
     rates = per_km(found["modes"]["autonomous"]["m"], motion.distance_m, found["interventions"], found["alarms"])

@@ -3,7 +3,7 @@
 /**
  * @typedef {import('./protocol-types.js').Reply} Reply
  * @typedef {NonNullable<Reply['outcome']>} Outcome
- * @typedef {NonNullable<Reply['became']>} Became
+ * @typedef {NonNullable<Reply['became']> | 'done_late' | 'not_delivered'} Became the last two: as its own answer said, which came late
  * @typedef {NonNullable<Reply['cut']> | 'page-server'} Cut
  * @typedef {Exclude<import('./protocol-types.js').PageMessage['kind'], 'hello' | 'take' | 'have' | 'watch' | 'replay' | 'present' | 'position' | 'outcome'>} Ordered
  */
@@ -50,7 +50,7 @@ export function maybe(why) {
  * What was found out later of a command that was not answered.
  * @param {string} kind
  * @param {Became} became
- * @param {string} reason where it was refused
+ * @param {string} reason where it was refused or not delivered
  * @param {Cut | null} cut where it was lost, where known
  * @returns {{title: string, text: string}}
  */
@@ -60,10 +60,14 @@ export function laterWords(kind, became, reason, cut) {
   switch (became) {
     case 'done':
       return { title: 'Carried out', text: `${name} was carried out. Only its answer was lost: the link was cut in the direction back${between}.` };
+    case 'done_late':
+      return { title: 'Carried out', text: `${name} was carried out; its answer came late.` };
     case 'refused':
       return { title: 'Refused', text: `${name} was refused: ${reason || 'it is not known why.'}` };
     case 'never':
       return { title: 'Not carried out', text: `${name} was lost on its way. It is not carried out any more. The link was cut in the direction to the car${between}.` };
+    case 'not_delivered':
+      return { title: 'Not carried out', text: `${name} was not carried out${reason ? `: ${reason}` : '.'}` };
     default:
       return { title: 'Not known', text: `It is not known whether ${name} was carried out. Look at what the car shows.` };
   }

@@ -374,6 +374,12 @@ export interface Course {
   way: CoursePoints;
   time: CoursePoints;
   events: Array<CourseEvent>;
+  /** false: the mode of the car was not recorded, in a part at least; a missing one is no zero */
+  are_interventions_known: boolean;
+  /** false: no log was recorded, in a part at least; the same */
+  are_alarms_known: boolean;
+  /** there were more than 300: `events` lacks later ones */
+  are_events_cut: boolean;
   /** the speed limit at the beginning; null: not recorded */
   limit_mps: number | null;
 }

@@ -102,7 +102,15 @@ export class Requests {
     const waiting = this.#waiting.get(reply.id);
     if (answer.outcome === 'unknown' && waiting) this.#keep(reply.id, waiting, reply.cut ?? null);
     if (waiting) this.#settle(reply.id, answer);
-    else if (answer.outcome !== 'unknown') this.#tell(reply.id, answer.ok ? 'done' : answer.outcome === 'not_delivered' ? 'never' : 'refused', reply.reason);
+    else this.#late(reply.id, answer, reply.cut ?? null);
+  }
+
+  /** An answer that came when it was given up: nothing is cut but what it says. @param {string} id @param {Answer} answer @param {Cut | null} cut */
+  #late(id, { ok, outcome, reason }, cut) {
+    const lost = this.#lost.get(id);
+    if (!lost) return;
+    lost.cut = cut;
+    if (outcome !== 'unknown') this.#tell(id, ok ? 'done_late' : outcome === 'not_delivered' ? 'not_delivered' : 'refused', reason);
   }
 
   /** The connection broke: none of them is answered any more. */

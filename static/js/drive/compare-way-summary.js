@@ -16,8 +16,8 @@ import { fixed, signed } from '../core/format.js';
 export function summaryOf(rows, by, a, b) {
   const both = rows.filter((row) => row.b);
   return [
-    counts('Interventions', rows, by, a, b, ({ kind }) => kind === 'intervention'),
-    counts('Alarms', rows, by, a, b, ({ kind }) => kind !== 'intervention' && kind !== 'mark'),
+    counts('Interventions', rows, by, a, b, interventionsOf),
+    counts('Alarms', rows, by, a, b, alarmsOf),
     numbers('Speed', 'm/s', both, ({ speed }) => (speed === null ? null : Math.abs(speed)), (row) => difference(row, 'speed')),
     numbers('Steering', '%', both, ({ steering }) => steering, (row) => difference(row, 'steering')),
     errors('Following error', 'm/s', both, ({ follow }) => (follow === null ? null : Math.abs(follow))),
@@ -26,11 +26,25 @@ export function summaryOf(rows, by, a, b) {
   ];
 }
 
-/** @param {string} name @param {Row[]} rows @param {By} by @param {Course} a @param {Course} b @param {(event: CourseEvent) => boolean} isOne @returns {Line} */
-function counts(name, rows, by, a, b, isOne) {
+/** Null: they were not recorded, or are more than a course has. @param {Course} course */
+export function alarmsOf({ events, are_alarms_known, are_events_cut }) {
+  return are_alarms_known && !are_events_cut ? events.filter(({ kind }) => kind !== 'intervention' && kind !== 'mark') : null;
+}
+
+/** The same. @param {Course} course */
+function interventionsOf({ events, are_interventions_known, are_events_cut }) {
+  return are_interventions_known && !are_events_cut ? events.filter(({ kind }) => kind === 'intervention') : null;
+}
+
+/** @param {string} name @param {Row[]} rows @param {By} by @param {Course} a @param {Course} b @param {(course: Course) => CourseEvent[] | null} eventsOf @returns {Line} */
+function counts(name, rows, by, a, b, eventsOf) {
   const isMet = (/** @type {number | null} */ x) => x !== null && nearest(rows, x)?.b != null;
-  const ofA = a.events.filter((event) => isOne(event) && isMet(by === 'time' ? event.t : event.m)).length;
-  const ofB = b.events.filter((event) => isOne(event) && placeOfB(rows, event.t) !== null).length;
+  const ofA = eventsOf(a)?.filter((event) => isMet(by === 'time' ? event.t : event.m)).length ?? null;
+  const ofB = eventsOf(b)?.filter((event) => placeOfB(rows, event.t) !== null).length ?? null;
+  if (ofA === null || ofB === null) {
+    const side = ofB !== null ? ' in A' : ofA !== null ? ' in B' : '';
+    return { name, unit: '', a: ofA, b: ofB, mean: null, most: null, words: `not known${side}` };
+  }
   const words = ofA === ofB ? 'as many in both' : `${Math.abs(ofB - ofA)} ${ofB < ofA ? 'fewer' : 'more'} in B`;
   return { name, unit: '', a: ofA, b: ofB, mean: ofB - ofA, most: null, words };
 }

@@ -1,7 +1,7 @@
 // Two drives compared along the way or over time: speed, steering, what happened, B − A, one cursor through all.
 
 import { csvOf } from './compare-way-csv.js';
-import { summaryOf } from './compare-way-summary.js';
+import { alarmsOf, summaryOf } from './compare-way-summary.js';
 import { aligned, difference, differences } from './compare-way-model.js';
 import { axisOf, bothPlot, differencePlot, eventsPlot, speedPlot, waysMap } from './compare-way-plots.js';
 import { dayOf, figure, openBoard, options, select } from './drive-board.js';
@@ -185,14 +185,14 @@ class CompareWay {
     const number = (/** @type {number | null | undefined} */ value, digits = 1) => (value === null || value === undefined ? null : fixed(value, digits));
     const other = (/** @type {string | null} */ value, unit = '') => `B ${value === null ? 'not known' : `${value}${unit}`}`;
     const delta = difference(row, 'speed');
-    const alarms = (/** @type {Course} */ course) => course.events.filter(({ kind }) => kind !== 'mark' && kind !== 'intervention').length;
+    const alarms = (/** @type {Course} */ course) => number(alarmsOf(course)?.length, 0);
     this.figures.replaceChildren(
       figure('At', this.#axisWords(row.x).split(' ')[0] ?? null, this.#axisWords(row.x).split(' ')[1] ?? '', `A ${duration(row.a.t)}${row.b ? `, B ${duration(row.b.t)}` : ''}`),
       figure('Speed A', number(row.a.speed), 'm/s', `${other(number(row.b?.speed))}${delta === null ? '' : `, ${signed(delta)}`}`),
       figure('Steering A', number(row.a.steering, 0), '%', other(number(row.b?.steering, 0), ' %')),
       figure('Aside', number(row.aside), 'm', 'B from A'),
       figure('Time A', duration(a.length_s), '', `B ${duration(b.length_s)}`),
-      figure('Alarms A', String(alarms(a)), '', `B ${alarms(b)}`));
+      figure('Alarms A', alarms(a), '', other(alarms(b))));
     this.slider.setAttribute('aria-valuetext', `${this.#axisWords(row.x)}, A ${number(row.a.speed) ?? 'not known'} m/s`);
   }
 

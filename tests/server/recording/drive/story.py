@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from server.recording.standing import Stood
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1
 from tests.server.recording.export.ours import TOML, Own, as_ours, event
 
@@ -36,7 +37,14 @@ def rows(length_s: float = LENGTH_S, speed_mps: float = SPEED_MPS, from_s: float
 
 def logged(at_s: float, change: str, alarm: str | None = None, **more: Any) -> Own:
     at_ms = BEGIN_MS + round(at_s * 1000)
-    return (BEGIN_S * NS + round(at_s * NS), "/catgraph/alarms", event(1, at_ms, change, alarm, **more))
+    return (BEGIN_S * NS + round(at_s * NS), "/catgraph/alarms", event(at_ms - BEGIN_MS, at_ms, change, alarm, **more))
+
+
+def standing(*own: Own) -> dict[str, str]:
+    """What stands after these events, as the recorder writes it into the metadata of the next part."""
+    stood = Stood()
+    stood.note_all(said for _, topic, said in own if topic == "/catgraph/alarms")
+    return stood.as_metadata()
 
 
 def mark(at_s: float, id: str, change: str = "mark", *, logged_s: float | None = None, **more: Any) -> Own:
@@ -139,8 +147,15 @@ LATER: Sequence[Own] = (
 
 def in_two_parts(folder: Path, *, session: str = "s1") -> list[Path]:
     """A drive of two recordings, the second after a lost link."""
+    ordered = logged(117.0, "slow_down", step="ordered", order=2, why="obstacle", ordered_by="M. R. (Tablet)")
     raised = logged(118.0, "raised", "gps_drift", text="0.4 m", state="UNACKED")
-    first = recorded(folder, [*STORY, raised], name=f"{session}.mcap", session=session)
+    own = [*STORY, ordered, raised]
+    first = recorded(folder, own, name=f"{session}.mcap", session=session)
     from_s, length_s = SECOND
-    more = {"session": session, "part": "2"}
-    return [first, recorded(folder, LATER, name=f"{session}_p2.mcap", from_s=from_s, length_s=length_s, **more)]
+    _, alarms, changed = mode(140.0, "autonomous", "manual")  # written as soon as the second part begins
+    early = (BEGIN_S * NS + round(from_s * NS), alarms, changed)
+    more = {"session": session, "part": "2", **standing(*own)}
+    return [
+        first,
+        recorded(folder, [early, *LATER], name=f"{session}_p2.mcap", from_s=from_s, length_s=length_s, **more),
+    ]

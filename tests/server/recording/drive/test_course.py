@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from monitor.values import GpsFix, MotionCommand
+from server.protocol.logbook import Course
 from server.protocol.marks import DriveMark
-from server.recording.drive.course import course_of, joined, with_marks
+from server.recording.drive.course import MOST_EVENTS, course_of, joined, with_marks
 from server.recording.drive.facts import DriveFacts, read_facts
 from server.recording.drive.motion import Motion
 from server.recording.read.read import open_recording
@@ -88,3 +89,41 @@ def test_the_parts_of_a_drive_are_one_course(tmp_path: Path) -> None:
     assert metres == sorted(metres)
     assert way["t"][-1] == pytest.approx(210, abs=1.5)
     assert [event["t"] for event in found["events"] if event["kind"] == "intervention"] == [80.0, 170.0]
+
+
+def test_a_drive_whose_events_are_not_known_says_so(tmp_path: Path) -> None:
+    with open_recording([recorded(tmp_path)]) as recording:
+        known = course_of(read_facts(recording))
+    of_others = course_of(DriveFacts(start_ms=0, end_ms=10_000, log=None, motion=Motion(10.0), late=[]))
+    said = [
+        (one["are_interventions_known"], one["are_alarms_known"], one["are_events_cut"])
+        for one in (known, of_others, joined([known, of_others]))
+    ]
+    assert said == [(True, True, False), (False, False, False), (False, False, False)]
+    many = joined(
+        [{**known, "events": known["events"][:1] * 200}, known, {**known, "events": known["events"][:1] * 99}]
+    )
+    assert (len(many["events"]), many["are_events_cut"]) == (MOST_EVENTS, True)
+    assert joined([many, known])["are_events_cut"]
+    assert with_marks(many, [])["are_events_cut"]
+
+
+def test_a_part_without_a_distance_ends_no_comparison_by_distance(tmp_path: Path) -> None:
+    with open_recording([recorded(tmp_path)]) as recording:
+        known = course_of(read_facts(recording))
+    start_ms = known["start_ms"]
+    silent = course_of(
+        DriveFacts(start_ms=start_ms + 130_000, end_ms=start_ms + 140_000, log=None, motion=Motion(10.0), late=[])
+    )
+    assert silent["length_m"] is None
+    later: Course = {**known, "start_ms": start_ms + 150_000}
+    found = joined([known, silent, later])
+    length_m = known["length_m"] or 0.0
+    assert found["length_m"] == pytest.approx(2 * length_m)
+    way = found["way"]
+    i = next(n for n, at_m in enumerate(way["m"]) if at_m is not None and at_m > length_m + 300)
+    assert way["t"][i] == pytest.approx(150 + 30, abs=2)
+    assert way["speed"][i] == SPEED_MPS
+    assert joined([silent, known])["way"]["speed"].count(SPEED_MPS) > 100
+    assert joined([{**known, "length_m": 1200.0}, silent])["way"]["t"][-1] < 121
+    assert joined([silent, silent])["length_m"] is None

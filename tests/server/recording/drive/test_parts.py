@@ -13,7 +13,8 @@ from server.recording.drive.parts import DrivePart, missing_parts, outside
 from server.recording.drive.people import PersonInDrive, Span, joined_people
 from server.recording.drive.unseen import blind_times, late_times
 from server.recording.read.read import open_recording
-from tests.server.recording.drive.story import BEGIN_MS, LENGTH_S, SECOND, in_two_parts, recorded
+from tests.server.recording.bags import BEGIN_S
+from tests.server.recording.drive.story import BEGIN_MS, LENGTH_S, NS, SECOND, in_two_parts, logged, recorded, standing
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +44,7 @@ def test_the_figures_of_the_parts_are_added_up(paths: list[Path], drive: DriveFa
     assert whole["driven_s"] == 180.0
     for name in ("distance_m", "driven_s", "blind_s"):
         assert whole[name] == pytest.approx(one[name] + other[name], abs=3.0), name
+    assert (one["alarms"], one["slow_downs"], other["alarms"], other["slow_downs"]) == (3, 2, 1, 0)
     for name in ("alarms", "interventions", "marks", "slow_downs", "blind"):
         assert whole[name] == one[name] + other[name], name
     for mode in ("autonomous", "manual", "unknown"):
@@ -70,6 +72,41 @@ def test_what_begins_in_one_part_goes_on_in_the_next(log: DriveLog) -> None:
     assert list(described) == ["i1", "i2"]
     assert [row["mark"] for row in log.marks] == ["m1", "m3", "m9"]
     assert log.departure.state == "signed"
+
+
+def test_what_began_where_no_part_is_there_is_in_the_report_once(tmp_path: Path) -> None:
+    own = [logged(5.0, "raised", "gps_drift", state="UNACKED")]
+    between = [
+        logged(15.0, "raised", "speed_limit", state="UNACKED"),
+        logged(16.0, "planned_stop", reason="workshop"),
+        logged(17.0, "slow_down", step="ordered", order=7, why="obstacle"),
+    ]
+    first = recorded(tmp_path, own, name="s2.mcap", length_s=10.0)
+    stood, later = standing(*own, *between), [logged(22.0, "acknowledged", "speed_limit")]
+    second = recorded(tmp_path, later, name="s2_p2.mcap", from_s=20.0, length_s=10.0, part="2", **stood)
+    third = recorded(tmp_path, [], name="s2_p3.mcap", from_s=40.0, length_s=10.0, part="3", **stood)
+    log = read(first, second, third).log
+    assert log is not None
+    assert [(one.alarm, one.to_acknowledge_s) for one in log.alarms] == [("gps_drift", None), ("speed_limit", 7.0)]
+    assert [one.from_ms for one in log.planned_stops] == [BEGIN_MS + 16_000]
+    assert [one.order for one in log.slow_downs] == [7]
+    assert log.slow_downs[0].steps == 2
+
+
+def test_a_session_that_resumes_counts_no_alarm_again_and_another_does(tmp_path: Path) -> None:
+    stood = standing(logged(5.0, "raised", "gps_drift", state="UNACKED"))
+    counts = []
+    for name, resumes in (("s3", True), ("s4", False)):
+        started = logged(30.0, "started", resumes=resumes)
+        facts = read(recorded(tmp_path, [started], name=f"{name}.mcap", from_s=30.0, length_s=5.0, **stood))
+        counts.append((figures_of(facts)["alarms"], figures_of(facts)["components"]))
+        assert facts.log is not None
+        assert [one.alarm for one in facts.log.alarms] == ["gps_drift"]
+    assert counts == [(0, {}), (1, {"Position": 1})]
+    _, alarms, raised = logged(25.0, "raised", "speed_limit", state="UNACKED")  # while no part was open
+    early = ((BEGIN_S + 30) * NS, alarms, raised)
+    part = recorded(tmp_path, [early], name="s5.mcap", from_s=30.0, length_s=5.0, part="2", **stood)
+    assert figures_of(read(part))["alarms"] == 1
 
 
 def test_a_mode_holds_within_its_part(log: DriveLog) -> None:
