@@ -2,7 +2,7 @@
 
 A drive has ended once nothing of its session has been written for a while: a link that returns goes on in another part,
 and after a restart of the server the drive goes on in another session.
-What is still to be mailed is in a file, so that a server that is killed mails it after its next start.
+What is still to be mailed is in a file, so that a server that is stopped or killed mails it after its next start.
 """
 
 from __future__ import annotations
@@ -64,10 +64,10 @@ class DriveReports:
         self._supervisor.keep("mailing", self._run)
 
     async def stop(self) -> None:
-        """What waits is ordered at once: the outbox keeps it, and it is sent after the next start."""
+        """Drives that are over are ordered; the others may go on after the next start, and are kept until then."""
         await self._supervisor.stop()
         self._loop = None
-        await self._mail_all(lambda drives, is_followed: True)
+        await self._mail_all(self._is_over)
         await self._keep()
 
     def problems(self) -> list[str]:

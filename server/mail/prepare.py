@@ -103,9 +103,9 @@ async def _exported(
             into = work / f"{i}"
             await asyncio.to_thread(into.mkdir)
             on_progress = partial(_part_of, progress, i, len(order.recordings))
-            paths = [path] if len(drive) == 1 else await asyncio.to_thread(_paths, drive, source)
+            paths = [path] if len(drive) == 1 else await asyncio.to_thread(_paths, drive, source, recording, path)
             try:
-                made = await source.export(paths, order.format, into, on_progress)
+                made = await source.export(paths, order.format, into, on_progress, asked=path)
             except (OSError, ValueError, RuntimeError) as why:
                 raise CannotPrepare(f"{recording} cannot be written as {order.format}: {why}") from None
             path = made.path
@@ -124,8 +124,9 @@ def _drive_of(letter: Letter, source: Source, recording: str) -> Sequence[str]:
     return source.drive_of(recording) if form is not None and form.of_drive else [recording]
 
 
-def _paths(recordings: Sequence[str], source: Source) -> list[Path]:
-    return [path for path in map(source.path_of, recordings) if path is not None]
+def _paths(recordings: Sequence[str], source: Source, asked: str, path_of_it: Path) -> list[Path]:
+    found = (path_of_it if recording == asked else source.path_of(recording) for recording in recordings)
+    return [path for path in found if path is not None]
 
 
 def _part_of(progress: Callable[[float], None], i: int, of: int, share: float) -> None:

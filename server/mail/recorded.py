@@ -21,5 +21,7 @@ class Recorded:
     def drive_of(self, recording: str) -> Sequence[str]:
         return self._drive_of(recording)
 
-    async def export(self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None]) -> Made:
-        return await make_export(paths, format, into, progress)
+    async def export(
+        self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None], *, asked: Path
+    ) -> Made:
+        return await make_export(paths, format, into, progress, asked=asked)

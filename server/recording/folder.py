@@ -8,6 +8,8 @@ recordings/.trash/                       deleted by the operator, and not yet go
 
 from __future__ import annotations
 
+import contextlib
+import glob
 import re
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -21,7 +23,7 @@ RECOVERING = ".mcap.recovering"  # the new file while it is made; worth nothing 
 FOLDER = "folder"  # the format of a recording that is a folder: a split bag of ROS 2
 
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,79}")
-_PART = re.compile(r"_p\d+(-\d+)?$")
+_PART = re.compile(r"_p(\d+)(-\d+)?$")
 _TRASH = ".trash"
 
 
@@ -102,6 +104,21 @@ def part_id(first: str, part: int) -> str:
 def first_part(id: str) -> str:
     """The name of the first part of the session that a recording is of."""
     return _PART.sub("", id)
+
+
+def part_number(id: str) -> int:
+    """Which part of its session a recording is, by its name."""
+    found = _PART.search(id)
+    return 1 if found is None else int(found[1])
+
+
+def known_beside(folder: Path) -> set[str]:
+    """The names of all recordings of a vehicle's folder: finished, being written, unreadable, or in the trash."""
+    folder = folder.absolute()
+    found = list(folder.glob("*.mcap*"))
+    with contextlib.suppress(OSError):
+        found += (folder.parent / _TRASH).glob(f"*/{glob.escape(folder.name)}/*{FINISHED}")
+    return {id_of(path) for path in found if path.name.endswith((FINISHED, WRITING, DAMAGED))}
 
 
 def id_of(path: Path) -> str:

@@ -94,7 +94,7 @@ def write_forms(
     """Writes a zip with a CSV file of each table. Raises ExportRefused, RecordingUnreadable, OSError."""
     tables = [table for form in forms().values() for table in form.table]
     report = DriveReport.read(recording, name=name)
-    outcome = Outcome()
+    outcome = Outcome(notices=list(report.found["parts_missing"]))
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
         for table in tables:
             rows = list(rows_of(table, report.found))
@@ -102,6 +102,7 @@ def write_forms(
             packed.writestr(f"{table.file}.csv", as_csv(rows))
     if report.found["interventions"] is None:
         outcome.notices.append("The interventions are not known: the mode of the car was not recorded.")
+    outcome.notes += [f"{sentence}." for sentence in recording.damage]
     progress(1.0)
     return outcome
 

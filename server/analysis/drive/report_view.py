@@ -18,7 +18,7 @@ from server.recording.drive.facts import DriveFacts, DriveLog, figures_of
 from server.recording.drive.link_way import LinkStretch, link_along
 from server.recording.drive.parts import DrivePart, Span, missing_parts
 from server.recording.drive.unseen import UnseenTime, blind_times, late_times
-from server.recording.folder import id_of
+from server.recording.folder import id_of, known_beside
 from server.recording.read.read import Recording
 from server.recording.verification import Verification
 from server.version import catgraph_version
@@ -54,7 +54,7 @@ def report_json(
         "tags": list(annotations.tags),
         "parts": [_part(part, facts) for part in facts.parts],
         "gaps": [_gap(gap, facts) for gap in facts.gaps[:MOST_ROWS]],
-        "parts_missing": missing_parts(facts.parts),
+        "parts_missing": missing_parts(facts.parts, _known_beside(recording)),
         "chain": [{"recording": id_of(one.path), **one.as_json()} for one in verified],
         "figures": figures_of(facts),
         "load": None if load is None or log is None else _load(load),
@@ -69,6 +69,10 @@ def report_json(
         "link_along": [_stretch(one) for one in link_along(facts)],
         **(_unknown() if log is None else _of_log(log, facts)),
     }
+
+
+def _known_beside(recording: Recording) -> set[str]:
+    return {id for folder in {path.parent for path in recording.paths} for id in known_beside(folder)}
 
 
 def _part(part: DrivePart, facts: DriveFacts) -> dict[str, Any]:

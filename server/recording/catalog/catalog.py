@@ -10,7 +10,7 @@ import asyncio
 import os
 import shutil
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from server.recording.catalog.trash import Trash
 from server.recording.catalog.verifications import Verifications
 from server.recording.drive.course import joined, with_marks
 from server.recording.drive.logbook import drives_of
-from server.recording.folder import first_part
+from server.recording.folder import first_part, part_number
 
 MOST_IN_LOGBOOK = 20_000  # recordings
 AROUND_MS = 7 * 86_400_000  # no drive takes longer
@@ -155,18 +155,31 @@ class Catalog:
         return drives_of(self._entries.figures(which, MOST_IN_LOGBOOK))
 
     def drive_of(self, id: str) -> list[str]:
-        """The recordings of the drive of which it is a part, oldest first; those that are yet to be read where their
-        names say so. A clip, and what is not there, is of no other."""
+        """The recordings of the drive of which it is a part, oldest first; those that are yet to be read, or cannot be
+        read, where their names say so. A clip, and what is not there, is of no other."""
         entry = self._listing.entry(id)
-        if entry is None or entry.found is None or entry.found.get("is_clip"):
+        if entry is None or _is_clip(entry):
             return [id]
-        since_ms, until_ms = entry.started_ms - AROUND_MS, entry.started_ms + AROUND_MS
-        near = self.drives(Which(vehicle=entry.vehicle, since_ms=since_ms, until_ms=until_ms))
-        found = next((drive["recordings"] for drive in near if id in drive["recordings"]), [id])
-        firsts = {first_part(one) for one in found}
-        unread = self._entries.select("WHERE trashed_ms IS NULL AND vehicle = ? AND found IS NULL", [entry.vehicle])
-        waiting = [one for one in unread if first_part(one.id) in firsts]
-        return [*found, *(one.id for one in sorted(waiting, key=lambda one: one.started_ms) if one.id not in found)]
+        known, firsts = [id], {first_part(id)}
+        one = entry if _is_read(entry) else next(filter(_is_read, self._named(entry, firsts)), None)
+        if one is not None:
+            since_ms, until_ms = one.started_ms - AROUND_MS, one.started_ms + AROUND_MS
+            near = self.drives(Which(vehicle=one.vehicle, since_ms=since_ms, until_ms=until_ms))
+            known = next((drive["recordings"] for drive in near if one.id in drive["recordings"]), [one.id])
+            firsts |= {first_part(part) for part in known}
+        others = {part.id for part in self._named(entry, firsts) if not _is_read(part)} | {id}
+        if others <= set(known):
+            return known
+        sessions = list(dict.fromkeys(map(first_part, [*known, *sorted(others)])))
+        return sorted({*known, *others}, key=lambda part: (sessions.index(first_part(part)), part_number(part), part))
+
+    def _named(self, entry: Entry, firsts: Collection[str]) -> list[Entry]:
+        """The recordings beside one that their names make parts of these sessions."""
+        marks = " OR ".join("id = ? OR substr(id, 1, length(?) + 2) = ? || '_p'" for _ in firsts)
+        values = [first for first in firsts for _ in range(3)]
+        folder = entry.path.rpartition("/")[0]
+        found = self._entries.select(f"WHERE trashed_ms IS NULL AND ({marks}) ORDER BY id", values)
+        return [one for one in found if one.path.rpartition("/")[0] == folder and not _is_clip(one)]
 
     def path(self, id: str) -> Path | None:
         """Its file, of a split bag its folder; None: it is not there. No id leads out of the folder."""
@@ -264,3 +277,11 @@ class Catalog:
     def destroy(self, id: str | None) -> Total:
         """For good: one of the trash, or with None all of it; how many and how large. Raises NotThere, Refused."""
         return self._trash.destroy(id)
+
+
+def _is_read(entry: Entry) -> bool:
+    return entry.found is not None and not entry.found.get("problem")
+
+
+def _is_clip(entry: Entry) -> bool:
+    return bool((entry.found or {}).get("is_clip"))

@@ -12,8 +12,11 @@ from server.recording.export.worker import Made, run_worker
 __all__ = ["ExportRefused", "Made", "make_export"]
 
 
-async def make_export(paths: Sequence[Path], format: str, into: Path, progress: Progress = nothing) -> Made:
-    """Writes a recording in a format of FORMATS into a folder, by a process of its own; several files are one.
+async def make_export(
+    paths: Sequence[Path], format: str, into: Path, progress: Progress = nothing, *, asked: Path | None = None
+) -> Made:
+    """Writes a recording in a format of FORMATS into a folder, by a process of its own; several files are one,
+    with `asked` as far as they can be read with that one of them.
 
     `progress` is called with 0 to 1. Raises ExportRefused with one sentence, ValueError for an unknown format,
     OSError. Where it is cancelled the process is ended and leaves nothing behind.
@@ -21,4 +24,5 @@ async def make_export(paths: Sequence[Path], format: str, into: Path, progress: 
     if format not in FORMATS:
         raise ValueError(f"There is no format {format[:40]!r}.")
     out = into / f"{paths[0].name.partition('.')[0]}.{FORMATS[format].extension}"
-    return await run_worker([*map(str, paths), "--format", format, "--out", str(out)], progress)
+    with_asked = [] if asked is None else ["--asked", str(asked)]
+    return await run_worker([*map(str, paths), "--format", format, "--out", str(out), *with_asked], progress)

@@ -19,11 +19,11 @@ from server.recording.own import PREFIX
 from server.recording.read.beforehand import beforehand, type_of_first
 from server.recording.read.decode import Decode, compile_decoder, sifted
 from server.recording.read.definitions import definition_of, definitions_of
-from server.recording.read.errors import NoRoom, RecordingUnreadable, Undecodable
-from server.recording.read.recognise import Found, FoundRecording, by_name, open_file, recognise
+from server.recording.read.errors import RecordingUnreadable, Undecodable
+from server.recording.read.open_files import of_car, open_parts, open_with, what_is_wrong
+from server.recording.read.recognise import recognise
 from server.recording.read.source import Channel, Damage, FileSource, Stream, in_time_order, why_not_decoded
 from server.recording.read.steady_time import ClockStep, make_steady, notes_on
-from server.recording.read.unpack import PartTooLarge
 
 __all__ = ["Recording", "RecordingUnreadable", "TopicInfo", "open_recording"]
 
@@ -51,10 +51,11 @@ _ROS_TYPE = re.compile(r"[A-Za-z]\w*(/msg)?/[A-Za-z]\w*")
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, content
 
 
-def open_recording(paths: Sequence[Path]) -> Recording:
+def open_recording(paths: Sequence[Path], *, asked: Path | None = None) -> Recording:
     """Open one drive of one or several files, of ROS 1 or ROS 2.
 
     A path is a ROS 1 bag, a ROS 2 bag directory, a single .mcap or .db3 file, or a directory with such files in it.
+    With `asked`, one of the paths, the others are read where they can be read with it, and else named in `lacking`.
     Raises RecordingUnreadable with one sentence that names the file.
     """
     if not paths:
@@ -62,9 +63,12 @@ def open_recording(paths: Sequence[Path]) -> Recording:
     sources: list[FileSource] = []
     lacking: list[str] = []
     try:
-        for path in paths:
-            _open_parts(recognise(Path(path)), sources, lacking)
-        if len({source.ros_version for source in sources if source.channels}) > 1:
+        if asked is None:
+            for path in paths:
+                open_parts(recognise(Path(path)), sources, lacking)
+        else:
+            open_with(asked, paths, sources, lacking)
+        if len({source.ros_version for source in sources if of_car(source)}) > 1:
             raise RecordingUnreadable("recordings of ROS 1 and ROS 2 cannot be read as one")
         return Recording(sources, lacking, list(map(Path, paths)))
     except BaseException:
@@ -83,7 +87,9 @@ class Recording:
         self.paths = paths
         self.clock_steps = _made_steady(sources)  # the times of the files are corrected for them
         self.clock_notes = notes_on(self.clock_steps)  # for a person
-        self.ros_version: RosVersion = next((s for s in sources if s.channels), sources[0]).ros_version
+        self.ros_version: RosVersion = next(
+            (s for which in (of_car, lambda one: one.channels) for s in sources if which(s)), sources[0]
+        ).ros_version
         self.topics: dict[str, TopicInfo] = {}
         ours = (source.metadata for source in sources if isinstance(source, McapFile) and source.metadata)
         self.metadata: dict[str, str] = next(ours, {})
@@ -200,6 +206,8 @@ class Recording:
         for channel in sorted(source.channels, key=lambda one: not one.type):
             if channel.topic.startswith(PREFIX) and channel.encoding == "json":
                 continue
+            if source.ros_version != self.ros_version:
+                continue  # it has no messages of the car
             type = _spelled(channel.type, self.ros_version)
             key = (channel.type, channel.definition, channel.encoding)
             try:
@@ -246,7 +254,7 @@ class Recording:
         except (RecordingUnreadable, MemoryError):
             raise
         except Exception as error:  # a damaged file makes the readers fail in every way there is
-            raise RecordingUnreadable(_what_is_wrong(source.path, error)) from None
+            raise RecordingUnreadable(what_is_wrong(source.path, error)) from None
 
 
 def _made_steady(sources: Sequence[FileSource]) -> list[ClockStep]:
@@ -255,58 +263,7 @@ def _made_steady(sources: Sequence[FileSource]) -> list[ClockStep]:
     except (RecordingUnreadable, MemoryError):
         raise
     except Exception as error:
-        raise RecordingUnreadable(_what_is_wrong(sources[0].path, error)) from None
-
-
-def _open_parts(found: FoundRecording, sources: list[FileSource], lacking: list[str]) -> None:
-    """Adds the files that can be opened, and sentences on the others. Raises RecordingUnreadable where none can."""
-    opened: list[FileSource] = []
-    why_not: list[str] = []
-    for file in found.files:
-        try:
-            opened.append(_open(file))
-            sources.append(opened[-1])
-        except NoRoom:  # nothing is known of the file
-            raise
-        except RecordingUnreadable as why:
-            if len(found.files) == 1 and not found.lacking:
-                raise
-            why_not.append(by_name(why, file.path))
-    lacking += [*why_not, *found.lacking]
-    if not opened:
-        folder = found.files[0].path.parent
-        raise RecordingUnreadable(f"{folder} has no file that can be read: {why_not[0]}")
-
-
-def _open(found: Found) -> FileSource:
-    try:
-        return open_file(found)
-    except (RecordingUnreadable, MemoryError):  # what is too large is not damaged
-        raise
-    except Exception as error:  # as above
-        raise RecordingUnreadable(_what_is_wrong(found.path, error)) from None
-
-
-# Messages of other readers for a missing end of a file, and thus a missing index.
-_ENDS_EARLY = (
-    "File end magic is invalid",
-    "Header could not be read from file",
-    "Truncated record",
-    "Invalid MCAP footer",
-)
-
-
-def _what_is_wrong(path: Path, error: Exception) -> str:
-    if isinstance(error, PermissionError) or isinstance(error.__cause__, PermissionError):
-        return f"{path} may not be read by this user: permission denied"
-    said = " ".join(str(error).split()).rstrip(".")
-    if isinstance(error, PartTooLarge):
-        return f"{path} cannot be read: of a part of it, {said}"
-    if any(words in said for words in _ENDS_EARLY):
-        return f"{path} is not complete: it ends too early"
-    if not said or len(said) > 200 or isinstance(error, KeyError | AssertionError | TypeError | IndexError):
-        return f"{path} is damaged or not complete"
-    return f"{path} is damaged or not complete: {said}"
+        raise RecordingUnreadable(what_is_wrong(sources[0].path, error)) from None
 
 
 def _spelled(type: str, version: RosVersion) -> str:

@@ -180,6 +180,20 @@ def test_a_part_that_is_missing_is_said(tmp_path: Path) -> None:
     assert "Part 1 of the drive of s1_p2 is not in this report" in words_of(tmp_path / "page.html")
 
 
+@pytest.mark.parametrize("where", ["car/s1_p3.mcap.writing", "car/s1_p3.mcap.damaged", ".trash/5/car/s1_p3.mcap"])
+def test_the_last_part_is_named_while_its_file_is_there(tmp_path: Path, where: str) -> None:
+    (tmp_path / "car").mkdir()
+    paths = in_two_parts(tmp_path / "car")
+    (tmp_path / where).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / where).write_bytes(b"")
+    with open_recording(paths) as recording:
+        write_report_json(recording, tmp_path / "report.json", name="drive")
+        outcome = write_forms(recording, tmp_path / "forms.zip")
+    (said,) = json.loads((tmp_path / "report.json").read_text())["parts_missing"]
+    assert said.startswith("Part 3 of the drive of s1 is not in this report")
+    assert said in outcome.notices
+
+
 def words_of(path: Path) -> str:
     """What the page says, without its tags."""
     text = re.sub(r"<style>.*?</style>|<script.*?</script>", "", path.read_text(), flags=re.S)

@@ -39,9 +39,12 @@ class Shelf:
     def drive_of(self, recording: str) -> list[str]:
         return next((drive for drive in self.drives if recording in drive), [recording])
 
-    async def export(self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None]) -> Made:
+    async def export(
+        self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None], *, asked: Path
+    ) -> Made:
         if format == "bag":
             raise ValueError("its messages have no definition")
+        assert asked in paths
         path = paths[0]
         self.exported.append([one.stem for one in paths])
         made = into / f"{path.stem}.{'zip' if format == 'csv' else format}"

@@ -81,12 +81,25 @@ async def test_what_waits_at_the_end_of_the_server_is_kept(tmp_path: Path) -> No
     mailer = Mailer(tmp_path / "mail", shelf, wall_ms=Clock())
     await mailer.start()
     mailer.settings = replace(MailSettings(host="localhost", port=1, sender="car@example.org"), report_to=TO)
+    before, after = "car_20261119T140303Z", "car_20261119T141500Z"
     reports = DriveReports(mailer, now=Watch())
     reports.start()
-    reports.finished(shelf.put("20261119T140303Z"))
-    await asyncio.sleep(0.01)
+    reports.finished(shelf.put(before))
+    await until(lambda: reports._waiting)
     await reports.stop()
-    assert len(await mailer.letters(None, 10)) == 1
+    assert await mailed(reports) == []  # the drive may go on after the next start
+    resumed = [{"n": 1, "at_ms": 5, "alarm": None, "change": "started", "resumes": True}]
+    path = record(shelf.folder / f"{after}.mcap", seconds=2.0, own=resumed)
+    watch = Watch()
+    reports = DriveReports(mailer, now=watch)
+    reports.start()
+    await until(lambda: reports._waiting)
+    reports.finished(path)
+    await until(lambda: len(reports._waiting) == 2)
+    watch.s = 100.0
+    await reports.stop()
+    assert await mailed(reports) == [(before, after)]  # once, as it was over
+    assert not reports._waiting
     await mailer.stop()
 
 

@@ -15,6 +15,7 @@ from rosbags.highlevel import AnyReader
 
 from server.recording.read.read import RecordingUnreadable, open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, build, typestore, write_ros1, write_ros2
+from tests.server.recording.export.ours import OurFile, event
 
 INT, TEXT, SCAN = "std_msgs/msg/Int32", "std_msgs/msg/String", "sensor_msgs/msg/LaserScan"
 ROWS: list[Row] = [
@@ -146,6 +147,30 @@ def test_versions_cannot_be_mixed(tmp_path: Path) -> None:
     one, two = write_ros1(tmp_path / "1.bag", SHORT), write_ros2(tmp_path / "2", SHORT)
     with pytest.raises(RecordingUnreadable, match="ROS 1 and ROS 2 cannot be read as one"):
         open_recording([one, two])
+
+
+def test_what_cannot_be_read_with_the_asked_file_is_named(tmp_path: Path) -> None:
+    one, two = write_ros1(tmp_path / "1.bag", SHORT), write_ros2(tmp_path / "2", SHORT)
+    spoilt = tmp_path / "3.mcap"
+    spoilt.write_bytes(b"spoilt")
+    for asked, other, version in ((one, two, 1), (two, one, 2), (spoilt, two, 1)):
+        with open_recording([one, two, spoilt], asked=asked) as recording:
+            assert (recording.ros_version, recording.topics["/n"].count) == (version, 9)
+            damaged, mixed = recording.damage
+            assert damaged.startswith("3.mcap ")
+            assert mixed == f"{other.name} is of another version of ROS and cannot be read with {asked.name}"
+    with pytest.raises(RecordingUnreadable):
+        open_recording([spoilt], asked=spoilt)
+
+
+def test_a_file_without_messages_of_the_car_has_no_version(tmp_path: Path) -> None:
+    """As the first part of a recording that was begun before the version was known."""
+    silent = OurFile(tmp_path / "drive.mcap", profile="ros1")
+    silent.own(BEGIN_S * 1_000_000_000, "/catgraph/alarms", event(1, 5, "started", None))
+    two = write_ros2(tmp_path / "drive_p2", SHORT)
+    with open_recording([silent.close(), two]) as recording:
+        assert (recording.ros_version, recording.notes, len(list(recording.messages()))) == (2, [], 11)
+        assert len(list(recording.own("/catgraph/alarms"))) == 1
 
 
 @pytest.mark.parametrize("kind", ["bag", "mcap", "sqlite3"])

@@ -16,7 +16,7 @@ import pytest_asyncio
 
 from server.app.config import Config
 from server.recording.export.clip import Window
-from server.recording.export.jobs import KEEP_BYTES, KEEP_S, MOST_WAITING, Exports, Job, NotYet, TooMany
+from server.recording.export.jobs import KEEP_BYTES, KEEP_S, MOST_WAITING, NOT_WHOLE, Exports, Job, NotYet, TooMany
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
 from server.vehicle.vehicle import Vehicle
@@ -364,6 +364,16 @@ async def test_a_clip_reaches_into_the_next_part(bench: Bench) -> None:
     late = Window(at_ns=(BEGAN_MS + 10_000) * 1_000_000, before_s=2.0, after_s=2.0)
     job = await bench.done(await bench.exports.clip(f"{DRIVE}_p2", late))  # beside a part that nobody can read
     assert job.state == "done"
+
+
+async def test_a_part_that_cannot_be_read_spoils_no_report(bench: Bench) -> None:
+    (bench.root / "car" / f"{DRIVE}_p2.mcap").write_bytes(b"spoilt")
+    bench.exports._drive_of = lambda id: [DRIVE, f"{DRIVE}_p2"]
+    job = await bench.done(await bench.exports.begin(DRIVE, "report_json"))
+    assert (job.state, job.is_whole, job.sentence) == ("done", False, NOT_WHOLE)
+    assert any(note.startswith(f"{DRIVE}_p2.mcap ") for note in job.notes)
+    assert await bench.exports.begin(DRIVE, "report_json") is job
+    assert await bench.exports.begin(f"{DRIVE}_p2", "report_json") is not job
 
 
 async def test_a_moment_far_ahead_is_refused(bench: Bench) -> None:
