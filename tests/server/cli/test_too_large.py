@@ -14,7 +14,7 @@ from server.recording.read import read, recognise, rosbag1_truncated
 from server.system.process_limits import TOO_LARGE
 
 
-def too_large(*_: object) -> NoReturn:
+def too_large(*_: object, **__: object) -> NoReturn:
     raise MemoryError
 
 
