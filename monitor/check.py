@@ -76,7 +76,7 @@ OK = Finding(verdict=Verdict.OK, text="OK", brief="OK")
 
 def ok(text: str, *, measured: Quantity | None = None, limit: Quantity | None = None, ended: str = "") -> Finding:
     """The verdict OK, with `text`."""
-    return Finding(verdict=Verdict.OK, text=text, brief="OK", measured=measured, limit=limit, ended=ended)
+    return Finding(Verdict.OK, text, "OK", measured, limit, ended=ended)
 
 
 def on_tile(brief: str) -> str:

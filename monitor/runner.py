@@ -56,6 +56,7 @@ class CheckRow(NamedTuple):
 
     check: AnyCheck
     limits: Any
+    explains: bool  # whether its alarm explains others
 
 
 def blind_to_the_car(snapshot: Snapshot) -> Finding | None:
@@ -146,7 +147,12 @@ class Monitor:
     def limits(self, limits: AllLimits) -> None:
         self._limits = limits
         self._rows = tuple(
-            CheckRow(check, getattr(limits, check.limits_group, None) or check.limits()) for check in self._checks
+            CheckRow(
+                check,
+                getattr(limits, check.limits_group, None) or check.limits(),
+                check.id in self._causes.inhibitors,
+            )
+            for check in self._checks
         )
         self._immediate_rows: dict[Collection[str], tuple[CheckRow, ...]] = {}  # by the signals that changed together
 
@@ -160,7 +166,8 @@ class Monitor:
         transitions: list[Transition] = []
         blind = blind_to_the_car(snapshot)
         for row in self._rows if changed is None else self._immediate(changed):
-            transitions += self._judge(row, snapshot, blind)
+            if happened := self._judge(row, snapshot, blind):
+                transitions += happened
         if changed is None and len(self.alarms) > len(self._declared) + 1:
             for name in self.alarms.keys() - {check.id for check in self._declared} - {IMPAIRED}:
                 transitions += self._advance(name, NOT_HERE, snapshot.now_s, ())
@@ -275,7 +282,8 @@ class Monitor:
         is_fault = finding.verdict is Verdict.FAULT
         if not is_fault and not by and not snapshot.paused and alarm.is_at_rest:  # by far the most frequent case
             self.findings[check.id] = finding
-            self._causes.note(alarm, snapshot.now_s)
+            if row.explains:
+                self._causes.note(alarm, snapshot.now_s)
             return ()
         if by and is_fault:
             why = self.alarms[by[0]].spec.title

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,13 +15,14 @@ FALTERS_AT = 0.5  # of its horizon: an announced silence ends when no gap comes 
 CROWD = 3  # so many fast signals do not die at one moment by themselves
 OTHERS_S, OTHERS_PERIODS = 1.5, 1.5  # another signal goes on if its newest message is no older than this
 BRIDGE_WITHIN_S = 2.6  # a half-open link is found within 2.5 s: then it has been called lost, or the bridge is alive
+REGULAR = frozenset(name for name, one in SIGNALS.items() if not (one.event_like or one.by_parts))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Silence:
     """How silent the car is at one moment."""
 
-    heard: int  # signals received on this connection that have a regular rate
+    regular: int  # signals received on this connection that have a regular rate
     fresh: int  # of those, the ones that still come
     is_quiet: bool  # nothing where several things ought to have come: too early to blame one signal
     is_silent: bool  # nothing comes of all that comes fast
@@ -34,26 +34,25 @@ class Silence:
 def silence(snapshot: Snapshot) -> Silence | None:
     """None before the first regular signal on this connection."""
     now_s, opened_s = snapshot.now_s, snapshot.link.opened_s
-    heard = [one for one in _arrivals(snapshot) if opened_s is None or one.at_s >= opened_s]
-    if not heard:
+    arrivals = [one for one in _arrivals(snapshot) if opened_s is None or one.at_s >= opened_s]
+    if not arrivals:
         return None
-    horizon_s = max(FAST_HORIZON_S, min(one.horizon_s for one in heard))
-    fast = [one for one in heard if one.horizon_s <= horizon_s]
-    newest_s = max(one.at_s for one in fast)
-    margin_s = min(_overdue_s(one) for one in fast)
+    horizon_s = max(FAST_HORIZON_S, min([one.horizon_s for one in arrivals]))
+    fast = [one for one in arrivals if one.horizon_s <= horizon_s]
+    newest_s = max([one.at_s for one in fast])
+    margin_s = min([_overdue_s(one) for one in fast])
     newest_of_all_s = newest_s if snapshot.heard_s is None else snapshot.heard_s
     nothing_since = newest_of_all_s - newest_s <= margin_s
-    others_come = any(
-        one.at_s - newest_s > margin_s and now_s - one.at_s <= max(OTHERS_S, OTHERS_PERIODS * (one.period_s or 0.0))
-        for one in heard
-    )
+    coming = [one for one in arrivals if one.is_coming(now_s)]
+    newer = [one for one in arrivals if one.at_s - newest_s > margin_s]
+    others_come = any(now_s - one.at_s <= max(OTHERS_S, OTHERS_PERIODS * (one.period_s or 0.0)) for one in newer)
     all_overdue = all(now_s - one.at_s > _overdue_s(one) for one in fast)
     bridge_s = max((s for s in (snapshot.link.bridge_heard_s, snapshot.heard_s) if s is not None), default=newest_s)
     return Silence(
-        heard=len(heard),
-        fresh=sum(one.is_coming(now_s) for one in heard),
+        regular=len(arrivals),
+        fresh=len(coming),
         is_quiet=all_overdue and not others_come and (len(fast) >= CROWD or now_s - newest_of_all_s > margin_s),
-        is_silent=not (others_come or any(one.is_coming(now_s) for one in fast))
+        is_silent=not (others_come or any(one.horizon_s <= horizon_s for one in coming))
         and (len(fast) >= CROWD or nothing_since),
         falters=not others_come and all(now_s - one.at_s > FALTERS_AT * one.horizon_s for one in fast),
         silent_s=max(0.0, now_s - newest_s),
@@ -67,19 +66,16 @@ def is_heard(snapshot: Snapshot) -> bool:
     return snapshot.heard_s is not None and (opened_s is None or snapshot.heard_s >= opened_s)
 
 
-def _arrivals(snapshot: Snapshot) -> Iterator[_Arrival]:
+def _arrivals(snapshot: Snapshot) -> list[_Arrival]:
     """Of each signal that ought to come regularly, whether what came can be used or not."""
     unusable = snapshot.unusable
-    for name, reading in snapshot.readings.items():
-        if reading.derived_from is None and _is_regular(name) and name not in unusable:
-            yield _Arrival(reading.received_s, reading.horizon_s, reading.period_s)
-    for name, one in unusable.items():
-        if _is_regular(name):
-            yield _Arrival(one.at_s, one.horizon_s, one.period_s)
-
-
-def _is_regular(name: str) -> bool:
-    return not (SIGNALS[name].event_like or SIGNALS[name].by_parts)
+    found = [
+        _Arrival(reading.received_s, reading.horizon_s, reading.period_s)
+        for name, reading in snapshot.readings.items()
+        if name in REGULAR and reading.derived_from is None and name not in unusable
+    ]
+    found += [_Arrival(one.at_s, one.horizon_s, one.period_s) for name, one in unusable.items() if name in REGULAR]
+    return found
 
 
 class _Arrival(NamedTuple):

@@ -27,7 +27,7 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
         what = "No regular signal" if is_heard(snapshot) else "Nothing"
         return unknown(f"{what} received since connecting", short="no data")
     if not found.is_silent and not (was_active and found.falters):
-        return ok(f"{found.fresh} of {found.heard} signals come")
+        return ok(f"{found.fresh} of {found.regular} signals come")
     if not (found.is_bridge_proved or was_active or found.silent_s > BRIDGE_WITHIN_S):
         # Car or link? Wait for the bridge's next sign of life: a lost link has its own words.
         return unknown(f"No message for {found.silent_s:.1f} s, pinging the bridge", short="silent")
