@@ -10,12 +10,12 @@ import ctypes
 import os
 import re
 import signal
-import socket
 import sys
 import tempfile
 from pathlib import Path
 
 from server.bus import nats_wire as wire
+from tests.ports import free_port
 from tests.server.bus.broker import connected, nats_server
 
 NODE = "node"  # the node's data folder, in that of the agent
@@ -77,9 +77,7 @@ async def drain(out: asyncio.StreamReader) -> None:
 async def main(arguments: list[str]) -> None:
     assert arguments[0] == "serve"
     of_agent, of_page, data = parted(arguments[1:])
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        at_port = probe.getsockname()[1]
+    at_port = free_port()
     broker = f"nats://127.0.0.1:{at_port}"
     store = tempfile.mkdtemp()
     await start(nats_server(), "-a", "127.0.0.1", "-p", str(at_port), "-js", "-sd", store, listens=False)

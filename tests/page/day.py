@@ -14,7 +14,8 @@ from playwright.async_api import Browser, Locator, expect
 from playwright.async_api import TimeoutError as PlaywrightTimeout
 
 from tests.page.conftest import PHONE, Phone, phone_in, picture
-from tests.page.processes import Process, free_port, running, server, simulate
+from tests.page.processes import Process, running, server, simulate
+from tests.ports import free_port
 from tests.server.mail.post import Post, posting
 from tests.server.simulator.conftest import bridge_client
 

@@ -7,7 +7,6 @@ import contextlib
 import os
 import re
 import signal
-import socket
 import sys
 import time
 from collections.abc import AsyncIterator
@@ -181,11 +180,3 @@ async def watching(watch: Process, address: str) -> Process:
 
 def replay(path: Path, *options: str, port: int = 0) -> tuple[str, ...]:
     return ("replay", str(path), "--port", str(port), "--loop", *options)
-
-
-def free_port() -> int:
-    """A port that nothing listens on now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        found: int = probe.getsockname()[1]
-        return found

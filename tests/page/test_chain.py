@@ -18,8 +18,9 @@ from playwright.async_api import expect
 from tests.page.canned import Canned
 from tests.page.conftest import Phone
 from tests.page.drives import number, steady, twist, write
-from tests.page.processes import Drive, driving, free_port, replay, running, server, simulate
+from tests.page.processes import Drive, driving, replay, running, server, simulate
 from tests.page.radio import Radio
+from tests.ports import free_port
 
 CAR_S = 2.0  # what the design allows; to each is added what the looking and a busy machine cost: phone.slack_s
 FROZEN_S = 2.5

@@ -17,7 +17,8 @@ from server.rosbridge.address import parse
 from tests.page.canned import Canned
 from tests.page.canned import idle as no_car
 from tests.page.conftest import Phone
-from tests.page.processes import Process, free_port, running, server, simulate
+from tests.page.processes import Process, running, server, simulate
+from tests.ports import free_port
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="module")

@@ -17,7 +17,8 @@ from playwright.async_api import Browser, Locator, expect
 
 from tests.page.barriers import no_barrier
 from tests.page.conftest import LIVE, PHONE, Phone, phone_in
-from tests.page.processes import Process, free_port, running, server, simulate
+from tests.page.processes import Process, running, server, simulate
+from tests.ports import free_port
 
 SETTINGS = """[limits.link_late]
 late_s = 10.0

@@ -26,6 +26,7 @@ from tests.page import house
 from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE
 from tests.page.processes import running
+from tests.ports import free_port
 
 HOST = f"{label_of(socket.gethostname()) or 'nameless'}.local"
 HERE = {"latitude": 48.1, "longitude": 11.6, "accuracy": 5.0}
@@ -56,20 +57,13 @@ class Field:
         return f"http://{HOST}:{self.setup_port}/"
 
 
-def free_ports() -> tuple[int, int]:
-    with socket.socket() as one, socket.socket() as other:
-        one.bind(("127.0.0.1", 0))
-        other.bind(("127.0.0.1", 0))
-        return one.getsockname()[1], other.getsockname()[1]
-
-
 @pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def served(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Field]:
     if label_of(socket.gethostname()) == "":
         pytest.skip("this machine has no name")
     folder = tmp_path_factory.mktemp("field")
     project = house.copy(folder / "house")
-    port, setup_port = free_ports()
+    port, setup_port = free_port(), free_port()
     ports = ("--port", str(port), "--setup-port", str(setup_port))
     async with running("serve", "--host", "0.0.0.0", *ports, "--data", str(folder / "data"), folder=project):
         async with httpx.AsyncClient() as client:

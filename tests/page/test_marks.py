@@ -19,7 +19,8 @@ from playwright.async_api import Browser, Locator, async_playwright, expect
 from tests.chromium import FLAGS
 from tests.page.barriers import fits, fits_all, no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
-from tests.page.processes import Process, free_port, running, server, simulate
+from tests.page.processes import Process, running, server, simulate
+from tests.ports import free_port
 
 HOSTILE = "<img src=x onerror=alert(1)>"
 pytestmark = pytest.mark.timeout(120)

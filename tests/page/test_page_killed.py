@@ -21,7 +21,8 @@ from playwright.async_api import Error as PlaywrightError
 
 from tests.chromium import FLAGS
 from tests.page.conftest import PHONE
-from tests.page.processes import Process, free_port, running, server, simulate
+from tests.page.processes import Process, running, server, simulate
+from tests.ports import free_port
 
 SETTINGS = "[limits.link_late]\nlate_s = 10.0\ncritical_s = 20.0\n"  # this machine is shared: that is not tested here
 OLD_MS = 1000  # a mark so old outlives everything

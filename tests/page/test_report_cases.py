@@ -16,8 +16,9 @@ import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
 from tests.page.conftest import LIVE, PHONE, Phone
-from tests.page.processes import Drive, Process, driving, free_port, running, server, simulate, watching
+from tests.page.processes import Drive, Process, driving, running, server, simulate, watching
 from tests.page.test_tabs import TABS
+from tests.ports import free_port
 
 LONG = 45_000  # ms: the car must first stop, or come to where the other one pulls out
 

@@ -12,7 +12,8 @@ import httpx
 import pytest
 
 from tests.page.conftest import Phone
-from tests.page.processes import Process, free_port, running, simulate
+from tests.page.processes import Process, running, simulate
+from tests.ports import free_port
 from tests.server.bus.broker import running_broker
 
 # Sockets that were opened, and the longest times without a message, as the page has them.

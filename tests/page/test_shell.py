@@ -19,7 +19,8 @@ from playwright.async_api import Browser, Error, Page, expect
 from tests.page import house
 from tests.page.barriers import no_barrier
 from tests.page.conftest import LIVE, PHONE
-from tests.page.processes import Process, free_port, running, server, simulate
+from tests.page.processes import Process, running, server, simulate
+from tests.ports import free_port
 
 KEPT = """async () => {
   const all = {};

@@ -8,7 +8,6 @@ import contextlib
 import locale
 import os
 import shutil
-import socket
 import time
 from collections.abc import AsyncIterator, Iterator, Mapping
 from glob import glob
@@ -16,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+
+from tests.ports import free_port
 
 DRIVER, SCREEN = "WebKitWebDriver", "Xvfb"
 LANGUAGE = "en_US.UTF-8"  # in the C locale the driver waits for its browser for ever
@@ -136,9 +137,7 @@ async def screen() -> AsyncIterator[str]:
 @contextlib.asynccontextmanager
 async def driver(environment: Mapping[str, str]) -> AsyncIterator[httpx.AsyncClient]:
     """A client of a driver that answers."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     process = await asyncio.create_subprocess_exec(
         *(DRIVER, "-p", str(port)),
         env=environment,

@@ -7,7 +7,6 @@ import json
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import threading
 import time
@@ -17,6 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from tests.ports import free_port
 from tests.tree import PROJECT
 from tests.vehicle import ros2_environment
 from tests.vehicle.conftest import GUARD
@@ -181,9 +181,7 @@ class Car:
 @contextlib.contextmanager
 def ros1(folder: Path) -> Iterator[dict[str, str]]:
     """A roscore on a port of its own; the environment of its nodes."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = int(free.getsockname()[1])
+    port = free_port()
     environment = os.environ | {
         "PATH": "/usr/bin:/bin:/usr/sbin:/sbin",  # nodes are found by `env python3`, which is Debian's own here
         "ROS_MASTER_URI": f"http://127.0.0.1:{port}",

@@ -9,7 +9,6 @@ import hashlib
 import platform
 import shutil
 import signal
-import socket
 import sys
 import time
 from collections.abc import AsyncIterator
@@ -19,6 +18,8 @@ import nats
 import psutil
 import pytest
 from nats.aio.client import Client
+
+from tests.ports import free_port
 
 # SHA-256 of the program in the wheel that pyproject.toml pins; other platforms are not checked.
 PINNED = {("Linux", "x86_64"): "dd9b8a99f78955e35108355176d2fe61269efb909698eb9fce3d5d81a70e2bda"}
@@ -56,9 +57,7 @@ class Broker:
         self._include = include
         self._store = store
         self._host = host
-        with socket.socket() as probe:
-            probe.bind((host, 0))
-            self.port: int = probe.getsockname()[1]
+        self.port = free_port(host)
         self._process: asyncio.subprocess.Process | None = None
 
     @property

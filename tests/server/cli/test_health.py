@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import datetime as dt
-import socket
 import ssl
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -16,6 +15,7 @@ from server.cli import health
 from server.cli.main import main
 from server.tls.certificate_renewal import OwnCertificate
 from server.tls.names import names_of
+from tests.ports import free_port
 from tests.server.conftest import serving
 
 BODY = b'{"status":"ok","version":"9.9.9","vehicles":{"car":"idle"}}'
@@ -107,9 +107,7 @@ async def test_without_an_address_it_asks_this_machine_both_ways(
 async def test_nobody_there_is_told_for_both(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     monkeypatch.setattr(health, "_HERE", tuple(f"{one}://127.0.0.1:{port}" for one in ("https", "http")))
     assert await asked() == 1
     assert capsys.readouterr().err.count("does not answer") == 2

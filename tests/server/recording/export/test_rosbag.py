@@ -21,6 +21,7 @@ from rosbags.rosbag1 import Reader
 
 from server.recording.export.formats.bag import write_bag
 from server.recording.read.read import open_recording
+from tests.ports import free_port
 from tests.server.recording.export.ours import Own, as_ours, event
 
 pytestmark = [
@@ -108,9 +109,7 @@ def messages(path: Path) -> dict[str, list[bytes]]:
 
 @contextmanager
 def master(folder: Path) -> Iterator[int]:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = int(free.getsockname()[1])
+    port = free_port()
     process = subprocess.Popen(
         ["rosmaster", "--core", "-p", str(port)], env=environment(folder, port), stdout=subprocess.DEVNULL, cwd=folder
     )

@@ -12,6 +12,7 @@ from foxglove.websocket import Capability, Client, ClientChannel, ServerListener
 
 from server.judge.message import RosVersion
 from server.recording.read.schemas import TypeBook
+from tests.ports import free_port
 
 ODOMETRY, FIX = "nav_msgs/Odometry", "sensor_msgs/NavSatFix"
 SCAN, TWIST = "sensor_msgs/LaserScan", "geometry_msgs/Twist"
@@ -97,7 +98,7 @@ class Peer:
             "message_backlog_size": most_queued,
         }
         self._channels: dict[str, tuple[foxglove.Channel, Any]] = {}
-        self.port = 0
+        self.port = free_port()
         self.start()
 
     def start(self) -> None:
@@ -105,7 +106,6 @@ class Peer:
         self.server = foxglove.start_server(
             name="peer", port=self.port, context=self.context, server_listener=self.listener, **self._options
         )
-        self.port = self.server.port
 
     def stop(self) -> None:
         self.server.stop()
