@@ -130,6 +130,7 @@ async def test_the_logbook_and_two_drives_along_the_way(saved: Phone) -> None:
     await compare.get_by_role("slider").press("End")
     await expect(compare.locator(".lb-figures")).to_contain_text("1.19")
     await no_barrier(page, "two drives", ".compareway-board")
+    await fits_all(page, "two drives", ".compareway-board")
     async with page.expect_download() as saving:
         await compare.locator('[data-f="compare-csv"]').tap()
     table = list(csv.reader(io.StringIO(Path(await (await saving.value).path()).read_bytes().decode())))

@@ -17,7 +17,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, Locator, async_playwright, expect
 
 from tests.chromium import FLAGS
-from tests.page.barriers import fits, fits_all, no_barrier
+from tests.page.barriers import fits_all, no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
 from tests.ports import free_port
@@ -156,7 +156,7 @@ async def test_a_mark_with_voice_photo_and_words(hearing: Browser, car: Process,
         await sheet.get_by_role("button", name="−0.1 s").tap()
         await sheet.locator("textarea").fill(HOSTILE)
         await no_barrier(page, "a mark", "#sheet-mark")
-        await fits(page, "a mark")
+        await fits_all(page, "a mark", "#sheet-mark")
         before = (await one.stored(3))[-1]["marked_ms"]
         await sheet.get_by_role("button", name="Keep").tap()
         await one.stored(3, category="control", words=HOSTILE)
@@ -173,6 +173,7 @@ async def test_a_mark_with_voice_photo_and_words(hearing: Browser, car: Process,
         await expect(rows).to_have_count(3)
         await expect(rows.first).to_contain_text(HOSTILE)
         await no_barrier(page, "the list of marks", "#sheet-marks")
+        await fits_all(page, "the list of marks", "#sheet-marks")
         assert one.phone.complaints == []
 
 

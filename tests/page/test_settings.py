@@ -520,6 +520,7 @@ async def test_with_all_of_it_open_it_keeps_nobody_out_and_fits_every_screen(pho
     await type_number(phone, "99")
     await expect(row(phone).locator(".says")).to_be_visible()
     await phone.page.evaluate("document.querySelectorAll('.group').forEach((one) => { one.open = true; })")
+    await expect(phone.page.locator("#panel-settings .people-list input").first).to_have_value("A. K.")
     await no_barrier(phone.page, "tab", "#panel-settings")
     await fits_all(phone.page, "tab")
     for width in (320, 412, 1180):

@@ -13,7 +13,7 @@ import pytest
 from playwright.async_api import Browser, expect
 from playwright.async_api import TimeoutError as PlaywrightTimeout
 
-from tests.page.barriers import no_barrier
+from tests.page.barriers import fits_all, no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
 
@@ -95,6 +95,7 @@ async def test_a_take_over_is_seen_and_described_with_one_tap(browser: Browser, 
         await opened(phone)
         await expect(sheet.locator('[data-f="fact-at"]')).to_contain_text("m/s")
         await no_barrier(page, "the form of a take-over", "#sheet-take-over, .ledge")
+        await fits_all(page, "the form of a take-over", "#sheet-take-over")
         await do(phone, lambda: sheet.locator('[data-f="what"]').fill(HOSTILE, timeout=5000))
         await do(phone, lambda: sheet.locator('[data-by="driver"]').tap(timeout=5000))
         await do(phone, lambda: sheet.locator('[data-f="later"]').tap(timeout=5000))
