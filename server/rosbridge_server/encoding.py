@@ -34,7 +34,6 @@ from server.rosbridge_server.shape import (
     fields,
     items,
     primitive,
-    stamp,
     time_of,
 )
 from server.rosbridge_server.types import RosContext
@@ -207,8 +206,9 @@ class Outgoing:
     def _stamped(self) -> bytes:
         """The time of sending, the same for every client: secs and nsecs, whichever the version of ROS."""
         if self._stamp is None:
-            now = stamp(self._bridge.now(), 1)
-            self._stamp = _STAMP.pack(now["secs"], _RAW_NSECS, now["nsecs"])
+            now_s = self._bridge.now()
+            secs = int(now_s)
+            self._stamp = _STAMP.pack(secs, _RAW_NSECS, min(round((now_s - secs) * 1e9), 999_999_999))
         return self._stamp
 
     def _as_text(self, topic: str) -> bytes:

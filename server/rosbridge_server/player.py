@@ -163,22 +163,19 @@ class _Playing:
         """Publishes until nothing is due or the turn is over; returns the time until the next step, None at the end."""
         batch, prepared = self._batch, self._prepared
         with self._bridge.writing_together:
-            while self._at < len(batch):
-                message = batch[self._at]
-                if (wait_s := self._wait_s(message)) > SOON_S:
-                    break
+            while self._at < len(batch) and self._wait_s() <= SOON_S:
                 if time.monotonic() > self._turn_ends:
                     return 0.0
+                message = batch[self._at]
                 self._bridge.publish(message.topic, prepared.popleft() if prepared else message.message)
                 self._at += 1
                 if self._on_message is not None:
                     self._on_message(message)
-            else:
-                return None
+        if self._at == len(batch):
+            return None
         if not prepared:
             self._prepare()
-            wait_s = self._wait_s(message)
-        return max(0.0, wait_s)
+        return max(0.0, self._wait_s())
 
     def _prepare(self) -> None:
         for message in islice(self._batch, self._at, self._at + PREPARED):
@@ -186,10 +183,11 @@ class _Playing:
             if time.monotonic() > self._turn_ends:
                 return
 
-    def _wait_s(self, message: Message) -> float:
+    def _wait_s(self) -> float:
+        """Until the next message is due."""
         assert self._origin is not None
         first_at_s, began_s = self._origin
-        return began_s + (message.at_s - first_at_s) / self._rate - self._clock()
+        return began_s + (self._batch[self._at].at_s - first_at_s) / self._rate - self._clock()
 
 
 async def _fetched(source: Iterator[T], ahead: int) -> AsyncGenerator[list[T], None]:
