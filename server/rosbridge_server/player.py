@@ -81,7 +81,7 @@ async def play(
     bridge: RosBridge,
     *,
     rate: float = 1.0,
-    clock: Callable[[], float] = time.monotonic,
+    clock: Callable[[], float] | None = None,
     call_later: Callable[[float, Callable[[], None]], Timer] | None = None,
     on_end: Callable[[], None] | None = None,
     on_message: Callable[[Message], None] | None = None,
@@ -90,13 +90,15 @@ async def play(
     """Publish every message when it is due, at `rate` times real time; return their number.
 
     All due times are relative to the first message, so that delays never add up: late messages are sent at once, in
-    order, until none is late. The topics must have been advertised. `clock` returns seconds and `call_later`, the
-    loop's where none is given, waits on it. `ahead`: so many messages are fetched in a thread before they are due, for
-    sources that read files; 0 fetches each only when the one before it is out, for sources that react to what happens.
+    order, until none is late. The topics must have been advertised. `clock` returns seconds (monotonic where none is
+    given) and `call_later` waits on it (the loop's where none is given). `ahead`: so many messages are fetched in a
+    thread before they are due, for sources that read files; 0 fetches each only when the one before it is out, for
+    sources that react to what happens.
     """
     if not rate > 0:
         raise ValueError("the rate must be above 0")
-    playing = _Playing(bridge, rate, clock, call_later or asyncio.get_running_loop().call_later, on_message)
+    call_later = call_later or asyncio.get_running_loop().call_later
+    playing = _Playing(bridge, rate, clock or time.monotonic, call_later, on_message)
     count = 0
     async with contextlib.aclosing(_fetched(iter(messages), ahead)) as fetched:
         async for batch in fetched:
@@ -108,7 +110,7 @@ async def play(
 
 
 class _Playing:
-    """Publishes messages when they are due, in callbacks of the loop: a task would take a second round of it."""
+    """Publishes messages when they are due, in callbacks of the loop; waking a task takes another cycle of it."""
 
     def __init__(
         self,
@@ -178,9 +180,10 @@ class _Playing:
         return max(0.0, self._wait_s())
 
     def _prepare(self) -> None:
+        """Encodes the next messages until one is due or the turn is over."""
         for message in islice(self._batch, self._at, self._at + PREPARED):
             self._prepared.append(self._bridge.prepare(message.topic, message.message))
-            if time.monotonic() > self._turn_ends:
+            if self._wait_s() <= SOON_S or time.monotonic() > self._turn_ends:
                 return
 
     def _wait_s(self) -> float:
