@@ -51,7 +51,7 @@ class _ChannelReader:
 
 _ROS_TYPE = re.compile(r"[A-Za-z]\w*(/msg)?/[A-Za-z]\w*")
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, content
-_Ways = Mapping[int, tuple[str, str, Callable[[bytes], Json]]]  # number of a channel → topic, type, decoder
+_Decoders = Mapping[int, tuple[str, str, Callable[[bytes], Json]]]  # number of a channel → topic, type, decoder
 
 
 def open_recording(paths: Sequence[Path], *, asked: Path | None = None) -> Recording:
@@ -149,10 +149,10 @@ class Recording:
 
         `rejected` then counts a message that cannot be decoded when its fields are first read.
         """
-        ways = [{n: (r.topic, r.type, self._deferred(r)) for n, r in readers.items()} for readers in self._readers]
+        decoders = [{n: (r.topic, r.type, self._deferred(r)) for n, r in readers.items()} for readers in self._readers]
         return (
             Message(at_s=at_s, topic=topic, type=type, message=message)
-            for at_s, topic, type, message in self._in_order(start_s, ways)
+            for at_s, topic, type, message in self._in_order(start_s, decoders)
         )
 
     def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
@@ -162,11 +162,11 @@ class Recording:
         be decoded is left out and counted in `rejected`, what is damaged is left out where the rest can be read without
         it, and named in `damage`. Raises RecordingUnreadable where it cannot, or nothing is whole.
         """
-        ways = [
+        decoders = [
             {n: (r.topic, r.type, sifted(r.decode, r.topic, topics)) for n, r in readers.items()}
             for readers in self._readers
         ]
-        return self._in_order(start_s, ways)
+        return self._in_order(start_s, decoders)
 
     def only(self, topics: Collection[str]) -> Iterator[Row]:
         """Messages of these topics alone, in time order, for what is to be known before a reading; see `beforehand`."""
@@ -247,7 +247,7 @@ class Recording:
         return readers
 
     def _deferred(self, reader: _ChannelReader) -> Callable[[bytes], Json]:
-        """Leaves the decoding of a channel's messages to who reads their fields."""
+        """Wraps the bytes of a channel's messages, which are decoded when their fields are read."""
         layout = reader.layout
         if layout is None:
             return reader.decode
@@ -265,19 +265,19 @@ class Recording:
         self.rejected[topic] = self.rejected.get(topic, 0) + 1
         self.why_rejected.setdefault(topic, str(why))
 
-    def _in_order(self, start_s: float, ways: Sequence[_Ways]) -> Iterator[Row]:
+    def _in_order(self, start_s: float, decoders: Sequence[_Decoders]) -> Iterator[Row]:
         start_ns = self._start_ns + round(start_s * 1e9)
         streams = [
             Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=self._read(source, own, start_ns))
-            for source, own in zip(self._sources, ways, strict=True)
+            for source, own in zip(self._sources, decoders, strict=True)
             if own
         ]
         return in_time_order(streams, operator.itemgetter(0))
 
-    def _read(self, source: FileSource, ways: _Ways, start_ns: int) -> Iterator[Row]:
+    def _read(self, source: FileSource, decoders: _Decoders, start_ns: int) -> Iterator[Row]:
         try:
-            for time_ns, number, raw in source.messages(set(ways), start_ns):
-                topic, type, decode = ways[number]
+            for time_ns, number, raw in source.messages(set(decoders), start_ns):
+                topic, type, decode = decoders[number]
                 try:
                     message = decode(raw)
                 except Undecodable as why:
