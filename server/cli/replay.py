@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import gc
 import math
 import signal
 import sys
@@ -203,6 +204,7 @@ class _Replay:
         if self._args.wait:
             await self._wait_for_subscribers()
         self._report.begin()
+        gc.freeze()  # what stays until the end need not be searched again and again
         rounds = Rounds(self._args.rate)
         while True:
             round_ends_s = time.monotonic() + SHORTEST_ROUND_S
@@ -213,7 +215,7 @@ class _Replay:
             await asyncio.sleep(max(0.0, round_ends_s - time.monotonic()))
 
     def _messages(self) -> Iterator[Message]:
-        for message in self._recording.messages(self._args.start):
+        for message in self._recording.raw_messages(self._args.start):
             name = self._names.get(message.topic)
             if name is not None:
                 yield message if name == message.topic else replace(message, topic=name)

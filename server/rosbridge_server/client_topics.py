@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from server.rosbridge.codec import Unencodable
 from server.rosbridge_server import fields
 from server.rosbridge_server.encoding import Encoding, Outgoing
 from server.rosbridge_server.fields import Refused
@@ -166,6 +168,12 @@ class Subscription:
             if self._encoding not in self._lost_as:
                 self._lost_as.add(self._encoding)
                 self._on_lost(f"{self.spelling} cannot be sent as {self._encoding}: {why}")
+
+    def prepare(self, message: Outgoing) -> None:
+        """Has a message encoded that will be offered; what cannot be encoded is reported when it is offered."""
+        if not self._is_muted and not self._throttle_s:  # a throttle may leave it out
+            with suppress(Lost, Unencodable):
+                message.prepare(self.spelling, self._encoding, self.fragment_size)
 
     def _offer(self, message: Outgoing) -> None:
         if not self._throttle_s:

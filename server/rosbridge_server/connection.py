@@ -13,6 +13,7 @@ from websockets.server import ServerProtocol
 
 HANDSHAKE_S = 10.0  # a socket that has not become a WebSocket by then is closed
 LARGEST_BUFFER = 4_000_000  # bytes of pongs: beyond, the peer floods us with pings and does not read
+TOGETHER_BYTES = 16_384  # small frames that are written with one call
 KEEPALIVE_S = 30  # TCP's own probe finds peers that vanished; rosbridge itself sends no pings
 
 
@@ -20,10 +21,31 @@ class Admission(Protocol):
     """The listener, as a connection that came from it needs it."""
 
     is_frozen: bool
+    together: WriteTogether
 
     def admit(self, connection: Connection, /) -> bool: ...
 
     def forget(self, connection: Connection, /) -> None: ...
+
+
+class WriteTogether:
+    """A block that does not wait: each connection writes at its end, with one system call, what it is given in it."""
+
+    def __init__(self) -> None:
+        self.is_open = False
+        self._connections: list[Connection] = []
+
+    def add(self, connection: Connection) -> None:
+        self._connections.append(connection)
+
+    def __enter__(self) -> None:
+        self.is_open = True
+
+    def __exit__(self, *_: object) -> None:
+        self.is_open = False
+        connections, self._connections = self._connections, []
+        for connection in connections:
+            connection.write_together()
 
 
 class Connection(ServerConnection):
@@ -35,6 +57,8 @@ class Connection(ServerConnection):
         self.awake = asyncio.Event()  # not frozen
         self.awake.set()
         self._unread = bytearray()
+        self._unwritten: list[bytes] = []  # frames, only within a block of WriteTogether
+        self._unwritten_bytes = 0
         self._pong_bytes = 0  # written since the socket's buffer was last empty
         self._deadline: asyncio.TimerHandle | None = None  # of the handshake
         self.on_ready: Callable[[], None] | None = None
@@ -57,7 +81,22 @@ class Connection(ServerConnection):
 
     def write(self, frame: bytes) -> None:
         """Writes one whole frame. Frames are never split here, so they cannot fall into the middle of another."""
-        self.transport.write(frame)
+        together = self._listener.together
+        if not together.is_open:
+            self.transport.write(frame)
+            return
+        if not self._unwritten:
+            together.add(self)
+        self._unwritten.append(frame)
+        self._unwritten_bytes += len(frame)
+        if self._unwritten_bytes > TOGETHER_BYTES:
+            self.write_together()
+
+    def write_together(self) -> None:
+        """Writes the frames that were kept back."""
+        frames, self._unwritten, self._unwritten_bytes = self._unwritten, [], 0
+        if frames:
+            self.transport.write(frames[0] if len(frames) == 1 else b"".join(frames))
 
     def freeze(self) -> None:
         self.awake.clear()

@@ -1,7 +1,6 @@
 """One outgoing message, encoded at most once in each encoding, however many clients want it.
 
 The encodings are JSON, its text as a picture or in fragments, CBOR, and the bytes that ROS sends between nodes.
-
 """
 
 from __future__ import annotations
@@ -21,6 +20,8 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from server.judge.message import Json, RosVersion
+from server.recording.read.errors import Undecodable
+from server.recording.read.raw_message import RawMessage, fields_of
 from server.rosbridge.codec import cbor_bytes, json_bytes
 from server.rosbridge_server.shape import (
     FLOATS,
@@ -33,7 +34,6 @@ from server.rosbridge_server.shape import (
     fields,
     items,
     primitive,
-    stamp,
     time_of,
 )
 from server.rosbridge_server.types import RosContext
@@ -125,14 +125,15 @@ def _chunk(name: bytes, data: bytes) -> bytes:
 
 def frame(opcode: int, payload: bytes) -> bytes:
     """A whole, final, unmasked WebSocket frame (RFC 6455, 5.2): what a server sends."""
-    size = len(payload)
+    return _frame_head(opcode, len(payload)) + payload
+
+
+def _frame_head(opcode: int, size: int) -> bytes:
     if size < 126:
-        head = bytes((0x80 | opcode, size))
-    elif size < 65536:
-        head = bytes((0x80 | opcode, 126)) + size.to_bytes(2, "big")
-    else:
-        head = bytes((0x80 | opcode, 127)) + size.to_bytes(8, "big")
-    return head + payload
+        return bytes((0x80 | opcode, size))
+    if size < 65536:
+        return bytes((0x80 | opcode, 126)) + size.to_bytes(2, "big")
+    return bytes((0x80 | opcode, 127)) + size.to_bytes(8, "big")
 
 
 def text_frames(payload: bytes, fragment_size: int | None = None, id: object = None) -> bytes:
@@ -154,13 +155,15 @@ def json_frames(message: Json, fragment_size: int | None = None) -> bytes:
 class Outgoing:
     """A message on its way to every subscriber of its topic. It must not change after it was published."""
 
-    __slots__ = ("_bodies", "_bridge", "_frames", "_message", "type")
+    __slots__ = ("_bodies", "_bridge", "_frames", "_message", "_stamp", "_unstamped", "type")
 
     def __init__(self, bridge: RosContext, type: str, message: Json) -> None:
         """`type`: the publisher's, as this version of ROS spells it."""
         self.type = type
         self._bridge = bridge
         self._message = message
+        self._stamp: bytes | None = None
+        self._unstamped: dict[str, tuple[bytes, bytes]] = {}  # by topic: prepared frames of cbor-raw
         self._bodies: dict[Encoding, bytes] = {}
         self._frames: dict[tuple[str, Encoding, int | None], bytes] = {}
 
@@ -168,7 +171,8 @@ class Outgoing:
         """The WebSocket frame for clients which write the topic so ("chatter" and "/chatter" may both be in use).
 
         Text that is longer than `fragment_size` becomes the frames of its fragments, one after another.
-        Raises Unencodable, and Lost where the message is not of its type or that is not known: it has no raw bytes.
+        Raises Unencodable, and Lost where a recorded message cannot be decoded, or one without raw bytes is not of
+        its type or that is not known.
         """
         key = (topic, encoding, fragment_size)
         made = self._frames.get(key)
@@ -176,16 +180,39 @@ class Outgoing:
             made = self._frames[key] = self._make(topic, encoding, fragment_size)
         return made
 
+    def prepare(self, topic: str, encoding: Encoding, fragment_size: int | None) -> None:
+        """Does what of `frames` can be done before the message is due. Raises as `frames`."""
+        if encoding == "cbor-raw":  # the frame has the time of sending
+            self._unstamped[topic] = self._without_stamp(topic)
+        else:
+            self.frames(topic, encoding, fragment_size)
+
     def _make(self, topic: str, encoding: Encoding, fragment_size: int | None) -> bytes:
         if encoding == "json":
             return text_frames(self._as_text(topic), fragment_size)
         if encoding == "png":
             return json_frames({"op": "png", "data": png(self._as_text(topic))}, fragment_size)
-        # 0xa3: a map of three pairs, written by hand so that the body is encoded once for every spelling of the topic
-        return frame(_BINARY, b"\xa3" + _CBOR_OP + _CBOR_TOPIC + cbor2.dumps(topic) + _CBOR_MSG + self._body(encoding))
+        if encoding == "cbor-raw":
+            head, rest = self._unstamped.get(topic) or self._without_stamp(topic)
+            return head + self._stamped() + rest
+        return frame(_BINARY, _cbor_head(topic) + self._body(encoding))
+
+    def _without_stamp(self, topic: str) -> tuple[bytes, bytes]:
+        """The frame of cbor-raw before and after the time of sending."""
+        head = _cbor_head(topic) + _RAW_SECS
+        rest = _RAW_BYTES + self._body("cbor-raw")
+        return _frame_head(_BINARY, len(head) + _STAMP.size + len(rest)) + head, rest
+
+    def _stamped(self) -> bytes:
+        """The time of sending, the same for every client: secs and nsecs, whichever the version of ROS."""
+        if self._stamp is None:
+            now_s = self._bridge.now()
+            secs = int(now_s)
+            self._stamp = _STAMP.pack(secs, _RAW_NSECS, min(round((now_s - secs) * 1e9), 999_999_999))
+        return self._stamp
 
     def _as_text(self, topic: str) -> bytes:
-        return b'{"op":"publish","topic":' + orjson.dumps(topic) + b',"msg":' + self._body("json") + b"}"
+        return _json_head(topic) + self._body("json") + b"}"
 
     def _body(self, encoding: Encoding) -> bytes:
         body = self._bodies.get(encoding)
@@ -195,20 +222,42 @@ class Outgoing:
 
     def _encode(self, encoding: Encoding) -> bytes:
         if encoding == "json":
-            return json_bytes(self._message)
+            return json_bytes(self._fields())
         if encoding == "cbor":
-            return cbor_bytes(self._message)
-        now = stamp(self._bridge.now(), 1)  # secs and nsecs, whichever the version
-        return cbor2.dumps({**now, "bytes": self.raw()})
+            return cbor_bytes(self._fields())
+        return cbor2.dumps(self.raw())
 
     def raw(self) -> bytes:
-        """The message as ROS sends it between nodes. Raises Lost."""
-        definitions = self._bridge.types.definitions(self.type)
+        """The message as ROS sends it between nodes: recorded bytes where clients can read them. Raises Lost."""
+        types, message = self._bridge.types, self._message
+        if isinstance(message, RawMessage) and types.describes(self.type, message.layout):
+            return message.raw
+        definitions = types.definitions(self.type)
         if definitions is None:
             raise Lost(f"the type {self.type} is not known")
-        return raw_bytes(self._bridge.types.long_name(self.type), definitions, self._bridge.ros_version, self._message)
+        return raw_bytes(types.long_name(self.type), definitions, self._bridge.ros_version, self._fields())
+
+    def _fields(self) -> Json:
+        """The message, decoded. Raises Lost."""
+        try:
+            return fields_of(self._message)
+        except Undecodable as why:
+            raise Lost(str(why)) from None
 
 
-_CBOR_OP = cbor2.dumps("op") + cbor2.dumps("publish")
-_CBOR_TOPIC = cbor2.dumps("topic")
-_CBOR_MSG = cbor2.dumps("msg")
+@lru_cache(maxsize=1_000)
+def _json_head(topic: str) -> bytes:
+    return b'{"op":"publish","topic":' + orjson.dumps(topic) + b',"msg":'
+
+
+@lru_cache(maxsize=1_000)
+def _cbor_head(topic: str) -> bytes:
+    """The beginning of a map of three pairs (0xa3), up to the value of `msg`."""
+    return b"\xa3" + b"".join(map(cbor2.dumps, ("op", "publish", "topic", topic, "msg")))
+
+
+# The message of cbor-raw: a map of three pairs. Its times are numbers of 4 bytes, so that its length is known before.
+_RAW_SECS = b"\xa3" + cbor2.dumps("secs") + b"\x1a"
+_RAW_NSECS = cbor2.dumps("nsecs") + b"\x1a"
+_RAW_BYTES = cbor2.dumps("bytes")
+_STAMP = struct.Struct(f">I{len(_RAW_NSECS)}sI")

@@ -20,6 +20,8 @@ class Subscriber(Protocol):
 
     def offer(self, message: Outgoing, /) -> None: ...
 
+    def prepare(self, message: Outgoing, /) -> None: ...
+
 
 class Owner(Protocol):
     """The owner of a subscriber."""

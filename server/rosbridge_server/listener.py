@@ -14,7 +14,7 @@ from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.http11 import Request, Response
 from websockets.server import ServerProtocol
 
-from server.rosbridge_server.connection import Connection
+from server.rosbridge_server.connection import Connection, WriteTogether
 
 WRITE_LIMIT = 65_536  # bytes in a socket's own buffer before its client counts as slow
 EXTRA_SOCKETS = 32  # sockets beyond the clients: handshakes on their way, and refusals
@@ -46,6 +46,7 @@ class Listener:
         self._sockets: set[Connection] = set()
         self._clients = 0
         self.is_frozen = False
+        self.together = WriteTogether()
 
     @property
     def clients(self) -> int:

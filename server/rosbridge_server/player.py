@@ -5,11 +5,15 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Iterator
+from collections import deque
+from collections.abc import AsyncGenerator, Callable, Iterable, Iterator, Sequence
 from itertools import islice
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from server.judge.message import Json, Message
+from server.recording.read.errors import Undecodable
+from server.recording.read.raw_message import fields_of
+from server.rosbridge_server.encoding import Outgoing
 from server.rosbridge_server.server import RosBridge
 
 _NS = 10**9
@@ -19,6 +23,7 @@ DEEPEST = 8  # levels; stamps of the standard messages are at most 3 deep
 
 SOON_S = 0.0005  # nearer than this is now: the loop cannot sleep more finely
 TURN_S = 0.005  # when late, others get a turn at least this often
+PREPARED = 64  # messages that are encoded together before they are due: one by one takes several times as long
 
 T = TypeVar("T")
 
@@ -27,8 +32,12 @@ def moved(message: Json, by_s: float) -> Json:
     """The message with each field `stamp` later by so much; a copy where there is any. A stamp of zero is none."""
     if not by_s:
         return message
-    found = _moved(message, round(by_s * _NS), DEEPEST)
-    return found if isinstance(found, dict) else message
+    try:
+        fields = fields_of(message)
+    except Undecodable:
+        return message
+    found = _moved(fields, round(by_s * _NS), DEEPEST)
+    return found if found is not fields and isinstance(found, dict) else message
 
 
 def _moved(value: Any, by_ns: int, deep: int) -> Any:
@@ -61,13 +70,19 @@ def _later(stamp: Any, by_ns: int) -> Any:
     return stamp
 
 
+class Timer(Protocol):
+    """What a loop's `call_later` returns."""
+
+    def cancel(self) -> None: ...
+
+
 async def play(
     messages: Iterable[Message],
     bridge: RosBridge,
     *,
     rate: float = 1.0,
     clock: Callable[[], float] | None = None,
-    sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
+    call_later: Callable[[float, Callable[[], None]], Timer] | None = None,
     on_end: Callable[[], None] | None = None,
     on_message: Callable[[Message], None] | None = None,
     ahead: int = 0,
@@ -75,48 +90,119 @@ async def play(
     """Publish every message when it is due, at `rate` times real time; return their number.
 
     All due times are relative to the first message, so that delays never add up: late messages are sent at once, in
-    order, until none is late. The topics must have been advertised. `clock` returns seconds (monotonic
-    where none is given) and `sleep` waits on it. `ahead`: so many messages are fetched in a thread before they are due,
-    for sources that read files; 0 fetches each only when the one before it is out, for sources that react to what
-    happens.
+    order, until none is late. The topics must have been advertised. `clock` returns seconds (monotonic where none is
+    given) and `call_later` waits on it (the loop's where none is given). `ahead`: so many messages are fetched in a
+    thread before they are due, for sources that read files; 0 fetches each only when the one before it is out, for
+    sources that react to what happens.
     """
     if not rate > 0:
         raise ValueError("the rate must be above 0")
-    clock_s = clock or time.monotonic
+    call_later = call_later or asyncio.get_running_loop().call_later
+    playing = _Playing(bridge, rate, clock or time.monotonic, call_later, on_message)
     count = 0
-    first_at_s = began_s = 0.0
-    turn_ends = time.monotonic() + TURN_S
     async with contextlib.aclosing(_fetched(iter(messages), ahead)) as fetched:
-        async for message in fetched:
-            if count == 0:
-                first_at_s, began_s = message.at_s, clock_s()
-            wait_s = began_s + (message.at_s - first_at_s) / rate - clock_s()
-            if wait_s > SOON_S:
-                await sleep(wait_s)
-                turn_ends = time.monotonic() + TURN_S
-            elif time.monotonic() > turn_ends:
-                await asyncio.sleep(0)
-                turn_ends = time.monotonic() + TURN_S
-            bridge.publish(message.topic, message.message)
-            count += 1
-            if on_message is not None:
-                on_message(message)
+        async for batch in fetched:
+            await playing.play(batch)
+            count += len(batch)
     if on_end is not None:
         on_end()
     return count
 
 
-async def _fetched(source: Iterator[T], ahead: int) -> AsyncGenerator[T, None]:
+class _Playing:
+    """Publishes messages when they are due, in callbacks of the loop; waking a task takes another cycle of it."""
+
+    def __init__(
+        self,
+        bridge: RosBridge,
+        rate: float,
+        clock: Callable[[], float],
+        call_later: Callable[[float, Callable[[], None]], Timer],
+        on_message: Callable[[Message], None] | None,
+    ) -> None:
+        self._bridge = bridge
+        self._rate = rate
+        self._clock = clock
+        self._call_later = call_later
+        self._on_message = on_message
+        self._origin: tuple[float, float] | None = None  # recorded time and time of the clock
+        self._turn_ends = time.monotonic() + TURN_S
+        self._batch: Sequence[Message] = ()
+        self._at = 0  # of the next message in the batch
+        self._prepared: deque[Outgoing] = deque()  # the next messages
+        self._timer: Timer | None = None
+        self._played: asyncio.Future[None]
+
+    async def play(self, batch: Sequence[Message]) -> None:
+        """Returns when the last message is published."""
+        if self._origin is None:
+            self._origin = batch[0].at_s, self._clock()
+        self._batch, self._at = batch, 0
+        self._played = asyncio.get_running_loop().create_future()
+        self._step()
+        try:
+            await self._played
+        finally:
+            if self._timer is not None:
+                self._timer.cancel()
+
+    def _begin_turn(self) -> None:
+        self._turn_ends = time.monotonic() + TURN_S
+        self._step()
+
+    def _step(self) -> None:
+        try:
+            next_s = self._publish_due()
+        except Exception as error:
+            self._played.set_exception(error)
+            return
+        if next_s is None:
+            self._played.set_result(None)
+        else:
+            self._timer = self._call_later(next_s, self._begin_turn)
+
+    def _publish_due(self) -> float | None:
+        """Publishes until nothing is due or the turn is over; returns the time until the next step, None at the end."""
+        batch, prepared = self._batch, self._prepared
+        with self._bridge.writing_together:
+            while self._at < len(batch) and self._wait_s() <= SOON_S:
+                if time.monotonic() > self._turn_ends:
+                    return 0.0
+                message = batch[self._at]
+                self._bridge.publish(message.topic, prepared.popleft() if prepared else message.message)
+                self._at += 1
+                if self._on_message is not None:
+                    self._on_message(message)
+        if self._at == len(batch):
+            return None
+        if not prepared:
+            self._prepare()
+        return max(0.0, self._wait_s())
+
+    def _prepare(self) -> None:
+        """Encodes the next messages until one is due or the turn is over."""
+        for message in islice(self._batch, self._at, self._at + PREPARED):
+            self._prepared.append(self._bridge.prepare(message.topic, message.message))
+            if self._wait_s() <= SOON_S or time.monotonic() > self._turn_ends:
+                return
+
+    def _wait_s(self) -> float:
+        """Until the next message is due."""
+        assert self._origin is not None
+        first_at_s, began_s = self._origin
+        return began_s + (self._batch[self._at].at_s - first_at_s) / self._rate - self._clock()
+
+
+async def _fetched(source: Iterator[T], ahead: int) -> AsyncGenerator[list[T], None]:
     if ahead <= 0:
         for item in source:
-            yield item
+            yield [item]
         return
     fetch = asyncio.create_task(asyncio.to_thread(_take, source, ahead))
     try:
         while batch := await fetch:
             fetch = asyncio.create_task(asyncio.to_thread(_take, source, ahead))
-            for item in batch:
-                yield item
+            yield batch
     finally:  # the caller may close the source next: wait for the thread to leave it
         if not fetch.done():
             await asyncio.wait({fetch})

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from server.judge.message import Json, RosVersion
 from server.judge.ros_names import canonical_name, canonical_type
 from server.rosbridge_server.client import Client
-from server.rosbridge_server.connection import Connection
+from server.rosbridge_server.connection import Connection, WriteTogether
 from server.rosbridge_server.encoding import Outgoing
-from server.rosbridge_server.graph import SOURCE, Graph, Handler, Service, ServiceFailed, Services
+from server.rosbridge_server.graph import SOURCE, Graph, Handler, Service, ServiceFailed, Services, Topic
 from server.rosbridge_server.listener import CannotListen, Listener
 from server.rosbridge_server.outbox import Counters
 from server.rosbridge_server.rosapi import add_rosapi
@@ -142,16 +142,33 @@ class RosBridge:
             found.publishers.discard(SOURCE)
             self.graph.tidy(found)
 
-    def publish(self, topic: str, message: Json) -> None:
+    def publish(self, topic: str, message: Json | Outgoing) -> None:
         """Sends a message to all who listen, without ever waiting. The message must not change afterwards.
 
         Raises LookupError where the topic was not advertised, Unencodable where it cannot be sent.
         """
+        found, type = self._published_here(topic)
+        found.distribute(message if isinstance(message, Outgoing) else Outgoing(self, type, message))
+
+    def prepare(self, topic: str, message: Json) -> Outgoing:
+        """Encodes a message for those who listen now; it is to be published soon. Raises LookupError."""
+        found, type = self._published_here(topic)
+        outgoing = Outgoing(self, type, message)
+        for subscription in found.subscribers:
+            subscription.prepare(outgoing)
+        return outgoing
+
+    def _published_here(self, topic: str) -> tuple[Topic, str]:
         found = self.graph.find(topic)
         if found is None or SOURCE not in found.publishers:
             raise LookupError(f"{topic} was not advertised")
         assert found.type is not None
-        found.distribute(Outgoing(self, found.type, message))
+        return found, found.type
+
+    @property
+    def writing_together(self) -> WriteTogether:
+        """For a block that does not wait: what it publishes is written to each client with one system call."""
+        return self._listener.together
 
     def add_service(
         self,

@@ -9,7 +9,9 @@ from typing import Any, Protocol
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from server.judge.message import Json, RosVersion
+from server.recording.read.raw_message import Layout
 from server.rosbridge_server.completion import Completion
+from server.rosbridge_server.shape import TIMES, fields
 
 Definitions = dict[str, Any]  # type as rosbags spells it → (constants, fields)
 
@@ -21,6 +23,7 @@ class MessageTypes:
         self._version: RosVersion = version
         self._texts: dict[str, str] = {}
         self._parsed: dict[str, Definitions] = {}
+        self._described: dict[tuple[str, Layout], bool] = {}
 
     def load(self) -> None:
         """Gets the standard messages ready: a tenth of a second, the first time in a process."""
@@ -31,6 +34,7 @@ class MessageTypes:
         if self._texts.get(type) != definition:
             self._texts[type] = definition
             self._parsed.pop(type, None)
+            self._described.clear()
 
     def text(self, type: str) -> str:
         """The definition in full, as `gendeps --cat` writes it; empty where it is not known."""
@@ -73,6 +77,15 @@ class MessageTypes:
                 return definitions
         return next((found for found in map(self._learnt, list(self._texts)) if long in found), None)
 
+    def describes(self, type: str, layout: Layout) -> bool:
+        """Whether recorded bytes of a layout are those of the definition that clients get of this type."""
+        key = (type, layout)
+        if key not in self._described:
+            self._described[key] = layout.ros_version == self._version and _have_same_fields(
+                _long(type), layout.definitions, self.definitions(type) or {}
+            )
+        return self._described[key]
+
     def _learnt(self, type: str) -> Definitions:
         if type not in self._texts:
             return {}
@@ -82,6 +95,20 @@ class MessageTypes:
             except Exception:  # the parser raises many exception types; the standard messages may still know it
                 self._parsed[type] = {}
         return self._parsed[type]
+
+
+def _have_same_fields(type: str, one: Definitions, other: Definitions) -> bool:
+    """Whether a type and all it contains have the same fields in both; constants are not in the bytes."""
+    names, seen = [type], set(TIMES)
+    while names:
+        name = names.pop()
+        if name in seen:
+            continue
+        seen.add(name)
+        if name not in one or name not in other or one[name][1] != other[name][1]:
+            return False
+        names += [field.type for field in fields(name, one) if field.is_message]
+    return True
 
 
 class RosContext(Protocol):

@@ -16,7 +16,6 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-import psutil
 from websockets.sync.client import ClientConnection, connect
 
 from tests.bench.child import PROJECT
@@ -59,14 +58,21 @@ def micros(tree: Path, drive: Path, encoding: str, seconds: float) -> float | No
             with connect(url, max_size=None, compression=None) as socket:
                 if not subscribe(socket, encoding):
                     return None
-                run = psutil.Process(process.pid)
                 count(socket, WARM_S)
-                before = run.cpu_times()
+                before = processor_s(process.pid)
                 messages = count(socket, seconds)
-                after = run.cpu_times()
+                used = processor_s(process.pid) - before
         finally:
             process.terminate()
-    return (after.user + after.system - before.user - before.system) / messages * 1e6
+    return used / messages * 1e6
+
+
+def processor_s(pid: int) -> float:
+    """Processor time of a process by Linux's clock of it, whose number clock_getcpuclockid(3) makes of the pid.
+
+    psutil's figures have steps of 10 ms, which 150 scans do not take.
+    """
+    return time.clock_gettime((~pid << 3) | 2)
 
 
 def subscribe(socket: ClientConnection, encoding: str) -> bool:

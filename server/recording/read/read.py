@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +21,7 @@ from server.recording.read.decode import Decode, compile_decoder, sifted
 from server.recording.read.definitions import definition_of, definitions_of
 from server.recording.read.errors import RecordingUnreadable, Undecodable
 from server.recording.read.open_files import of_car, open_parts, open_with, what_is_wrong
+from server.recording.read.raw_message import Layout, RawMessage
 from server.recording.read.recognise import recognise
 from server.recording.read.source import Channel, Damage, FileSource, Stream, in_time_order, why_not_decoded
 from server.recording.read.steady_time import ClockStep, make_steady, notes_on
@@ -45,10 +46,12 @@ class _ChannelReader:
     topic: str
     type: str
     decode: Decode
+    layout: Layout | None  # of its bytes; None: JSON
 
 
 _ROS_TYPE = re.compile(r"[A-Za-z]\w*(/msg)?/[A-Za-z]\w*")
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, content
+_Decoders = Mapping[int, tuple[str, str, Callable[[bytes], Json]]]  # number of a channel → topic, type, decoder
 
 
 def open_recording(paths: Sequence[Path], *, asked: Path | None = None) -> Recording:
@@ -96,7 +99,7 @@ class Recording:
         self.rejected: dict[str, int] = {}  # messages by topic that could not be decoded while reading
         self.why_rejected: dict[str, str] = {}
         self._readers: list[dict[int, _ChannelReader]] = []
-        decoders: dict[tuple[str, str, str], Decode] = {}
+        decoders: dict[tuple[str, str, str], tuple[Decode, Layout | None]] = {}
         self._untyped: set[str] = set()  # topics whose type is by their messages
         left_out: Counter[tuple[str, str]] = Counter()  # messages by topic and reason
         for source in sources:
@@ -141,6 +144,17 @@ class Recording:
             for at_s, topic, type, message in self.rows(start_s, topics)
         )
 
+    def raw_messages(self, start_s: float = 0.0) -> Iterator[Message]:
+        """Like `messages`, with a RawMessage wherever the recording has the bytes that ROS sends between nodes.
+
+        `rejected` then counts a message that cannot be decoded when its fields are first read.
+        """
+        decoders = [{n: (r.topic, r.type, self._deferred(r)) for n, r in readers.items()} for readers in self._readers]
+        return (
+            Message(at_s=at_s, topic=topic, type=type, message=message)
+            for at_s, topic, type, message in self._in_order(start_s, decoders)
+        )
+
     def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
         """Like `messages`, as tuples: time, topic, type, content.
 
@@ -148,13 +162,11 @@ class Recording:
         be decoded is left out and counted in `rejected`, what is damaged is left out where the rest can be read without
         it, and named in `damage`. Raises RecordingUnreadable where it cannot, or nothing is whole.
         """
-        start_ns = self._start_ns + round(start_s * 1e9)
-        streams = [
-            Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=self._read(source, readers, start_ns, topics))
-            for source, readers in zip(self._sources, self._readers, strict=True)
-            if readers
+        decoders = [
+            {n: (r.topic, r.type, sifted(r.decode, r.topic, topics)) for n, r in readers.items()}
+            for readers in self._readers
         ]
-        return in_time_order(streams, operator.itemgetter(0))
+        return self._in_order(start_s, decoders)
 
     def only(self, topics: Collection[str]) -> Iterator[Row]:
         """Messages of these topics alone, in time order, for what is to be known before a reading; see `beforehand`."""
@@ -199,7 +211,7 @@ class Recording:
     def _readers_of(
         self,
         source: FileSource,
-        decoders: dict[tuple[str, str, str], Decode],
+        decoders: dict[tuple[str, str, str], tuple[Decode, Layout | None]],
         left_out: Counter[tuple[str, str]],
     ) -> dict[int, _ChannelReader]:
         readers: dict[int, _ChannelReader] = {}
@@ -216,15 +228,16 @@ class Recording:
                     raise Undecodable(f"it has the type {type} and also {known.type}")
                 if key not in decoders:
                     decoders[key] = _decoder(channel, source)
+                decode, layout = decoders[key]
             except Undecodable as why:
                 if channel.count:
                     left_out[channel.topic, str(why)] += channel.count
                 continue
             if not type and known is None:
                 self._untyped.add(channel.topic)
-                type = type_of_first(source, channel, decoders[key])
+                type = type_of_first(source, channel, decode)
             type = type or (known.type if known else "")
-            readers[channel.number] = _ChannelReader(topic=channel.topic, type=type, decode=decoders[key])
+            readers[channel.number] = _ChannelReader(topic=channel.topic, type=type, decode=decode, layout=layout)
             self.topics[channel.topic] = TopicInfo(
                 type=type,
                 count=channel.count + (known.count if known else 0),
@@ -233,20 +246,42 @@ class Recording:
             )
         return readers
 
-    def _read(
-        self, source: FileSource, readers: dict[int, _ChannelReader], start_ns: int, topics: Collection[str] | None
-    ) -> Iterator[Row]:
-        ways = {
-            number: (road.topic, road.type, sifted(road.decode, road.topic, topics)) for number, road in readers.items()
-        }
+    def _deferred(self, reader: _ChannelReader) -> Callable[[bytes], Json]:
+        """Wraps the bytes of a channel's messages, which are decoded when their fields are read."""
+        layout = reader.layout
+        if layout is None:
+            return reader.decode
+
+        def decode(raw: bytes) -> Json:
+            try:
+                return reader.decode(raw)
+            except Undecodable as why:
+                self._reject(reader.topic, why)
+                raise
+
+        return lambda raw: RawMessage(raw, decode, layout)
+
+    def _reject(self, topic: str, why: Undecodable) -> None:
+        self.rejected[topic] = self.rejected.get(topic, 0) + 1
+        self.why_rejected.setdefault(topic, str(why))
+
+    def _in_order(self, start_s: float, decoders: Sequence[_Decoders]) -> Iterator[Row]:
+        start_ns = self._start_ns + round(start_s * 1e9)
+        streams = [
+            Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=self._read(source, own, start_ns))
+            for source, own in zip(self._sources, decoders, strict=True)
+            if own
+        ]
+        return in_time_order(streams, operator.itemgetter(0))
+
+    def _read(self, source: FileSource, decoders: _Decoders, start_ns: int) -> Iterator[Row]:
         try:
-            for time_ns, number, raw in source.messages(set(readers), start_ns):
-                topic, type, decode = ways[number]
+            for time_ns, number, raw in source.messages(set(decoders), start_ns):
+                topic, type, decode = decoders[number]
                 try:
                     message = decode(raw)
                 except Undecodable as why:
-                    self.rejected[topic] = self.rejected.get(topic, 0) + 1
-                    self.why_rejected.setdefault(topic, str(why))
+                    self._reject(topic, why)
                     continue
                 yield time_ns / 1e9, topic, type, message
             if source.damage.is_total:
@@ -270,20 +305,22 @@ def _spelled(type: str, version: RosVersion) -> str:
     return type.replace("/msg/", "/") if version == 1 else type
 
 
-def _decoder(channel: Channel, source: FileSource) -> Decode:
+def _decoder(channel: Channel, source: FileSource) -> tuple[Decode, Layout | None]:
+    """The decoder of a channel's messages, and the layout of their bytes where they are not JSON."""
     version = source.ros_version
     match channel.encoding:
         case "json":
             if not _is_own(source) and not _ROS_TYPE.fullmatch(channel.type):
                 raise Undecodable("its messages are JSON, and of no ROS type")
-            return _decode_json
+            return _decode_json, None
         case "ros1" if version == 1:
             pass
         case "cdr" if version == 2:
             pass
         case other:
             raise Undecodable(why_not_decoded(other))
-    return compile_decoder(channel.type, definitions_of(channel, version, source.distro), version)
+    layout = Layout(version, definitions_of(channel, version, source.distro))
+    return compile_decoder(channel.type, layout.definitions, version), layout
 
 
 def _is_own(source: FileSource) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -27,7 +27,7 @@ def numbers(bridge: RosBridge) -> RosBridge:
 
 
 class Watch:
-    """A clock of the test's own, on which every sleep lasts a little too long."""
+    """A clock of the test's own, on which every timer lasts a little too long."""
 
     def __init__(self, late_s: float) -> None:
         self.now_s = 1000.0
@@ -36,9 +36,9 @@ class Watch:
     def __call__(self) -> float:
         return self.now_s
 
-    async def sleep(self, wait_s: float) -> None:
+    def call_later(self, wait_s: float, callback: Callable[[], None]) -> asyncio.Handle:
         self.now_s += wait_s + self.late_s
-        await asyncio.sleep(0)
+        return asyncio.get_running_loop().call_soon(callback)
 
 
 @pytest.mark.parametrize("ahead", [0, 16])
@@ -52,7 +52,7 @@ async def test_messages_come_when_they_are_due_and_lateness_never_adds_up(
     def note(message: Message) -> None:
         came_s.append(watch.now_s - 1000.0)
 
-    await play(drive(200), numbers, rate=rate, clock=watch, sleep=watch.sleep, ahead=ahead, on_message=note)
+    await play(drive(200), numbers, rate=rate, clock=watch, call_later=watch.call_later, ahead=ahead, on_message=note)
     due_s = [n * 0.01 / rate for n in range(200)]
     assert all(-SOON_S <= came - due <= 0.0015 for came, due in zip(came_s, due_s, strict=True))
     assert [(await probe.hear())["msg"]["data"] for _ in range(200)] == list(range(200))
@@ -66,7 +66,7 @@ async def test_what_is_late_catches_up_without_a_gap(numbers: RosBridge) -> None
         if message.message["data"] == 10:
             watch.now_s += 0.2
 
-    await play(drive(60), numbers, clock=watch, sleep=watch.sleep, on_message=stall)
+    await play(drive(60), numbers, clock=watch, call_later=watch.call_later, on_message=stall)
     assert came_s[11:31] == pytest.approx([0.3] * 20, abs=0.001)  # at once after the stall
     assert came_s[31:] == pytest.approx([n * 0.01 for n in range(31, 60)], abs=0.001)  # and in step again
 

@@ -13,6 +13,7 @@ import pytest
 from mcap.writer import Writer as McapWriter
 from rosbags.highlevel import AnyReader
 
+from server.recording.read.errors import Undecodable
 from server.recording.read.read import RecordingUnreadable, open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, build, typestore, write_ros1, write_ros2
 from tests.server.recording.export.ours import OurFile, event
@@ -131,6 +132,7 @@ def test_json_messages_in_an_mcap_file(tmp_path: Path) -> None:
     with open_recording([path]) as recording:
         assert [m.message for m in recording.messages()] == [{"data": 1}, {"data": 2}]
         assert recording.rejected == {"/n": 2}
+        assert [type(m.message) for m in recording.raw_messages()] == [dict] * 2, "JSON is not of ROS"
         assert recording.notes == ["/p (1 messages) is left out: messages encoded as 'protobuf' are not supported"]
 
 
@@ -246,6 +248,21 @@ def test_a_message_that_does_not_decode_is_counted_and_left_out(tmp_path: Path) 
     bag.write_bytes(content[: at - 4] + b"\xff\xff\xff\x7f" + content[at:])  # the string's length
     with open_recording([bag]) as recording:
         assert len(list(recording.messages())) == 10
+        assert recording.rejected == {"/text": 1}
+        assert "do not fit its type" in recording.why_rejected["/text"]
+
+
+def test_an_undecodable_message_is_counted_once_when_its_fields_are_read(tmp_path: Path) -> None:
+    bag = write_ros1(tmp_path / "a.bag", SHORT)
+    content = bag.read_bytes()
+    at = content.index(b"begin")
+    bag.write_bytes(content[: at - 4] + b"\xff\xff\xff\x7f" + content[at:])
+    with open_recording([bag]) as recording:
+        raw = [m.message for m in recording.raw_messages() if m.topic == "/text"]
+        assert recording.rejected == {}
+        for _ in range(2):
+            with pytest.raises(Undecodable, match="do not fit its type"):
+                dict(raw[0])
         assert recording.rejected == {"/text": 1}
         assert "do not fit its type" in recording.why_rejected["/text"]
 
