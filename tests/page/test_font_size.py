@@ -124,7 +124,10 @@ async def test_each_key_is_in_reach_with_a_large_font(grown: Phone, canned: Cann
 @pytest.mark.gate
 @pytest.mark.own_phone
 async def test_each_key_of_the_alarms_is_in_reach_with_a_large_font(grown: Phone, canned: Canned) -> None:
-    """The keys of a waiting alarm, and those at the foot of the list."""
+    """The keys of a waiting alarm, and those at the foot of the list; none hangs over the edge of the window."""
+    hangs = """() => [...document.querySelectorAll('.view > .screen button')]
+      .filter((one) => one.checkVisibility() && one.getBoundingClientRect().right > innerWidth + 0.5)
+      .map((one) => one.ariaLabel ?? one.textContent)"""
     page = await opened(grown, canned)
     canned.state = many()
     await grown.f("sound-off").tap()
@@ -133,6 +136,7 @@ async def test_each_key_of_the_alarms_is_in_reach_with_a_large_font(grown: Phone
     for width, height in (SIZES[0], (360, 640), SIZES[1]):
         await page.set_viewport_size({"width": round(width), "height": round(height)})
         await grown.drawn()
+        assert await page.evaluate(hangs) == [], (width, height)
         assert await page.evaluate(OUT_OF_REACH, "#monitor .view > .screen") == [], (width, height)
 
 
