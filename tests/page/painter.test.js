@@ -32,7 +32,7 @@ test('what is drawn in turn takes so long of a picture, the rest comes with the 
   assert.deepEqual(drawn, ['map', 'chart', 'tile', 'map'], 'it goes on after a rest');
 });
 
-test('what asks for a turn in its own turn has it, and one picture is asked for at a time', (context) => {
+test('what requests a turn in its own turn has it, and one picture is requested at a time', (context) => {
   const { painter, picture, due } = studio();
   let now_ms = 0;
   context.mock.method(performance, 'now', () => now_ms);

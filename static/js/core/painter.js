@@ -4,7 +4,7 @@ import { Drawing } from './drawing.js';
 
 /** Digits change at most five times a second. */
 export const DRAW_EVERY_MS = 200;
-/** What moves, moves for so long from one frame to the next (instruments.css): a new aim sooner would only cost [ms]. */
+/** A new aim of what moves, sooner than from one frame to the next, would only cost; the move takes a little longer (instruments.css): each that ends before the next aim costs a picture too [ms]. */
 const MOVE_EVERY_MS = 95;
 /** What is drawn in turn takes no longer of one picture, but for the last of it: each picture has its own costs of style, layout and layers [ms]. */
 const TURNS_MS = 4;
@@ -25,7 +25,7 @@ export class Painter {
   #isUrgent = false;
   /** What waits for one of the next pictures. @type {Set<() => void>} */
   #turns = new Set();
-  #isTurning = false; // a picture for them is asked for
+  #isTurning = false; // a picture for them is requested
   #emitter;
 
   /** @param {import('./emitter.js').Emitter<import('./store.js').Topic>} emitter gets `move`, `draw` and `drawn` */
