@@ -9,22 +9,48 @@ function studio(failed = (error) => { throw error; }) {
   const due = [];
   globalThis.requestAnimationFrame = (draw) => due.push(/** @type {() => void} */ (draw));
   const painter = new Painter(new Emitter(failed));
-  return { painter, picture: () => due.splice(0).forEach((draw) => draw()) };
+  return { painter, due, picture: () => due.splice(0).forEach((draw) => draw()) };
 }
 
-test('what is drawn in turn has a picture each, in the order in which it asked', () => {
+test('what is drawn in turn takes so long of a picture, the rest comes with the next, in the order in which it asked', (context) => {
   const { painter, picture } = studio();
+  let now_ms = 0;
+  context.mock.method(performance, 'now', () => now_ms);
   /** @type {string[]} */
   const drawn = [];
-  const [map, chart, tile] = ['map', 'chart', 'tile'].map((name) => () => void drawn.push(name));
+  const [map, chart, tile] = ['map', 'chart', 'tile'].map((name) => () => {
+    drawn.push(name);
+    now_ms += 2.5;
+  });
   for (const draw of [map, chart, tile]) painter.inTurn(/** @type {() => void} */ (draw));
-  for (const expected of [['map'], ['map', 'chart'], ['map', 'chart', 'tile'], ['map', 'chart', 'tile']]) {
+  for (const expected of [['map', 'chart'], ['map', 'chart', 'tile'], ['map', 'chart', 'tile']]) {
     picture();
     assert.deepEqual(drawn, expected);
   }
   painter.inTurn(/** @type {() => void} */ (map));
   picture();
   assert.deepEqual(drawn, ['map', 'chart', 'tile', 'map'], 'it goes on after a rest');
+});
+
+test('what requests a turn in its own turn has it, and one picture is requested at a time', (context) => {
+  const { painter, picture, due } = studio();
+  let now_ms = 0;
+  context.mock.method(performance, 'now', () => now_ms);
+  /** @type {number[]} */
+  const drawn = [];
+  /** @type {(n: number) => () => void} */
+  const line = (n) => () => {
+    drawn.push(n);
+    now_ms += 2.5;
+    if (n < 5) painter.inTurn(line(n + 1));
+  };
+  painter.inTurn(line(0));
+  for (const expected of [[0, 1], [0, 1, 2, 3], [0, 1, 2, 3, 4, 5]]) {
+    assert.equal(due.length, 1);
+    picture();
+    assert.deepEqual(drawn, expected);
+  }
+  assert.equal(due.length, 0);
 });
 
 test('what asks again before its turn waits once', () => {

@@ -12,13 +12,15 @@ from playwright.async_api import Browser, Page, async_playwright, expect
 from tests.chromium import FLAGS
 from tests.page.canned import Canned
 from tests.page.conftest import Phone, new_phone
+from tests.page.screenshots import several as many
 from tests.page.test_overlaps import DRAWN, critical, noticed, opened, several, walk
 
 SIZES: list[tuple[float, float]] = [(360, 740), (412, 915), (820, 1180), (1440, 900)]
 LARGER = 1.5
 #: Keys of the screen in front that no finger can reach: scrolled to, they lie outside the window or under another.
-OUT_OF_REACH = """() => {
-  const keys = [...document.querySelectorAll('#monitor :is(button, a[href], input, select), .snack button')];
+OUT_OF_REACH = """(root) => {
+  const within = `${root ?? '#monitor'} :is(button, a[href], input, select)`;
+  const keys = [...document.querySelectorAll(`${within}, .snack button`)];
   const seen = keys.filter((one) => !one.closest('[inert], .unseen, dialog:not([open])') && !one.disabled
     && one.checkVisibility({ visibilityProperty: true, opacityProperty: true, contentVisibilityAuto: true })
     && one.offsetWidth > 1 && getComputedStyle(one).pointerEvents !== 'none');
@@ -117,6 +119,25 @@ async def test_all_of_the_page_grows_with_the_browsers_font(grown: Phone, phone:
 @pytest.mark.own_phone
 async def test_each_key_is_in_reach_with_a_large_font(grown: Phone, canned: Canned) -> None:
     await all_is_in_reach(grown, canned, [SIZES[0], SIZES[3]], "home")
+
+
+@pytest.mark.gate
+@pytest.mark.own_phone
+async def test_each_key_of_the_alarms_is_in_reach_with_a_large_font(grown: Phone, canned: Canned) -> None:
+    """The keys of a waiting alarm, and those at the foot of the list; none hangs over the edge of the window."""
+    hangs = """() => [...document.querySelectorAll('.view > .screen button')]
+      .filter((one) => one.checkVisibility() && one.getBoundingClientRect().right > innerWidth + 0.5)
+      .map((one) => one.ariaLabel ?? one.textContent)"""
+    page = await opened(grown, canned)
+    canned.state = many()
+    await grown.f("sound-off").tap()
+    await page.evaluate("dispatchEvent(new CustomEvent('catgraph-open', { detail: { screen: 'alarms' } }))")
+    await expect(page.locator(".view > .screen .alarms [data-waits]").first).to_be_visible()
+    for width, height in (SIZES[0], (360, 640), SIZES[1]):
+        await page.set_viewport_size({"width": round(width), "height": round(height)})
+        await grown.drawn()
+        assert await page.evaluate(hangs) == [], (width, height)
+        assert await page.evaluate(OUT_OF_REACH, "#monitor .view > .screen") == [], (width, height)
 
 
 @pytest.mark.timeout(300)

@@ -11,6 +11,7 @@ from playwright.async_api import expect
 from tests.page.canned import Canned, live
 from tests.page.conftest import Phone
 from tests.page.screenshots import silent_car
+from tests.page.touch import DRAWN
 
 TITLED = ("departure", "log", "trends", "signals")
 OPEN = "name => dispatchEvent(new CustomEvent('catgraph-open', { detail: { screen: name } }))"
@@ -40,6 +41,36 @@ async def test_each_screen_behind_the_menu_shows_the_speed(phone: Phone, canned:
         assert await bar.evaluate(LOST) == [], name
         if folder := os.environ.get("CATGRAPH_LOOK"):
             await phone.page.screenshot(path=Path(folder) / f"head-{name}-{width}.png")
+
+
+#: Whether the speed is read in the gauge or in the head, and nothing pressable lies under that head.
+IN_SIGHT = """() => {
+  const box = (one) => document.querySelector(one).getBoundingClientRect();
+  const [gauge, screen, head] = [box('.gauge .speed'), box('.view > .screen'), box('#monitor > .titlebar')];
+  const covers = (a, b) => a.left < b.right - 1 && a.right > b.left + 1 && a.top < b.bottom - 1 && a.bottom > b.top + 1;
+  const speed = document.querySelector('#monitor > .titlebar .head-speed');
+  const tabs = [...document.querySelectorAll('#monitor > .tabs button')]
+    .filter((one) => one.checkVisibility({ visibilityProperty: true }) && covers(head, one.getBoundingClientRect()));
+  const isRead = speed.checkVisibility() || !covers(screen, gauge);
+  return { isRead, under: tabs.map((one) => one.textContent.trim()) };
+}"""
+
+
+@pytest.mark.gate
+async def test_a_screen_shows_the_speed_on_a_tablet_and_a_desktop_too(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 820, "height": 1180})
+    await phone.open(canned.address)
+    await phone.live()
+    await expect(page.locator("link[href$='drawers.css']")).to_be_attached()
+    for name in TITLED:
+        await page.evaluate(OPEN, name)
+        await expect(page.locator("#monitor > .titlebar .head-speed")).to_have_text("4.2m/s")
+        for width, height in ((820, 1180), (740, 1180), (1100, 800), (1000, 640), (1440, 900), (1440, 560)):
+            await page.set_viewport_size({"width": width, "height": height})
+            await page.evaluate(DRAWN)
+            assert await page.evaluate(IN_SIGHT) == {"isRead": True, "under": []}, (name, width, height)
+            assert await page.locator("#monitor > .titlebar").evaluate(LOST) == [], (name, width, height)
 
 
 @pytest.mark.gate

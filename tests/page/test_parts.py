@@ -232,7 +232,7 @@ async def test_a_server_that_falls_silent_covers_everything_and_its_return_uncov
 @pytest.mark.parametrize(
     ("scene", "sheet", "words", "cut"),
     [
-        ("link-lost", "#sheet-lost", "The car may still be moving: watch the car.", ("Server", "Bridge")),
+        ("link-lost", "#sheet-lost", "watch the car. Last known: 4.2 m/s, object at 12.4 m, ", ("Server", "Bridge")),
         ("no-messages", "#sheet-mute", "Connected, but no message", ("Bridge", "Car")),
         ("connect-failed", "#sheet-failed", "nothing listens on port 9090", ("Server", "Bridge")),
     ],

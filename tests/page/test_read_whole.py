@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from playwright.async_api import expect
 
 from monitor.catalog import CHECKS
 from tests.page.canned import Canned, Json, alarm, live
 from tests.page.conftest import Phone
+from tests.page.screenshots import several, silent_car
 
 NAMES = list(dict.fromkeys(check.tile_label for check in sorted(CHECKS, key=lambda one: one.order)))
 SIZES = [(820, 1180), (740, 1180), (1180, 1000)]
@@ -75,6 +78,25 @@ async def test_each_is_in_each_window(phone: Phone, canned: Canned) -> None:
     await names_are_whole(phone, canned, EACH, 'Roboto, "Liberation Sans", Arial')  # DejaVu is a quarter wider
 
 
+#: Words under the name of a check whose letters reach out of their line at its foot, where they are cut.
+CUT_LOW = """() => [...document.querySelectorAll('#monitor .checks li button > span')].filter((one) => {
+  const range = document.createRange();
+  range.selectNodeContents(one);
+  return one.checkVisibility() && range.getBoundingClientRect().bottom > one.getBoundingClientRect().bottom + 0.5;
+}).map((one) => one.textContent)"""
+
+
+@pytest.mark.gate
+async def test_tiles_of_three_lines_are_read_whole_on_the_widest_screen(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 1920, "height": 1080})
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    await expect(page.locator("#monitor .checks li.unk span").first).to_have_text("not checked\nmoving")
+    await expect(page.locator("#monitor .checks li.unk span").first).to_be_visible()
+    assert await page.evaluate(CUT_LOW) == []
+
+
 def fast() -> Json:
     return alarm(
         "speed_limit", "Speed above limit", priority="critical", place="dialog", sound="high", actions=["acknowledge"],
@@ -93,6 +115,56 @@ async def test_no_key_lies_over_the_limit_of_a_critical_alarm(phone: Phone, cann
         await phone.page.set_viewport_size({"width": width, "height": height})
         await phone.page.evaluate(DRAWN)
         assert not await phone.page.evaluate(OVER, ["#sheet-alarm .key", "#sheet-alarm .versus > div"]), (width, height)
+
+
+#: What of the measured value and its limit reaches out of the sheet, or of the window.
+BESIDE = """() => {
+  const sheet = document.querySelector('#sheet-alarm').getBoundingClientRect();
+  return [...document.querySelectorAll('#sheet-alarm .versus > div:not(.cover)')].filter((one) => {
+    const range = document.createRange();
+    range.selectNodeContents(one);
+    const { left, right } = range.getBoundingClientRect();
+    return right > Math.min(sheet.right, innerWidth) - 6 || left < sheet.left;
+  }).map((one) => one.textContent);
+}"""
+
+
+@pytest.mark.gate
+async def test_the_limit_of_a_critical_alarm_is_read_whole_beside_a_low_gauge(phone: Phone, canned: Canned) -> None:
+    canned.state = live() | {"alarms": [fast()]}
+    await phone.page.set_viewport_size({"width": 412, "height": 360})
+    await phone.open(f"{canned.address}/#home")
+    await expect(phone.page.locator("#sheet-alarm .versus")).to_be_visible()
+    for width, height in ((412, 360), (480, 360), (568, 320), (640, 360), (690, 360)):
+        await phone.page.set_viewport_size({"width": width, "height": height})
+        await phone.page.evaluate(DRAWN)
+        assert await phone.page.evaluate(BESIDE) == [], (width, height)
+
+
+#: Of the list under a docked alarm: how far its foot lies over the end of its pane, and the height of its rows [px].
+LIST = """() => {
+  const [pane, sheet, rows, foot] = ['', ' > .slot > .sheet', ' .alarm-list > .alarms', ' .alarms-foot']
+    .map((one) => document.querySelector(`.alarms-pane${one}`).getBoundingClientRect());
+  return { over: Math.max(foot.bottom, sheet.bottom) - pane.bottom, rows: rows.height };
+}"""
+
+
+@pytest.mark.gate
+async def test_a_critical_alarm_leaves_the_list_a_row_and_its_foot(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    canned.state = several()
+    canned.state["alarms"][0]["place"] = "dialog"
+    await page.set_viewport_size({"width": 1200, "height": 700})
+    await phone.open(f"{canned.address}/#home")
+    await expect(page.locator(".alarms-pane #sheet-alarm .versus")).to_be_visible()
+    await expect(page.locator("link[href$='drawers.css']")).to_be_attached()
+    await expect(page.locator(".alarms-pane .alarms > li").first).to_be_attached()
+    for width, height in ((1200, 700), (1200, 610), (1000, 640), (1180, 768), (1366, 768), (1440, 900)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await phone.drawn()
+        found = await page.evaluate(LIST)
+        assert found["over"] <= 1, (width, height, found)
+        assert found["rows"] >= 63, (width, height, found)
 
 
 @pytest.mark.gate
@@ -122,6 +194,35 @@ async def test_all_rows_of_the_trends_have_the_same_letters(phone: Phone, canned
         assert len(set(sizes)) == 1, (part, sizes)
 
 
+#: Values of the trends that reach out of their place.
+OUTSIDE = """() => [...document.querySelectorAll('.trends-pane .trends-value')].filter((one) => {
+  const range = document.createRange();
+  range.selectNodeContents(one);
+  const [at, head] = [range.getBoundingClientRect(), one.closest('.trends-head').getBoundingClientRect()];
+  return at.right > head.right + 0.5 || at.bottom > head.bottom + 0.5;
+}).map((one) => one.textContent)"""
+
+
+@pytest.mark.gate
+async def test_no_value_of_the_trends_is_cut_on_a_narrow_phone(phone: Phone, canned: Canned) -> None:
+    """With the lowest and the highest at the cursor, they are longest."""
+    page = phone.page
+    await page.set_viewport_size({"width": 360, "height": 740})
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    await page.evaluate("dispatchEvent(new CustomEvent('catgraph-open', { detail: { screen: 'trends' } }))")
+    await expect(page.locator(".trends-strip .line")).to_have_attribute("d", re.compile("M.*M"))
+    over = await page.locator(".trends-panes .u-over").first.bounding_box()
+    assert over is not None
+    await page.touchscreen.tap(over["x"] + 0.6 * over["width"], over["y"] + 20)
+    await expect(page.locator(".trends-pane[data-then]")).to_have_count(4)
+    await expect(page.locator(".trends-pane .v").first).to_contain_text(" to ")
+    for width, height in ((360, 740), (360, 640), (320, 640), (375, 667), (412, 915)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await phone.drawn()
+        assert await page.evaluate(OUTSIDE) == [], (width, height)
+
+
 @pytest.mark.gate
 async def test_the_default_of_a_limit_stands_clear_of_its_thumb_and_its_ends(phone: Phone, canned: Canned) -> None:
     await phone.open(f"{canned.address}/#settings")
@@ -140,3 +241,73 @@ async def test_no_line_crosses_the_gauge_of_a_phone_on_its_side(phone: Phone, ca
     slot = phone.page.locator("#monitor > .ledge > .fresh-slot")
     await expect(slot).to_be_attached()
     assert await slot.evaluate("(one) => one.offsetHeight") == 0
+
+
+@pytest.mark.gate
+async def test_the_gauge_of_a_phone_on_its_side_stays_whole_at_the_end_of_home(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 740, "height": 360})
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    await expect(page.locator("link[href$='drawers.css']")).to_be_attached()
+    await page.wait_for_function("() => document.querySelector('link[href$=\"drawers.css\"]').sheet")
+    home = page.locator("[data-panel=home]")
+    assert await home.evaluate("one => { one.scrollTo(0, 9999); return one.scrollTop; }") > 100
+    await page.evaluate(DRAWN)
+    cut = """() => {
+      const box = (one) => document.querySelector(one).getBoundingClientRect();
+      const [view, gauge] = ['#monitor > .view', '.gauge'].map(box);
+      return Math.max(view.top - gauge.top, gauge.bottom - view.bottom);
+    }"""
+    assert await page.evaluate(cut) <= 0
+
+
+#: How far the plate over stale values reaches out of its place, at the top and at the foot [px].
+PLATE = """() => {
+  const box = (one) => document.querySelector(`#monitor ${one}`).getBoundingClientRect();
+  const [veil, plate] = ['.veil', '.veil .plate'].map(box);
+  return [veil.top - plate.top, plate.bottom - veil.bottom];
+}"""
+
+
+@pytest.mark.gate
+async def test_stale_is_read_whole_on_a_small_phone(phone: Phone, canned: Canned) -> None:
+    """Under the line of the sound its title is, and the rest scrolls."""
+    page = phone.page
+    canned.state = silent_car(live())
+    await page.set_viewport_size({"width": 320, "height": 640})
+    await phone.open(f"{canned.address}/#home")
+    await expect(phone.f("veil")).to_have_attribute("data-on", "values")
+    await expect(phone.f("sound-off")).to_be_visible()
+    assert (await page.evaluate(PLATE))[0] <= 0
+    await phone.f("sound-off").tap()
+    await expect(phone.f("sound-off")).to_be_hidden()
+    for width, height in ((320, 640), (360, 640), (360, 740), (320, 568)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.evaluate(DRAWN)
+        top, foot = await page.evaluate(PLATE)
+        assert top <= 0, (width, height)
+        assert foot <= 1 or height < 600, (width, height)
+
+
+#: Keys and fields that reach out of the window, or that show less than all of their words.
+SHORT = """(panel) => [...document.querySelectorAll(`#panel-${panel} :is(button, input, select, a)`)].filter((one) => {
+  if (!one.checkVisibility() || one.matches('.unseen, [type=range]')) return false;
+  const at = one.getBoundingClientRect();
+  if (at.right > innerWidth + 1 || at.left < -1) return true;
+  if (!one.matches('[type=search]')) return false;
+  const pen = document.createElement('canvas').getContext('2d');
+  pen.font = getComputedStyle(one).font;
+  return pen.measureText(one.placeholder).width > one.clientWidth;
+}).map((one) => one.placeholder ?? one.textContent.trim())"""
+
+
+@pytest.mark.gate
+async def test_search_and_keys_are_read_whole_at_150_percent(phone: Phone, canned: Canned) -> None:
+    """A phone of 360 px has 240 then."""
+    await phone.page.set_viewport_size({"width": 240, "height": 493})
+    for panel, part in (("settings", ".find input"), ("files", ".files-find input")):
+        await phone.open("about:blank")
+        await phone.open(f"{canned.address}/#{panel}")
+        await expect(phone.page.locator(f"#panel-{panel} {part}")).to_be_visible()
+        assert await phone.page.evaluate(SHORT, panel) == [], panel

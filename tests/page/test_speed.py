@@ -11,6 +11,7 @@ import pytest_asyncio
 from playwright.async_api import expect
 
 from tests.page import drives
+from tests.page.canned import Canned
 from tests.page.conftest import Phone
 from tests.page.main_thread import heap_bytes, measure
 from tests.page.processes import replay, running, server
@@ -51,6 +52,43 @@ async def shown(phone: Phone, address: str, tab: str) -> None:
     else:
         await phone.page.locator("[data-trend=brake]").scroll_into_view_if_needed()
     await phone.page.wait_for_timeout(1500)
+
+
+#: What runs now of what only the main thread can animate: it has a picture for it 60 times a second.
+BUSY = """() => document.getAnimations().filter(({ playState, effect }) => {
+  const others = ['offset', 'computedOffset', 'easing', 'composite'];
+  const drawn = ['opacity', 'transform', 'translate', 'rotate', 'scale'];
+  const names = effect.getKeyframes().flatMap((one) => Object.keys(one)).filter((one) => !others.includes(one));
+  const isMoving = playState === 'running' && effect.getComputedTiming().progress !== null;
+  return isMoving && names.some((one) => !drawn.includes(one));
+}).map((one) => one.animationName ?? one.transitionProperty)"""
+
+
+@pytest.mark.gate
+async def test_nothing_is_animated_by_the_main_thread_while_all_is_well(phone: Phone, canned: Canned) -> None:
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    await phone.drawn()
+    assert await phone.page.evaluate("document.getAnimations().length") > 1
+    assert await phone.page.evaluate(BUSY) == []
+
+
+#: From now on, how often a picture is requested.
+COUNT = """() => {
+  window.pictures = 0;
+  const request = window.requestAnimationFrame.bind(window);
+  window.requestAnimationFrame = (draw) => {
+    window.pictures += 1;
+    return request(draw);
+  };
+}"""
+
+
+async def test_a_frame_costs_few_pictures(phone: Phone, street: str) -> None:
+    await shown(phone, street, "desk")
+    await phone.page.evaluate(COUNT)
+    await phone.drawn(30)  # five a second, of ten frames
+    assert await phone.page.evaluate("window.pictures") <= 30 * 5
 
 
 @pytest.mark.parametrize("tab", SHARE)

@@ -64,7 +64,7 @@ async def test_a_gap_says_it_on_the_veil_on_the_sheet_and_in_the_log(phone: Phon
     canned.silent = True
     await expect(phone.f("veil-then")).to_have_text(re.compile(r"4\.2 m/s.*, ≤ \d\d\.\d km unseen$"), timeout=15_000)
     await expect(phone.page.locator('#sheet-lost [data-f="more"]')).to_have_text(
-        re.compile(r"Since the last value: ≤ \d\d\.\d km unseen\.$"), timeout=15_000
+        re.compile(r"Last known: 4\.2 m/s.*, ≤ \d\d\.\d km unseen\.$"), timeout=15_000
     )
     canned.silent = False
     await phone.live()

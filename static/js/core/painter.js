@@ -4,8 +4,10 @@ import { Drawing } from './drawing.js';
 
 /** Digits change at most five times a second. */
 export const DRAW_EVERY_MS = 200;
-/** What moves, moves for so long from one frame to the next (instruments.css): a new aim sooner would only cost [ms]. */
+/** A new aim of what moves, sooner than from one frame to the next, would only cost; the move takes a little longer (instruments.css): each that ends before the next aim costs a picture too [ms]. */
 const MOVE_EVERY_MS = 95;
+/** What is drawn in turn takes no longer of one picture, but for the last of it: each picture has its own costs of style, layout and layers [ms]. */
+const TURNS_MS = 4;
 /** While frames come so close after each other they set the pace of drawing, after that a timer does [ms]. */
 const FED_MS = 300;
 
@@ -21,8 +23,9 @@ export class Painter {
   #isMoved = false;
   #urgent = '';
   #isUrgent = false;
-  /** What waits for a picture of its own. @type {Set<() => void>} */
+  /** What waits for one of the next pictures. @type {Set<() => void>} */
   #turns = new Set();
+  #isTurning = false; // a picture for them is requested
   #emitter;
 
   /** @param {import('./emitter.js').Emitter<import('./store.js').Topic>} emitter gets `move`, `draw` and `drawn` */
@@ -35,19 +38,26 @@ export class Painter {
     requestAnimationFrame(() => this.#emitter.guard(draw));
   }
 
-  /** Draw with a picture of its own, after those that wait: together they would take longer than one picture. @param {() => void} draw */
+  /** Draw with one of the next pictures, after those that wait: all together they may take longer than one picture. @param {() => void} draw */
   inTurn(draw) {
     this.#turns.add(draw);
-    if (this.#turns.size === 1) this.#turn();
+    if (!this.#isTurning) this.#turn();
   }
 
   #turn() {
+    this.#isTurning = true;
     this.picture(() => {
-      const [draw] = this.#turns;
-      if (!draw) return;
-      this.#turns.delete(draw);
-      if (this.#turns.size) this.#turn();
-      draw();
+      const ends_ms = performance.now() + TURNS_MS;
+      try {
+        for (const draw of this.#turns) {
+          this.#turns.delete(draw);
+          draw();
+          if (performance.now() >= ends_ms) break;
+        }
+      } finally {
+        this.#isTurning = this.#turns.size > 0;
+        if (this.#isTurning) this.#turn();
+      }
     });
   }
 
@@ -84,6 +94,7 @@ export class Painter {
     this.undrawn?.show();
     this.#isMoved = false; // a picture that was asked for may never come
     this.#turns.clear();
+    this.#isTurning = false;
   }
 
   /** Without frames a timer sets the pace. @param {number} now_ms @param {number} heard_ms when the last fresh frame came */

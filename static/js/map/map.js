@@ -110,7 +110,7 @@ class MapTab {
     const { car, phone } = this.#learn(store.frame);
     map.steer(car, phone, this.ground.middle);
     map.move(from, car.place, store.now());
-    this.#drawSoon();
+    this.draw();
   }
 
   /** @param {import('../core/protocol-types.js').State} frame */
@@ -170,7 +170,7 @@ class MapTab {
     if (!this.isShown() || !store.frame) return;
     if (this.known) this.#learn(store.frame);
     else this.look();
-    this.#drawSoon();
+    this.draw();
     if (!this.known) return;
     show(at('none'), !map.isPlaced);
     this.panel.draw(this.known, map.isTooFar);

@@ -8,6 +8,7 @@ import { Meant } from '../core/meant.js';
 import { isAsked } from './sheet.js';
 import { shownIn } from '../core/units.js';
 import { unseenOf, unseenWords } from '../core/unseen.js';
+import { thenWords } from './veil.js';
 import { dialogWords } from '../alarms/standing.js';
 import { keysOf, silentWords } from '../alarms/alarms-layout.js';
 import { age, counted, fixed, timeOfDay } from '../core/format.js';
@@ -263,8 +264,8 @@ function fillLink(sheet, kind, store) {
     text.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
     text.dataset['shown'] = key;
   }
-  const way = kind === 'lost' ? unseenWords(unseenOf(store)) : '';
-  setWords(field(sheet, 'more'), way ? `${more} Since the last value: ${way}.` : more);
+  const then = kind === 'lost' ? [thenWords(store.frame), unseenWords(unseenOf(store))].filter(Boolean).join(', ') : '';
+  setWords(field(sheet, 'more'), then ? `${more} Last known: ${then}.` : more);
 }
 
 /**
