@@ -21,7 +21,7 @@ const LIST_GONE = 'The list of marks could not be loaded from the server. Marks 
  * @param {Say} say
  */
 export async function mount(monitor, store, say) {
-  await styled('drive');
+  await Promise.all([styled('drive'), styled('mode')]);
   return new Ledge(monitor, store, say);
 }
 

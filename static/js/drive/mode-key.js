@@ -2,7 +2,6 @@
 
 import { html, icon, listen, setAttribute, setText, show, svg } from '../core/dom.js';
 import { modeWords } from './mode-words.js';
-import { styled } from '../core/style-sheet.js';
 
 /** @typedef {import('../core/store.js').Store} Store */
 /** @typedef {(sentence: string, title?: string) => void} Say */
@@ -20,7 +19,6 @@ const GONE = 'This part of the page could not be loaded from the server. The int
  * @returns {() => void}
  */
 export function mountMode(place, store, say) {
-  void styled('mode');
   const label = html('div', { class: 'mode', 'data-f': 'mode-label' });
   const key = html('button', { type: 'button', class: 'mode', 'data-f': 'mode-key', 'data-operator': '' });
   const faces = [new Face(label), new Face(key)];
