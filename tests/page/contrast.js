@@ -1,6 +1,16 @@
 // @ts-nocheck evaluated in the page by test_contrast.py: each text in sight with its contrast against what is painted under it; the worst first.
 () => {
-  const rgb = (text) => text.match(/[\d.]+/g).map(Number);
+  const rgb = (text) => {
+    if (!/^rgba?\(/.test(text)) throw new Error(`not a colour in rgb: ${text}`);
+    return text.match(/[\d.]+/g).map(Number);
+  };
+  /** A colour that lets `under` through. */
+  const over = ([r, g, b, share = 1], under) => [r, g, b].map((c, n) => c * share + under[n] * (1 - share));
+  const opacity = (one) => {
+    let share = 1;
+    for (let at = one; at; at = at.parentElement) share *= Number(getComputedStyle(at).opacity);
+    return share;
+  };
   const light = ([r, g, b]) => [r, g, b].map((c) => c / 255)
     .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4))
     .reduce((sum, c, n) => sum + c * [0.2126, 0.7152, 0.0722][n], 0);
@@ -28,7 +38,9 @@
   const note = (one, text, style) => {
     const ink = rgb(one instanceof SVGElement ? style.fill : style.color);
     const part = one.closest('.gauge') ? 'gauge' : one.closest('.rail, .ledge') ? 'rail' : '';
-    found.push({ ratio: ratio(ink, ground(one, style)), text: text.trim(), ink: one.dataset.ink ?? '', part });
+    const under = ground(one, style);
+    const [r, g, b, share = 1] = ink;
+    found.push({ ratio: ratio(over([r, g, b, share * opacity(one)], under), under), text: text.trim(), ink: one.dataset.ink ?? '', part });
   };
   for (const root of document.querySelectorAll('#monitor, dialog[open], .snacks')) {
     const walk = document.createTreeWalker(root, NodeFilter.SHOW_TEXT);

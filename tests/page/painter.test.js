@@ -12,7 +12,7 @@ function studio(failed = (error) => { throw error; }) {
   return { painter, due, picture: () => due.splice(0).forEach((draw) => draw()) };
 }
 
-test('what is drawn in turn takes so long of a picture, the rest comes with the next, in the order in which it asked', (context) => {
+test('what is drawn in turn takes so long of a picture, the rest comes with the next, in the order of the requests', (context) => {
   const { painter, picture } = studio();
   let now_ms = 0;
   context.mock.method(performance, 'now', () => now_ms);

@@ -5,7 +5,7 @@ import { armWords, bare, dialled, foundIn, isSameCar, remembered } from '../../s
 import { screenOf } from '../../static/js/shell/router.js';
 import { details, headline, kindWords } from '../../static/js/home/signals.js';
 import { tabByHash, tabByKey } from '../../static/js/shell/tabs.js';
-import { savedWords } from '../../static/js/shell/dialogs.js';
+import { lastKnown, savedWords } from '../../static/js/shell/dialogs.js';
 import { recordingWords } from '../../static/js/shell/topbar.js';
 import { thenWords } from '../../static/js/shell/veil.js';
 import { state } from './frames.js';
@@ -110,5 +110,10 @@ test('recording and last values', () => {
   assert.equal(savedWords({ state: 'recording', for_s: 9, saved }), '', 'what is not saved is not said to be');
   assert.equal(savedWords({ state: 'off', for_s: null, saved }), '');
   assert.equal(thenWords(state({ signals: { speed: { value: { speed_mps: 4.2 } }, distance: { value: { distance_m: 12.4 } } } })), '4.2 m/s, object at 12.4 m');
-  assert.equal(thenWords(null), 'nothing');
+  assert.equal(thenWords(null), '');
+  const known = { speed: { value: { speed_mps: 4.2 } } };
+  const store = (/** @type {object} */ frame) => /** @type {any} */ ({ frame, signal: (/** @type {string} */ name) => state(frame).signals[name], ink: () => ({ age_s: 1 }), limit: () => 2 });
+  assert.equal(lastKnown(store(state({ signals: known }))), ' Last known: 4.2 m/s, ≤ 5.2 m unseen.');
+  assert.equal(lastKnown(store(state({ signals: {} }))), '', 'nothing is known');
+  assert.equal(lastKnown(store(state({ signals: known, replay: {} }))), '', 'a recording has no car of now');
 });

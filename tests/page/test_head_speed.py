@@ -10,7 +10,7 @@ from playwright.async_api import expect
 
 from tests.page.canned import Canned, live
 from tests.page.conftest import Phone
-from tests.page.screenshots import silent_car
+from tests.page.screenshots import replayed, replayed_timeline, silent_car
 from tests.page.touch import DRAWN
 
 TITLED = ("departure", "log", "trends", "signals")
@@ -71,6 +71,16 @@ async def test_a_screen_shows_the_speed_on_a_tablet_and_a_desktop_too(phone: Pho
             await page.evaluate(DRAWN)
             assert await page.evaluate(IN_SIGHT) == {"isRead": True, "under": []}, (name, width, height)
             assert await page.locator("#monitor > .titlebar").evaluate(LOST) == [], (name, width, height)
+
+
+@pytest.mark.gate
+async def test_no_speed_of_a_recording_stands_in_a_head(phone: Phone, canned: Canned) -> None:
+    canned.state, canned.timeline = replayed(live()), replayed_timeline()
+    await phone.page.goto(f"{canned.address}/?replay=car_0&t=246#home")
+    await phone.page.wait_for_selector("#monitor:not([hidden])")
+    await phone.page.evaluate(OPEN, "log")
+    await expect(phone.page.locator("#monitor > .titlebar")).to_contain_text("Alarm log of the live car")
+    await expect(phone.page.locator("#monitor > .titlebar .head-speed")).to_be_hidden()
 
 
 @pytest.mark.gate

@@ -56,7 +56,10 @@ export function mount(root, { store, say, isFront }) {
     listen(at('fit'), 'click', () => tab.choose(() => map.choose(map.mode === 'both' ? 'follow' : 'both'))),
     listen(at('follow'), 'click', () => tab.choose(() => map.choose(map.mode === 'follow' ? 'free' : 'follow'))),
     listen(at('north'), 'click', () => tab.choose(() => map.turnNorth(tab.known?.car))),
-    store.on('move', () => tab.look()),
+    store.on('move', () => {
+      tab.look();
+      if (isFront()) tab.draw();
+    }),
     store.on('draw', () => store.painter.inTurn(read)),
     store.on('switch', () => tab.forget()),
   ];
@@ -102,7 +105,7 @@ class MapTab {
     this.press();
   }
 
-  /** Reads the frame and moves the map to what it shows. */
+  /** Reads the frame and moves the map to what it shows; to be drawn after it. */
   look() {
     const { map, store } = this;
     if (!this.isShown() || !store.frame) return;
@@ -110,7 +113,6 @@ class MapTab {
     const { car, phone } = this.#learn(store.frame);
     map.steer(car, phone, this.ground.middle);
     map.move(from, car.place, store.now());
-    this.draw();
   }
 
   /** @param {import('../core/protocol-types.js').State} frame */
@@ -183,14 +185,15 @@ class MapTab {
     change();
     this.press();
     this.look();
+    this.#drawSoon();
   }
 
   /** Shows a view that the operator chose. @param {import('./map-layout.js').View} view */
   moveTo(view) {
     this.map.set(view);
     this.press();
-    if (this.map.isFree) this.#drawSoon();
-    else this.look();
+    if (!this.map.isFree) this.look();
+    this.#drawSoon();
   }
 
   /** Zooms about a point; what is followed stays in the middle. @param {number} factor @param {number} [dx] @param {number} [dy] from the middle [px] */

@@ -264,8 +264,17 @@ function fillLink(sheet, kind, store) {
     text.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
     text.dataset['shown'] = key;
   }
-  const then = kind === 'lost' ? [thenWords(store.frame), unseenWords(unseenOf(store))].filter(Boolean).join(', ') : '';
-  setWords(field(sheet, 'more'), then ? `${more} Last known: ${then}.` : more);
+  setWords(field(sheet, 'more'), kind === 'lost' ? more + lastKnown(store) : more);
+}
+
+/**
+ * What was last known of the car, as a further sentence; none of a recording's values, which are no car's of now.
+ * @param {import('../core/store.js').Store} store
+ */
+export function lastKnown(store) {
+  const { frame } = store;
+  const then = frame && !frame.replay ? thenWords(frame) : '';
+  return then ? ` Last known: ${[then, unseenWords(unseenOf(store))].filter(Boolean).join(', ')}.` : '';
 }
 
 /**

@@ -154,7 +154,7 @@ export class Screens {
     this.onChange(this.open);
   }
 
-  /** One with a head of its own leaves the tabs in sight; so does any where it is a drawer among the panes. */
+  /** One with a head of its own leaves the tabs in sight; so does any beside the panes of a desktop. */
   #showHead() {
     const screen = this.open === null ? undefined : SCREENS[this.open];
     const isTitled = screen !== undefined && !screen.hasHead;

@@ -12,7 +12,7 @@ import { age, fixed, timeOfDay } from '../core/format.js';
 const RECORDED = { recording: 'it was recording', held: 'saved', saving: 'it was being saved', stopped: 'it had stopped' };
 
 /**
- * The last values, told as what they are.
+ * The last values; empty where there are none.
  * @param {import('../core/protocol-types.js').State | null} frame
  */
 export function thenWords(frame) {
@@ -21,7 +21,7 @@ export function thenWords(frame) {
   const parts = [];
   if (typeof speed_mps === 'number') parts.push(speedWords(speed_mps).join(' '));
   if (typeof distance_m === 'number') parts.push(`object at ${fixed(distance_m)} m`);
-  return parts.join(', ') || 'nothing';
+  return parts.join(', ');
 }
 
 /**
@@ -73,7 +73,7 @@ export function mount(root, store) {
       sentence.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
       written = `${bold}|${plain}`;
     }
-    setWords(then, [thenWords(store.frame), store.frame ? unseenWords(unseenOf(store)) : ''].filter(Boolean).join(', '));
+    setWords(then, [thenWords(store.frame) || 'nothing', store.frame ? unseenWords(unseenOf(store)) : ''].filter(Boolean).join(', '));
     const recording = RECORDED[store.frame?.recording.state ?? 'off'] ?? '';
     setText(rec, recording);
     for (const part of [recName, rec]) show(part, recording !== '');

@@ -121,6 +121,7 @@ async def test_a_command_for_an_earlier_run_is_refused() -> None:
                 wire.Answer, (await client.request(wire.subject("ocelot", "ask"), wire.encode(stale), timeout=5)).data
             )
             assert answer.refused == "ocelot has started again since the command was given"
+            await until(lambda: page.run("ocelot") == "run-2")
             assert (await page.request("ocelot", {"what": 3}))["got"] == 3
         assert [one["what"] for one in both.commands] == [1, 3]
 
