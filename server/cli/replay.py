@@ -92,7 +92,8 @@ class Report:
         say(f"Played {_counted(self._played, 'message')} in {took_s:.1f} s: {fate}.")
         for topic, count in sorted(self._recording.rejected.items()):
             why = self._recording.why_rejected[topic]
-            say(f"  Note: {_counted(count, 'message')} on {topic} left out: {why}")
+            what = f"{_counted(count, 'message')} on {topic}"
+            say(f"  Note: {what} could not be decoded for clients of JSON, CBOR or png: {why}")
         for sentence in self._recording.damage:
             say(f"  Note: {sentence}")
 

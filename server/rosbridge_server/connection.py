@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import socket
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -10,6 +11,8 @@ from typing import Any, Protocol
 from websockets.asyncio.server import Server, ServerConnection
 from websockets.protocol import State
 from websockets.server import ServerProtocol
+
+_log = logging.getLogger("catgraph.bridge")
 
 HANDSHAKE_S = 10.0  # a socket that has not become a WebSocket by then is closed
 LARGEST_BUFFER = 4_000_000  # bytes of pongs: beyond, the peer floods us with pings and does not read
@@ -45,7 +48,11 @@ class WriteTogether:
         self.is_open = False
         connections, self._connections = self._connections, []
         for connection in connections:
-            connection.write_together()
+            try:
+                connection.write_together()
+            except Exception:  # one client's connection; the others get theirs
+                connection.transport.abort()
+                _log.exception("A client's connection failed while messages were written to it")
 
 
 class Connection(ServerConnection):

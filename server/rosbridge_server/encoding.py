@@ -207,8 +207,9 @@ class Outgoing:
         """The time of sending, the same for every client: secs and nsecs, whichever the version of ROS."""
         if self._stamp is None:
             now_s = self._bridge.now()
-            secs = int(now_s)
-            self._stamp = _STAMP.pack(secs, _RAW_NSECS, min(round((now_s - secs) * 1e9), 999_999_999))
+            secs = math.floor(now_s)
+            nsecs = min(round((now_s - secs) * 1e9), 999_999_999)
+            self._stamp = _STAMP.pack(min(max(secs, 0), 2**32 - 1), _RAW_NSECS, nsecs)
         return self._stamp
 
     def _as_text(self, topic: str) -> bytes:

@@ -127,8 +127,7 @@ class _Playing:
         self._on_message = on_message
         self._origin: tuple[float, float] | None = None  # recorded time and time of the clock
         self._turn_ends = time.monotonic() + TURN_S
-        self._batch: Sequence[Message] = ()
-        self._at = 0  # of the next message in the batch
+        self._batch: deque[Message] = deque()  # what is not published yet
         self._prepared: deque[Outgoing] = deque()  # the next messages
         self._timer: Timer | None = None
         self._played: asyncio.Future[None]
@@ -137,7 +136,7 @@ class _Playing:
         """Returns when the last message is published."""
         if self._origin is None:
             self._origin = batch[0].at_s, self._clock()
-        self._batch, self._at = batch, 0
+        self._batch = deque(batch)
         self._played = asyncio.get_running_loop().create_future()
         self._step()
         try:
@@ -151,6 +150,8 @@ class _Playing:
         self._step()
 
     def _step(self) -> None:
+        if self._played.done():  # cancelled: its timer may fire before the task wakes
+            return
         try:
             next_s = self._publish_due()
         except Exception as error:
@@ -165,15 +166,14 @@ class _Playing:
         """Publishes until nothing is due or the turn is over; returns the time until the next step, None at the end."""
         batch, prepared = self._batch, self._prepared
         with self._bridge.writing_together:
-            while self._at < len(batch) and self._wait_s() <= SOON_S:
+            while batch and self._wait_s() <= SOON_S:
                 if time.monotonic() > self._turn_ends:
                     return 0.0
-                message = batch[self._at]
+                message = batch.popleft()
                 self._bridge.publish(message.topic, prepared.popleft() if prepared else message.message)
-                self._at += 1
                 if self._on_message is not None:
                     self._on_message(message)
-        if self._at == len(batch):
+        if not batch:
             return None
         if not prepared:
             self._prepare()
@@ -181,7 +181,7 @@ class _Playing:
 
     def _prepare(self) -> None:
         """Encodes the next messages until one is due or the turn is over."""
-        for message in islice(self._batch, self._at, self._at + PREPARED):
+        for message in islice(self._batch, PREPARED):
             self._prepared.append(self._bridge.prepare(message.topic, message.message))
             if self._wait_s() <= SOON_S or time.monotonic() > self._turn_ends:
                 return
@@ -190,7 +190,7 @@ class _Playing:
         """Until the next message is due."""
         assert self._origin is not None
         first_at_s, began_s = self._origin
-        return began_s + (self._batch[self._at].at_s - first_at_s) / self._rate - self._clock()
+        return began_s + (self._batch[0].at_s - first_at_s) / self._rate - self._clock()
 
 
 async def _fetched(source: Iterator[T], ahead: int) -> AsyncGenerator[list[T], None]:

@@ -34,7 +34,7 @@ DEFAULTS: dict[int, dict[tuple[str, str], float]] = {
 
 
 class Lost(Exception):
-    """The message cannot be sent in an encoding. The text says why."""
+    """The message cannot be sent in an encoding; the text is the reason."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -134,7 +134,7 @@ async def test_each_part_of_a_recording_holds_the_kept_samples_once(tmp_path: Pa
         await drive(bridge, 2.0)
         for topic in (FUEL, MAP):
             bridge.renew(topic)
-        await drive(bridge, 2.0)
+        await drive(bridge, 3.0)  # three answers, each after a longer silence, take 2 s
         bridge.close()
         await asyncio.sleep(3.0)
         bridge.open()

@@ -24,26 +24,26 @@ class Layout:
 class RawMessage(Mapping[str, Any]):
     """The serialized message in the encoding of its ROS version. Reading fields raises Undecodable."""
 
-    __slots__ = ("_decode", "_fields", "_why", "layout", "raw")
+    __slots__ = ("_decode", "_fields", "_unreadable", "layout", "raw")
 
     def __init__(self, raw: bytes, decode: Callable[[bytes], Json], layout: Layout) -> None:
         self.raw = raw
         self.layout = layout
         self._decode = decode
         self._fields: Json | None = None
-        self._why: Undecodable | None = None  # a message is decoded once, also in vain
+        self._unreadable: str | None = None  # the reason; decoding is tried once
 
     @property
     def fields(self) -> Json:
         """The decoded message. Raises Undecodable."""
+        if self._unreadable is not None:
+            raise Undecodable(self._unreadable)
         if self._fields is None:
-            if self._why is None:
-                try:
-                    self._fields = self._decode(self.raw)
-                    return self._fields
-                except Undecodable as why:
-                    self._why = why
-            raise self._why
+            try:
+                self._fields = self._decode(self.raw)
+            except Undecodable as error:
+                self._unreadable = str(error)
+                raise
         return self._fields
 
     def __getitem__(self, name: str) -> Any:

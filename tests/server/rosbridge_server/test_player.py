@@ -136,6 +136,33 @@ async def test_cancelling_waits_for_the_reading_thread(numbers: RosBridge) -> No
     await asyncio.sleep(0.1)
 
 
+@pytest.mark.parametrize("count", [2, 3])
+async def test_nothing_is_published_after_cancelling_while_late(numbers: RosBridge, count: int) -> None:
+    """A timer may fire after the cancelling and before the task wakes, for the last message or an earlier one."""
+    wrong: list[object] = []
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(lambda _, context: wrong.append(context))
+    played: list[Message] = []
+    timers: list[Callable[[], None]] = []
+
+    def call_later(_: float, callback: Callable[[], None]) -> asyncio.Handle:
+        timers.append(callback)
+        return loop.call_soon(lambda: None)
+
+    watch = Watch(late_s=0.0)
+    playing = asyncio.ensure_future(
+        play(drive(count), numbers, clock=watch, call_later=call_later, ahead=16, on_message=played.append)
+    )
+    while not timers:
+        await asyncio.sleep(0)
+    watch.now_s += 0.01  # the second one is due
+    loop.call_soon(timers.pop())  # before the task wakes
+    playing.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await playing
+    assert (len(played), timers, wrong) == (1, [], [])
+
+
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan")])
 async def test_a_senseless_rate_is_refused(numbers: RosBridge, rate: float) -> None:
     with pytest.raises(ValueError, match="rate must be above 0"):

@@ -53,8 +53,8 @@ async def test_recorded_bytes_are_sent_as_they_are_and_not_decoded(bridge: RosBr
         for one in (probe, other):
             await one.subscribe("/n", compression="cbor-raw")
         bridge.publish("/n", recorded.message(7))
-        heard = [await one.hear_raw() for one in (probe, other)]
-    assert heard[0] == heard[1], "the same bytes for every client"
+        received = [await one.hear_raw() for one in (probe, other)]
+    assert received[0] == received[1], "the same bytes for every client"
     bridge.publish("/n", recorded.message(8))
     assert (await probe.hear())["msg"]["bytes"] == bytes_of(8)
     assert recorded.decoded == 0
@@ -88,11 +88,11 @@ async def test_a_message_that_cannot_be_decoded_is_reported_and_the_next_one_com
             for at, number in enumerate(numbers)
         ]
         assert await play(messages, bridge, ahead=ahead) == 4
-        heard = [await probe.hear() for _ in range(3)]
+        received = [await probe.hear() for _ in range(3)]
         assert [(await raw.hear())["msg"]["bytes"] for _ in numbers] == [bytes_of(number) for number in numbers]
-    assert [one["op"] for one in heard] == ["publish", "status", "publish"]
-    assert heard[1]["msg"] == "subscribe: /n cannot be sent as json: it is negative"
-    assert heard[2]["msg"] == {"data": 4}
+    assert [one["op"] for one in received] == ["publish", "status", "publish"]
+    assert received[1]["msg"] == "subscribe: /n cannot be sent as json: it is negative"
+    assert received[2]["msg"] == {"data": 4}
     assert recorded.decoded == 4, "each once, also in vain"
 
 
@@ -120,9 +120,9 @@ async def test_what_is_sent_late_has_the_time_of_sending(bridge: RosBridge, prob
         Message(at_s=float(at), topic="/n", type="std_msgs/Int32", message=recorded.message(at)) for at in range(5)
     ]
     await play(messages, bridge, ahead=8, on_message=played.append)
-    heard = [(await probe.hear())["msg"] for _ in messages]
-    assert [(one["secs"], one["nsecs"]) for one in heard] == [(1_000 + at, 0) for at in range(5)]
-    assert [one["bytes"] for one in heard] == [bytes_of(at) for at in range(5)]
+    received = [(await probe.hear())["msg"] for _ in messages]
+    assert [(one["secs"], one["nsecs"]) for one in received] == [(1_000 + at, 0) for at in range(5)]
+    assert [one["bytes"] for one in received] == [bytes_of(at) for at in range(5)]
 
 
 def stamped(at_s: float) -> tuple[float, str, str, dict[str, Any]]:
@@ -149,10 +149,10 @@ async def test_a_drive_is_the_same_in_every_encoding(tmp_path: Path, version: Ro
             bridge.advertise(topic, info.type, info.definition)
             await probe.subscribe(topic, compression="cbor-raw")
         await play(raw, bridge, ahead=8)
-        heard = [await probe.hear() for _ in raw]
-    assert [one["msg"]["bytes"] for one in heard] == files
+        received = [await probe.hear() for _ in raw]
+    assert [one["msg"]["bytes"] for one in received] == files
     read = store.deserialize_ros1 if version == 1 else store.deserialize_cdr
-    point: Any = read(heard[2]["msg"]["bytes"], "geometry_msgs/msg/PointStamped")
+    point: Any = read(received[2]["msg"]["bytes"], "geometry_msgs/msg/PointStamped")
     assert (point.header.stamp.sec, point.header.frame_id, point.point.z) == (100, "map", 3.0)
 
 

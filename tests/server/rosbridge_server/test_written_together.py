@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from server.judge.message import Message
-from server.rosbridge_server.connection import TOGETHER_BYTES, Connection
+from server.rosbridge_server.connection import TOGETHER_BYTES, Connection, WriteTogether
 from server.rosbridge_server.listener import WRITE_LIMIT
 from server.rosbridge_server.player import play
 from server.rosbridge_server.server import RosBridge
@@ -89,9 +90,9 @@ async def test_a_client_that_does_not_read_is_as_slow_as_without_a_block(
     assert WRITE_LIMIT < watched.largest_buffer < WRITE_LIMIT + 2 * TOGETHER_BYTES
     assert bridge.dropped > 0, "the rest waits within the client's limit"
     probe.socket.transport.resume_reading()
-    heard = [int((await probe.hear())["msg"]["data"].split()[0]) for _ in range(20_000 - bridge.dropped)]
-    assert heard == sorted(heard)
-    assert heard[-1] == 19_999
+    received = [int((await probe.hear())["msg"]["data"].split()[0]) for _ in range(20_000 - bridge.dropped)]
+    assert received == sorted(received)
+    assert received[-1] == 19_999
 
 
 async def test_who_subscribes_after_a_message_was_encoded_gets_it_too(
@@ -103,8 +104,29 @@ async def test_who_subscribes_after_a_message_was_encoded_gets_it_too(
     assert (await probe.hear())["msg"] == {"data": 0}
     async with probing(port) as late:
         await late.send(op="subscribe", topic="/n", compression="cbor")
-        heard = [await late.hear() for _ in range(3)]
+        received = [await late.hear() for _ in range(3)]
     await playing
-    first = heard[0]["msg"]["data"]
+    first = received[0]["msg"]["data"]
     assert first < 3
-    assert [one["msg"]["data"] for one in heard] == [first, first + 1, first + 2]
+    assert [one["msg"]["data"] for one in received] == [first, first + 1, first + 2]
+
+
+def test_a_connection_that_fails_does_not_keep_the_others_from_writing() -> None:
+    class One:
+        def __init__(self, *, fails: bool) -> None:
+            self.fails = fails
+            self.written = 0
+            self.transport = SimpleNamespace(abort=lambda: setattr(self, "is_aborted", True))
+            self.is_aborted = False
+
+        def write_together(self) -> None:
+            if self.fails:
+                raise OSError("gone")
+            self.written += 1
+
+    together = WriteTogether()
+    first, second = One(fails=True), One(fails=False)
+    with together:
+        together.add(first)  # type: ignore[arg-type]
+        together.add(second)  # type: ignore[arg-type]
+    assert (first.is_aborted, second.written, second.is_aborted) == (True, 1, False)
