@@ -54,6 +54,7 @@ class DriveChart {
   #context = '';
   #drawn = ''; // what of the picture was drawn last
   #isOver = false;
+  #isShown = false; // by its size: to look would make the browser do its style and layout at once
   #turn = () => this.#isOver || this.#look();
   /** @type {import('./trends-layout.js').Spec[]} */
   #specs = [];
@@ -68,7 +69,8 @@ class DriveChart {
     element.append(this.brush.element);
     this.feed = new DriveFeed(store, () => this.#filled());
     this.panes = new Panes(plots, () => this.#scene());
-    this.resize = new ResizeObserver(() => {
+    this.resize = new ResizeObserver(([plot]) => {
+      this.#isShown = (plot?.contentRect.width ?? 0) > 0;
       this.panes.resize();
       this.#filled();
     });
@@ -159,7 +161,7 @@ class DriveChart {
     }
     this.#keepUp();
     this.feed.look();
-    if (this.parts.element.checkVisibility()) this.#draw();
+    if (this.#isShown) this.#draw();
   }
 
   /** Moves the view on with the drive, or with the moment of the replay. */
