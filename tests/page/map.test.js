@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { distance_m, offsetOf, placeAt } from '../../static/js/core/geodesy.js';
 import {
-  CLOSEST, FIRST, WIDEST, between, bounded, clearTop, ellipseOf, fitted, gridPaths, gridStep_m, groundMatrix, metresOf, overlap, panned, pictureMatrix, pixelOf, scaleBar_m, tileScale,
+  CLOSEST, FIRST, WIDEST, between, bounded, clearBox, clearTop, ellipseOf, fitted, gridPaths, gridStep_m, groundMatrix, metresOf, overlap, panned, pictureMatrix, pixelOf, scaleBar_m, tileScale,
   upOf, zoomed,
 } from '../../static/js/map/map-layout.js';
 import { besideWay, inside } from '../../static/js/map/map-figure.js';
@@ -358,6 +358,21 @@ test('words stand where nothing is taken, as near to their place as can be, or n
   assert.equal(clearTop({ ...words, top: 2 }, [keys, head], 130), 29);
   assert.equal(clearTop(words, [{ left: 0, top: 0, width: 400, height: 130 }], 130), null);
   assert.equal(clearTop({ ...words, left: 10 }, [keys, head], 130), 90); // beside the keys
+});
+
+test('a name that finds no room near its place stands beside its mark, right of it before left', () => {
+  const size = { width: 360, height: 130 };
+  const mark = { left: 164, top: 84, width: 32, height: 32 };
+  const name = { left: 135, top: 122, width: 90, height: 19 }; // below the mark there is no room for it
+  const sides = [196, 74].map((left) => ({ ...name, left, top: 90.5 }));
+  assert.deepEqual(clearBox({ ...name, top: 60 }, sides, [mark], size), { ...name, top: 60 });
+  const above = { left: 0, top: 0, width: 360, height: 60 };
+  assert.deepEqual(clearBox({ ...name, top: 99 }, sides, [mark, above], size)?.top, 64); // a line above its mark
+  const heads = { left: 0, top: 0, width: 360, height: 83 };
+  assert.deepEqual(clearBox(name, sides, [mark, heads], size), sides[0]);
+  const keys = { left: 240, top: 60, width: 120, height: 70 };
+  assert.deepEqual(clearBox(name, sides, [mark, heads, keys], size), sides[1]);
+  assert.equal(clearBox(name, sides, [mark, heads, keys, { left: 0, top: 60, width: 164, height: 70 }], size), null);
 });
 
 test('the bar of the scale keeps to the room that the keys leave', () => {

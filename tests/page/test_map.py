@@ -423,6 +423,36 @@ async def test_no_width_breaks_the_map(phone: Phone, canned: Canned) -> None:
             assert box["y"] + box["height"] <= place["y"] + place["height"], (width, height)
 
 
+COVERED = """() => {
+  const at = (one) => [one, document.querySelector(`#panel-map ${one}`)?.getBoundingClientRect()];
+  const names = ['.name:nth-of-type(1)', '.name:nth-of-type(2)', '.beside'].map(at);
+  const marks = ['.car-mark', '.phone-mark'].map(at);
+  const over = ['.fabs', '.compass', '.map-by'].map(at);
+  const pairs = [...[...names, ...marks].flatMap((one) => over.map((other) => [one, other])), ...names.flatMap((one) => marks.map((other) => [one, other]))];
+  return pairs.filter(([[, a], [, b]]) => a?.width && b?.width && a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 1 && b.top < a.bottom - 1)
+    .map(([[a], [b]]) => `${a} under ${b}`);
+}"""
+
+
+@pytest.mark.parametrize("size", [(360, 740), (412, 915), (820, 1180), (1440, 900)])
+async def test_car_phone_and_their_names_stand_clear_of_keys_and_each_other(
+    phone: Phone, canned: Canned, size: tuple[int, int]
+) -> None:
+    canned.ground["layers"] = [
+        {"title": "Plan", "tiles": "/map/{z}/{x}/{y}", "min_zoom": 0, "max_zoom": 19,
+         "attribution": "Plan: test track", "bounds": [-180, -85, 180, 85]}
+    ]  # fmt: skip
+    canned.tile = lambda z, x, y: png(176, 190, 168)
+    await phone.page.set_viewport_size({"width": size[0], "height": size[1]})
+    await phone.open(f"{canned.address}/#map")
+    await phone.live()
+    it = Map(phone)
+    for mark in (".car-mark", ".phone-mark"):
+        await expect(it.svg(mark)).to_be_visible(timeout=12_000)
+    await expect(it.f("by")).to_have_text("Plan: test track")
+    await it.until(f"() => ({COVERED})().length === 0")
+
+
 # -- the ground --------------------------------------------------------------------------------------------------------
 
 

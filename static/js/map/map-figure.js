@@ -4,7 +4,7 @@
 import { offsetOf, placeAt, turned } from '../core/geodesy.js';
 import { setAttribute, svg } from '../core/dom.js';
 import { distanceWords } from '../core/format.js';
-import { clearTop, gridPaths, groundMatrix, overlap, pixelOf, round, scaleBar_m, turnedPixels } from './map-layout.js';
+import { clearBox, clearTop, gridPaths, groundMatrix, overlap, pixelOf, round, scaleBar_m, turnedPixels } from './map-layout.js';
 import { OtherPhones } from './map-others.js';
 import { trackPaths } from './map-track.js';
 import { bearingWords } from './map-text.js';
@@ -35,7 +35,7 @@ const KEYS_PX = 70;
 /** Lower, the compass and the scale are one above the other [px]. */
 const LOW_PX = 120;
 /** A lower map hides words that have no clear place [px]. */
-const HIDING_PX = 170;
+const HIDING_PX = 200;
 /** Half the side of a mark [px]. */
 const MARK_PX = 16;
 /** The room of a name: above its base line, and all [px]. */
@@ -96,7 +96,7 @@ export class Figure {
     this.#drawCar(view, car, carAt ?? null);
     this.#drawPhone(view, phone, phoneAt ?? null);
     this.#taken = [...(size.taken ?? []), this.#drawScale(view, size)];
-    for (const at of size.height < HIDING_PX ? [carAt, phoneAt] : []) if (at) this.#taken.push(around(at, MARK_PX, MARK_PX));
+    for (const at of [carAt, phoneAt]) if (at) this.#taken.push(around(at, MARK_PX, MARK_PX));
     this.#drawNames(view, size, car, phone, carAt ?? null, phoneAt ?? null);
     this.#drawWay(size, apart, carAt ?? null, phoneAt ?? null);
   }
@@ -215,10 +215,12 @@ export class Figure {
     const x = Math.min(size.width - KEYS_PX - half, Math.max(half, at[0]));
     const isBesideScale = x - half > this.#scaleEnd_px + 8;
     const box = { left: x - half, top: Math.min(size.height - (isBesideScale ? 8 : 44), Math.max(20, y)) - NAME_PX.up, width: 2 * half, height: NAME_PX.high };
-    const top = clearTop(box, this.#taken, size.height);
-    if (top === null && size.height < HIDING_PX) shown(text, false);
-    else if (isShown) this.#taken.push({ ...box, top: top ?? box.top });
-    place(text, x, (top ?? box.top) + NAME_PX.up);
+    const sides = [at[0] + MARK_PX, at[0] - MARK_PX - box.width].map((left) => ({ ...box, left, top: at[1] - NAME_PX.high / 2 }));
+    const clear = clearBox(box, sides, this.#taken, size);
+    if (!clear && size.height < HIDING_PX) shown(text, false);
+    else if (clear && isShown) this.#taken.push(clear);
+    const { left, top } = clear ?? box;
+    place(text, left + half, top + NAME_PX.up);
   }
 
   /** Gives the room that it takes. @param {View} view @param {Size} size @returns {import('./map-layout.js').Box} */

@@ -121,6 +121,21 @@ export function clearTop(box, taken, height) {
 }
 
 /**
+ * Where a name stands: in its place or a line or two above or below it, else beside its mark, else in its column as near as it is clear.
+ * @param {Box} box of the name
+ * @param {Box[]} sides beside its mark
+ * @param {Box[]} taken
+ * @param {Size} size
+ * @returns {Box | null} null: nowhere
+ */
+export function clearBox(box, sides, taken, { width, height }) {
+  const top = clearTop(box, taken, height);
+  if (top !== null && Math.abs(top - box.top) <= 2 * box.height) return { ...box, top };
+  const beside = sides.find((one) => one.left >= 0 && one.left + one.width <= width && clearTop(one, taken, height) === one.top);
+  return beside ?? (top === null ? null : { ...box, top });
+}
+
+/**
  * The grid's lines over the map, as an SVG path of the weak and one of the strong: they lie still on the ground.
  * @param {Offset} middle where the view's middle is from the grid's origin
  * @param {Pick<View, 'mpp' | 'up_deg'>} view

@@ -43,7 +43,7 @@ export function mount(root, { store, say, isFront }) {
     map.size = { width: at('box').clientWidth, height: at('box').clientHeight, taken: takenOf(root, at('box')) };
     if (map.size.width && map.size.height) tab.draw();
   });
-  sized.observe(at('box'));
+  for (const name of ['box', 'by']) sized.observe(at(name));
   const read = () => tab.read();
   const stops = [
     () => sized.disconnect(),
@@ -212,12 +212,12 @@ class MapTab {
   }
 }
 
-/** What lies over the map: the keys, and the head of its pane where it is no row of its own. @param {HTMLElement} root @param {HTMLElement} box of the map */
+/** What lies over the map: the keys, whose map it is, and the head of its pane where it is no row of its own. @param {HTMLElement} root @param {HTMLElement} box of the map */
 function takenOf(root, box) {
   const { left, top, width } = box.getBoundingClientRect();
-  const keys = need(root, '.fabs').getBoundingClientRect();
+  const over = ['.fabs', '.map-by'].map((one) => need(root, one).getBoundingClientRect());
   const head = root.querySelector(':scope > .ph');
   const isOver = head !== null && getComputedStyle(head).position === 'absolute';
   const strip = { left: HEAD_PX.from, top: 0, width, height: HEAD_PX.high };
-  return [{ left: keys.left - left, top: keys.top - top, width: keys.width, height: keys.height }, ...(isOver ? [strip] : [])];
+  return [...over.filter((one) => one.width).map((one) => ({ left: one.left - left, top: one.top - top, width: one.width, height: one.height })), ...(isOver ? [strip] : [])];
 }
