@@ -13,8 +13,8 @@ from tests.page.conftest import Phone
 from tests.page.screenshots import several, silent_car
 
 NAMES = list(dict.fromkeys(check.tile_label for check in sorted(CHECKS, key=lambda one: one.order)))
-SIZES = [(820, 1180), (740, 1180), (1180, 1000)]
-EACH = [(width, height) for width in range(700, 1200, 33) for height in (600, 720, 768, 820, 1000, 1180, 1300)]
+SIZES = [(820, 1180), (740, 1180), (1180, 1000), (1440, 900)]
+EACH = [(width, height) for width in range(700, 1500, 33) for height in (600, 720, 768, 820, 1000, 1180, 1300)]
 DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 #: Names that are cut, or lie over the frame of their tile.
 CUT = """() => [...document.querySelectorAll('#monitor .checks b')].filter((one) => {

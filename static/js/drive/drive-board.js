@@ -39,7 +39,7 @@ export function openBoard({ kind, label, title, ends, view, store, onClose }) {
     ...(isInView ? [mountHeadSpeed(bar, store)] : []),
     listen(back, 'click', () => history.back()),
     listen(window, 'popstate', (event) => {
-      if (board.inert) return; // another board lies over it
+      if (board.inert || history.state?.[kind]) return; // another board lies over it, or a sheet did
       event.stopImmediatePropagation(); // what lies beneath stays
       close();
     }, { capture: true }),

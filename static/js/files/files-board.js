@@ -30,7 +30,7 @@ export function openSaved(store, say, router) {
   }
   const stops = [
     listen(back, 'click', () => history.back()),
-    listen(window, 'popstate', () => board.inert || close()), // the phone's back key too; of what lies over it, that
+    listen(window, 'popstate', () => board.inert || history.state?.saved || close()), // the phone's back key too; what lay over the board had an entry beyond that of the board
     store.on('draw', () => {
       if (router.isMonitorShown) close(); // a car is monitored, or a recording is shown
     }),

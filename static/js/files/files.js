@@ -222,6 +222,6 @@ function build(panel, search, live, dock) {
   const clear = html('button', { type: 'button', class: 'key wide', 'data-f': 'files-empty' }, icon('trash'), html('span', {}, 'Empty the trash'));
   const heads = html('div', { class: 'files-heads', 'aria-hidden': 'true' }, ...['Track', 'Recording', 'Car', 'Length', 'Size', 'Critical', 'Warning'].map((name) => html('span', {}, name)));
   panel.replaceChildren(html('div', { class: 'files' },
-    html('div', { class: 'files-side' }, html('div', { class: 'sec' }, count, free, logbook), search, state, heads, live, list, empty, html('div', { class: 'files-foot' }, older, trash, back, clear)), dock));
+    html('div', { class: 'files-side' }, html('div', { class: 'sec' }, html('p', {}, count, ' ', free), logbook), search, state, heads, live, list, empty, html('div', { class: 'files-foot' }, older, trash, back, clear)), dock));
   return { count, free, logbook, state, list, empty, emptyTitle, emptyWords, older, trash, back, clear };
 }
