@@ -224,7 +224,7 @@ async def test_a_board_outlives_the_sheet_over_it_and_back_closes_it_alone(phone
         await page.wait_for_function(GUARDED)
         await (page.keyboard.press(closes) if closes == "Escape" else page.go_back())
         await expect(menu).to_be_hidden()
-        await page.wait_for_function("() => history.state?.logbook === true && history.state.over !== true")
+        await page.wait_for_function("() => history.state?.logbook > 0 && history.state.over !== true")
         await expect(board).to_be_visible()
         await page.go_back()
         await expect(board).to_have_count(0)

@@ -407,3 +407,9 @@ async def test_saved_data_is_there_without_a_car(phone: Phone, tmp_path: Path) -
         await sheet(phone).get_by_text("Open replay").tap()
         await expect(phone.page.locator('[data-replay="on"]')).to_have_count(1, timeout=20_000)
         await expect(board).to_have_count(0)
+        await phone.page.get_by_role("button", name="Leave").tap()
+        await expect(phone.page.locator("#connect h1")).to_be_visible()
+        await phone.f("saved", "#connect").tap()
+        await expect(board).to_be_visible()
+        await phone.page.go_back()  # beneath is the entry of the board that the recording closed
+        await expect(board).to_have_count(0)

@@ -451,6 +451,8 @@ async def test_car_phone_and_their_names_stand_clear_of_keys_and_each_other(
         await expect(it.svg(mark)).to_be_visible(timeout=12_000)
     await expect(it.f("by")).to_have_text("Plan: test track")
     await it.until(f"() => ({COVERED})().length === 0")
+    for name in range(2):
+        await expect(it.page.locator("#panel-map .mapv .name").nth(name)).to_be_visible()
 
 
 # -- the ground --------------------------------------------------------------------------------------------------------

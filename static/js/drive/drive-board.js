@@ -27,7 +27,8 @@ export function openBoard({ kind, label, title, ends, view, store, onClose }) {
   const front = frontOf(monitor);
   for (const one of beneath) setAttribute(one, 'inert', true);
   (isInView ? need(monitor, '.view') : document.body).append(board);
-  history.pushState({ [kind]: true }, '');
+  const opened = Date.now(); // an older entry is of a board that was closed in another way
+  history.pushState({ [kind]: opened }, '');
   const close = () => {
     stops.forEach((stop) => stop());
     onClose();
@@ -39,7 +40,7 @@ export function openBoard({ kind, label, title, ends, view, store, onClose }) {
     ...(isInView ? [mountHeadSpeed(bar, store)] : []),
     listen(back, 'click', () => history.back()),
     listen(window, 'popstate', (event) => {
-      if (board.inert || history.state?.[kind]) return; // another board lies over it, or a sheet did
+      if (board.inert || history.state?.[kind] === opened) return; // another board lies over it, or a sheet did
       event.stopImmediatePropagation(); // what lies beneath stays
       close();
     }, { capture: true }),

@@ -18,7 +18,8 @@ export function openSaved(store, say, router) {
   setAttribute(beneath, 'inert', true);
   document.body.append(board);
   const files = mount(panel, { store, say, isFront: () => true });
-  history.pushState({ saved: true }, '');
+  const opened = Date.now(); // an older entry is of a board that was closed in another way
+  history.pushState({ saved: opened }, '');
   title.focus();
 
   function close() {
@@ -30,7 +31,7 @@ export function openSaved(store, say, router) {
   }
   const stops = [
     listen(back, 'click', () => history.back()),
-    listen(window, 'popstate', () => board.inert || history.state?.saved || close()), // the phone's back key too; what lay over the board had an entry beyond that of the board
+    listen(window, 'popstate', () => board.inert || history.state?.saved === opened || close()), // the phone's back key too; what lay over the board had an entry beyond that of the board
     store.on('draw', () => {
       if (router.isMonitorShown) close(); // a car is monitored, or a recording is shown
     }),
