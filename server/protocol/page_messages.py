@@ -32,10 +32,14 @@ class PageHello(TypedDict):
 
 
 class Take(TypedDict):
-    """Takes what was offered."""
+    """Takes what was offered, or states that a state came which was sent ahead."""
 
     kind: Literal["take"]
-    seq: int
+    seq: Annotated[int, doc("of the offer; with `ahead` 0: of none")]
+    n: NotRequired[Annotated[int, doc("counts the takes of a connection from 1 on")]]
+    ahead: NotRequired[
+        Annotated[int, doc("so many states may be sent before the next take, without an offer; at most 12")]
+    ]
 
 
 class Have(TypedDict):

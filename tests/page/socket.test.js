@@ -67,7 +67,7 @@ test('a connection that has just opened is alive, however long its dial took', (
   at(4000);
   sockets[0]?.onopen();
   look(4100, 8900);
-  assert.deepEqual([sockets.length, sockets[0]?.isClosed], [1, false]);
+  assert.equal(sockets[0]?.isClosed, false);
   look(9000, 20_000);
   assert.equal(sockets[0]?.isClosed, true);
 });
@@ -80,15 +80,15 @@ test('a connection of a weak radio gets more time, and what was measured holds f
   for (const [took_ms, came_ms] of [[2000, 2800], [3000, 4500], [5000, 5700]]) {
     at(Number(took_ms));
     pageSocket.send({ kind: 'take', seq: 1 });
-    pageSocket.answered(Number(came_ms));
-    pageSocket.answered(Number(came_ms) + 500); // a frame that nobody asked for says nothing of the round trip
+    pageSocket.answered(Number(came_ms), 'state');
+    pageSocket.answered(Number(came_ms) + 500, 'state'); // a frame that nobody asked for says nothing of the round trip
     pageSocket.proof(Number(came_ms));
   }
   look(5700, 8700);
   assert.equal(sockets[0]?.isClosed, false);
-  look(8800, 12_700);
+  look(8800, 10_700);
   assert.deepEqual([sockets[0]?.isClosed, sockets.length, sockets[1]?.isClosed], [true, 2, false]); // the dial, too
-  look(12_800, 13_200);
+  look(10_800, 12_000);
   assert.equal(sockets.length, 3);
 });
 
@@ -99,7 +99,7 @@ test('what was asked for proves the connection, whatever is known of the clocks 
   sockets[0]?.onopen();
   at(2400);
   pageSocket.send({ kind: 'take', seq: 1 });
-  pageSocket.answered(2450);
+  pageSocket.answered(2450, 'state');
   look(2500, 4900);
   assert.equal(sockets[0]?.isClosed, false);
   look(5000, 5100);
@@ -139,6 +139,91 @@ test('a page that knew a fast radio connects over one on which a connection take
   assert.ok(pageSocket.isOpen);
 });
 
+/** Opens at 0.3 s, as over a radio with a round trip of 0.15 s; a server that sends states ahead. */
+function slow() {
+  const one = set();
+  one.pageSocket.look(0);
+  one.at(300);
+  one.sockets[0]?.onopen();
+  one.pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'], took: 0 }), 400);
+  return one;
+}
+
+test('over a slow radio another connection is dialled beside a quiet one, and takes its place once it is open', () => {
+  const { sockets, heard, at, look, pageSocket } = slow();
+  look(400, 1300);
+  assert.equal(sockets.length, 1);
+  look(1400, 1500);
+  assert.equal(sockets.length, 2);
+  assert.deepEqual([sockets[0]?.isClosed, pageSocket.isOpen], [false, true]);
+  at(1600);
+  pageSocket.send({ kind: 'pause' });
+  assert.equal(sockets[0]?.sent.length, 1);
+  sockets[1]?.onopen();
+  assert.equal(sockets[0]?.isClosed, true);
+  pageSocket.send({ kind: 'pause' });
+  assert.deepEqual([sockets[0]?.sent.length, sockets[1]?.sent.length], [1, 1], 'over one connection, never over both');
+  assert.deepEqual(heard, ['open', 'closed', 'open']);
+  assert.equal(sockets[0]?.onmessage, null);
+});
+
+test('a quiet connection that answers before the other one is open stays', () => {
+  const { sockets, heard, look, pageSocket } = slow();
+  look(400, 1500);
+  pageSocket.proof(1600);
+  assert.deepEqual([sockets[0]?.isClosed, sockets[1]?.isClosed, sockets[1]?.onopen], [false, true, null]);
+  look(1700, 2500);
+  assert.deepEqual([sockets.length, heard], [2, ['open']]);
+});
+
+test('nothing is sent on a connection that was quiet for too long, though the other one is not open yet', () => {
+  const { sockets, heard, look, pageSocket } = slow();
+  look(400, 2800);
+  assert.equal(pageSocket.isOpen, true);
+  look(2900, 3000);
+  assert.deepEqual([pageSocket.isOpen, pageSocket.send({ kind: 'pause' }), sockets[0]?.isClosed], [false, false, true]);
+  assert.equal(sockets[1]?.isClosed, false, 'its dial goes on');
+  sockets[1]?.onopen();
+  assert.deepEqual(heard, ['open', 'closed', 'open']);
+});
+
+test('a connection over which anything comes is not doubled: the server has nothing fresh', () => {
+  const { sockets, at, look } = slow();
+  look(400, 1200);
+  at(1250);
+  sockets[0]?.onmessage({ data: '{"kind":"offer"}' });
+  look(1300, 2200);
+  assert.equal(sockets.length, 1);
+  look(2300, 2400);
+  assert.equal(sockets.length, 2);
+});
+
+test('over a good radio no connection is dialled beside a quiet one', () => {
+  const { sockets, at, look, pageSocket } = set();
+  pageSocket.look(0);
+  at(20);
+  sockets[0]?.onopen();
+  pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'], took: 0 }), 30);
+  look(100, 2500);
+  assert.equal(sockets.length, 1);
+});
+
+test('an offer answers the take that it names, and one of nothing tells the round trip', () => {
+  const { sockets, at, pageSocket } = slow();
+  const before = pageSocket.trip;
+  for (const ms of [1000, 1100, 1200]) {
+    at(ms);
+    pageSocket.answered(ms, 'state');
+  }
+  assert.deepEqual(sockets[0]?.sent.map((text) => JSON.parse(text).ahead), [12, 12, 12]);
+  assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 2, of: ['cars'], took: 2 }), 1400), 1100);
+  assert.equal(pageSocket.trip, before);
+  assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 3, of: [], took: 3 }), 1400), 1200);
+  assert.notEqual(pageSocket.trip, before);
+  assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 4, of: ['state'], took: 77 }), 1400), -Infinity, 'of no take of this page');
+  assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 5, of: ['state'] }), 1400), 1200, 'of a former server: the last one');
+});
+
 test('a server that refuses at once is dialled every two seconds', () => {
   const { pageSocket, sockets } = set();
   for (let ms = 0; ms < 60_000; ms += 100) {
@@ -166,7 +251,7 @@ test('nothing is sent while it is not open, and nothing is kept', () => {
   sockets[0]?.onopen();
   assert.deepEqual(sockets[0]?.sent, []);
   assert.equal(pageSocket.send({ kind: 'take', seq: 1 }), true);
-  assert.deepEqual(sockets[0]?.sent, ['{"kind":"take","seq":1}']);
+  assert.deepEqual(sockets[0]?.sent, ['{"kind":"take","seq":1,"n":1}']);
 });
 
 test('messages that are none of ours are refused', () => {

@@ -32,7 +32,7 @@
   /** Where devices are paired, a socket needs one. @param {string} way @returns {Promise<string | null>} */
   async function ticketOf(way) {
     if (way !== 'paired') return null;
-    const answer = await fetch('/api/ticket', { method: 'POST', cache: 'no-store', signal: AbortSignal.timeout(4000) });
+    const answer = await fetch('/api/ticket', { method: 'POST', cache: 'no-store' }); // how long to wait, whoever takes the socket over decides
     return (await answer.json()).ticket;
   }
 

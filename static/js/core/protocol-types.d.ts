@@ -1354,6 +1354,8 @@ export interface Offer {
   of: Array<"state" | "scan" | "timeline" | "cars" | "beside">;
   /** when the page's last take was received; before the first, when it connected */
   took_ms: number;
+  /** its number `n`; 0: it had none, or there was none yet */
+  took?: number;
 }
 
 /** Offers control to another page, whose operator reads back what is in force; until then control stays where it is. */
@@ -2574,10 +2576,15 @@ export interface SuppressedAlarm {
   raised_ms: number | null;
 }
 
-/** Takes what was offered. */
+/** Takes what was offered, or states that a state came which was sent ahead. */
 export interface Take {
   kind: "take";
+  /** of the offer; with `ahead` 0: of none */
   seq: number;
+  /** counts the takes of a connection from 1 on */
+  n?: number;
+  /** so many states may be sent before the next take, without an offer; at most 12 */
+  ahead?: number;
 }
 
 /** Takes, gives or requests control; server/control/lease.py says who may do what. */

@@ -134,9 +134,7 @@ export class Store extends Known {
   }
 
   /** Monotonic time [ms]. */
-  now() {
-    return performance.now();
-  }
+  now = () => performance.now();
 
   /**
    * Listen; the result stops listening.
@@ -198,12 +196,12 @@ export class Store extends Known {
   #heard(text, at_ms = this.now()) {
     const message = readMessage(text);
     if (!message) return void (this.unreadable += 1);
-    if (message.kind === 'state' || message.kind === 'cars') this.socket.answered(at_ms);
+    if (message.kind === 'state' || message.kind === 'cars') this.socket.answered(at_ms, message.kind);
     switch (message.kind) {
       case 'hello': return this.#greeted(message, at_ms);
       case 'offer':
-        this.#clock.note(message.took_ms, at_ms, this.socket.asked_ms);
-        return this.socket.takeInTurn(() => this.scans.offered(message.seq, this.now()));
+        this.#clock.note(message.took_ms, at_ms, this.socket.offered(message, at_ms));
+        return void (message.of.length && this.socket.takeInTurn(() => this.scans.offered(message.seq, this.now()))); // of nothing: it only answers a take
       case 'state': return this.#state(message, at_ms);
       case 'cars':
         this.list(message);
@@ -231,7 +229,7 @@ export class Store extends Known {
   #greeted(hello, at_ms) {
     if (!this.greet(hello)) return;
     this.seal.greeted(hello);
-    this.#clock.greeted(hello, at_ms, this.socket.asked_ms);
+    this.#clock.greeted(hello, at_ms, this.socket.dialled_ms);
     this.sync.greeted(hello, { name: this.name, build: ownBuild(), ...(this.page ? { page: this.page } : {}) }, this.heard_ms === null ? 0 : this.silence_s);
   }
 
@@ -246,7 +244,7 @@ export class Store extends Known {
     frame.server.boot = `${frame.server.boot} ${this.vehicle}`;
     const delay_ms = this.#clock.note(frame.server.time_ms, now_ms);
     const unseen_m = this.log.open && unseenOf(this);
-    if (!this.deadMan.frame(now_ms, delay_ms)) return; // a memory, not service
+    if (!this.socket.isTrusted || !this.deadMan.frame(now_ms, delay_ms)) return; // a memory, not service
     this.log.seen(unseen_m);
     const isFirst = this.take(frame, Date.now() - (this.now() - now_ms));
     this.#delay_ms = delay_ms;
@@ -264,7 +262,7 @@ export class Store extends Known {
   #look() {
     this.painter.look(!document.hidden);
     const now_ms = this.now();
-    if (this.#watch.slept_ms(now_ms) > 2000 && this.frame) this.deadMan.cover();
+    if (this.#watch.slept_ms(now_ms) > 2000 && this.frame) this.#cover();
     this.deadMan.look(now_ms);
     this.socket.look(now_ms);
     if (this.socket.isOpen) this.#requests.look(now_ms);
@@ -272,9 +270,11 @@ export class Store extends Known {
     this.#emitter.emit('tick');
   }
 
+  #cover = () => void [this.deadMan.cover(), this.socket.slept()];
+
   /** Hidden, frozen or back: the veil comes first, whatever the clocks say. @param {boolean} isBack @param {boolean} isRestored */
   #slept(isBack, isRestored) {
-    if (this.frame && (!isRestored || this.silence_s > 1)) this.deadMan.cover();
+    if (this.frame && (!isRestored || this.silence_s > 1)) this.#cover();
     if (isBack) this.socket.hurry();
     if (this.frame) this.painter.draw(); // before, there is nothing to cover
   }

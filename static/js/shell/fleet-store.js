@@ -161,7 +161,7 @@ export class FleetStore {
       case 'hello':
         return this.#greeted(message, at_ms);
       case 'offer':
-        this.#clock.note(message.took_ms, at_ms, this.socket.asked_ms);
+        this.#clock.note(message.took_ms, at_ms, this.socket.offered(message, at_ms));
         return void this.socket.send({ kind: 'take', seq: message.seq });
       case 'cars':
         return this.#list(message, at_ms);
@@ -189,7 +189,7 @@ export class FleetStore {
     this.seal.greeted(hello);
     this.isAnswering = true;
     this.unserved = '';
-    this.#clock.greeted(hello, at_ms, this.socket.asked_ms);
+    this.#clock.greeted(hello, at_ms, this.socket.dialled_ms);
     this.socket.send({ kind: 'hello', boot: hello.boot, name: this.self.name, page: this.self.page });
     this.#hasGreeted = true;
     this.#emitter.emit('open', hello);
@@ -197,7 +197,7 @@ export class FleetStore {
 
   /** @param {Cars} cars @param {number} at_ms */
   #list(cars, at_ms) {
-    this.socket.answered(at_ms);
+    this.socket.answered(at_ms, 'cars');
     const delay_ms = this.#clock.note(cars.time_ms, at_ms);
     if (!this.deadMan.frame(at_ms, delay_ms)) return; // of long ago
     this.cars = cars;
