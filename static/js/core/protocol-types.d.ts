@@ -1146,6 +1146,8 @@ export interface LogEvent {
   worst?: Worst | null;
   /** its number: grows by one, never given twice */
   n: number;
+  /** the log had lost it, and it was brought back from this recording */
+  brought_from?: string;
 }
 
 /** `GET /api/logbook`. */
