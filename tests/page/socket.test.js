@@ -182,7 +182,7 @@ test('nothing is sent on a connection that was quiet for too long, though the ot
   assert.equal(pageSocket.isOpen, true);
   look(2900, 3000);
   assert.deepEqual([pageSocket.isOpen, pageSocket.send({ kind: 'pause' }), sockets[0]?.isClosed], [false, false, true]);
-  assert.equal(sockets[1]?.isClosed, false, 'its dial goes on');
+  assert.equal(sockets[1]?.isClosed, false, 'its dial is not over');
   sockets[1]?.onopen();
   assert.deepEqual(heard, ['open', 'closed', 'open']);
 });
@@ -208,7 +208,7 @@ test('over a good radio no connection is dialled beside a quiet one', () => {
   assert.equal(sockets.length, 1);
 });
 
-test('an offer answers the take that it names, and one of nothing tells the round trip', () => {
+test('an offer answers the take that it names, and one of nothing measures the round trip', () => {
   const { sockets, at, pageSocket } = slow();
   const before = pageSocket.trip;
   for (const ms of [1000, 1100, 1200]) {

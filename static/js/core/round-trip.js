@@ -9,7 +9,7 @@
 const WEAK_MS = 300;
 /** Above this a state for each round trip is too few. */
 const AHEAD_MS = 100;
-/** So many states may then come without being asked for one by one: as many as the server sends within 1.8 s. */
+/** So many states may then come ahead of the next take: as many as the server sends within 1.8 s. */
 const AHEAD = 12;
 /** Before anything is measured, the slowest radio is assumed. @type {Limits} */
 const UNKNOWN = { dial_ms: 5000, ticket_ms: 5000, quiet_ms: 5000, spare_ms: Infinity };
@@ -61,7 +61,7 @@ export function isWeak(trip) {
   return trip !== null && trip.mean_ms >= WEAK_MS;
 }
 
-/** How many states may come without being asked for one by one. @param {RoundTrip | null} trip */
+/** How many states may come ahead of the next take. @param {RoundTrip | null} trip */
 export function aheadOf(trip) {
   return trip !== null && trip.mean_ms >= AHEAD_MS ? AHEAD : 0;
 }

@@ -73,7 +73,7 @@ export class PageSocket {
     return this.#socket !== null;
   }
 
-  /** When this connection was asked for [ms, monotonic]. */
+  /** When this connection was dialled [ms, monotonic]. */
   get dialled_ms() {
     return this.#takes.get(0) ?? -Infinity;
   }

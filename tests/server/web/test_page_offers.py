@@ -1,4 +1,4 @@
-"""States that are sent ahead of a page's takes: only to a page that asks for them, spaced, no more than it allows."""
+"""States that are sent ahead of a page's takes: only to a page that allows them, spaced, never more than that."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ async def states_of(page: SlowPage, lasts_s: float) -> float:
     return (len(page.states) - before) / lasts_s
 
 
-async def test_over_a_slow_radio_a_page_that_asks_for_states_ahead_gets_more_than_one_a_round_trip() -> None:
+async def test_over_a_slow_radio_a_page_that_allows_states_ahead_gets_more_than_one_a_round_trip() -> None:
     one_by_one, ahead = SlowPage(0), SlowPage(6)
     async with watching(one_by_one):
         assert 2.0 <= await states_of(one_by_one, 10.0) <= 1 / one_by_one.round_trip_s
@@ -162,7 +162,7 @@ async def test_a_take_is_answered_with_its_number_twice_a_second_though_nothing_
 
 
 @pytest.mark.parametrize("nonsense", [None, -1, True, "6", 2.5, []])
-def test_a_number_that_is_none_asks_for_nothing_ahead(nonsense: object) -> None:
+def test_a_number_that_is_none_allows_nothing_ahead(nonsense: object) -> None:
     offers = PageOffers(lambda: 0.0, lambda: 5)
     assert offers.taken(0, nonsense, nonsense), "it takes what was offered, as a page of before does"
     assert (offers.may_push, offers.took, offers.took_ms) == (False, 0, 5)
