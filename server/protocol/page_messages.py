@@ -14,7 +14,7 @@ from server.protocol.replay_commands import ReplayOrder
 
 class PageHello(TypedDict):
     """Before everything else but `take`: the server then sends what the page missed, and no event before it (or 1 s
-    after the connection, where none comes)."""
+    after the connection, where none comes). A command that comes before it is refused."""
 
     kind: Literal["hello"]
     have_event: NotRequired[Annotated[int | None, doc("number of the newest event that the page has")]]

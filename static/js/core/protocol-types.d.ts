@@ -1425,7 +1425,7 @@ export interface OrderSteps {
   slows_ms: number | null;
 }
 
-/** Before everything else but `take`: the server then sends what the page missed, and no event before it (or 1 s after the connection, where none comes). */
+/** Before everything else but `take`: the server then sends what the page missed, and no event before it (or 1 s after the connection, where none comes). A command that comes before it is refused. */
 export interface PageHello {
   kind: "hello";
   /** number of the newest event that the page has */

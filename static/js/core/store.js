@@ -45,7 +45,7 @@ export class Store extends Known {
   painter = new Painter(this.#emitter);
   #send = (/** @type {object} */ message) => this.socket.send(message);
   seal = new Seal(() => this);
-  #requests = new Requests(this.#send, (answer) => this.#emitter.emit('refused', answer), (message) => this.seal.sealed(message, this.vehicle, challengeOf(this.frame)), (found) => this.#emitter.emit('became', found));
+  #requests = new Requests((message) => this.sync.hasGreeted && this.#send(message), (answer) => this.#emitter.emit('refused', answer), (message) => this.seal.sealed(message, this.vehicle, challengeOf(this.frame)), (found) => this.#emitter.emit('became', found));
   scans = new ScanFeed(this.#send);
   sync = new LogSync(this.log, this.#send, this.#emitter);
   #watch = new PageWatch({
@@ -69,6 +69,7 @@ export class Store extends Known {
         opened: () => this.#emitter.guard(() => {
           this.#granted = null;
           this.unserved = '';
+          this.sync.closed();
           this.scans.opened();
         }),
         text: (text, at_ms) => this.#emitter.guard(() => this.#heard(text, at_ms)),
