@@ -21,8 +21,11 @@ function opened(t) {
   const sent = [];
   const socket = /** @type {any} */ ({ send: (/** @type {string} */ text) => sent.push({ at_ms: now_ms, ...JSON.parse(text) }), close() {} });
   const store = new Store(() => socket);
+  store.sync.greet();
   store.socket.look(0);
   socket.onopen();
+  socket.onmessage({ data: JSON.stringify({ kind: 'hello', boot: 'a', run: 'a', time_ms: 0 }) });
+  sent.length = 0;
   const pass = async (/** @type {number} */ ms) => {
     for (const end_ms = now_ms + ms; now_ms < end_ms; ) {
       now_ms += 1;

@@ -27,6 +27,7 @@ class Socket {
 
 function set() {
   let now_ms = 0;
+  const chance = { now: 0 };
   /** @type {Socket[]} */
   const sockets = [];
   /** @type {string[]} */
@@ -35,13 +36,14 @@ function set() {
     { opened: () => heard.push('open'), closed: () => heard.push('closed'), text: (text) => heard.push(text), bytes: () => heard.push('bytes') },
     () => /** @type {any} */ (sockets[sockets.push(new Socket()) - 1]),
     () => now_ms,
+    () => chance.now,
   );
   const at = (/** @type {number} */ ms) => { now_ms = ms; };
   /** Looks as the page does, from then to then. @param {number} from_ms @param {number} to_ms */
   const look = (from_ms, to_ms) => {
     for (now_ms = from_ms; now_ms <= to_ms; now_ms += 100) pageSocket.look(now_ms);
   };
-  return { pageSocket, sockets, heard, at, look };
+  return { pageSocket, sockets, heard, at, look, chance };
 }
 
 test('a quiet connection is given up though the browser reports nothing, and what it still brings is not heard', () => {
@@ -149,7 +151,7 @@ function slow() {
   return one;
 }
 
-test('over a slow radio another connection is dialled beside a quiet one, and takes its place once it is open', () => {
+test('over a slow radio another connection is dialled beside a quiet one, and takes its place with its first message', () => {
   const { sockets, heard, at, look, pageSocket } = slow();
   look(400, 1300);
   assert.equal(sockets.length, 1);
@@ -160,20 +162,52 @@ test('over a slow radio another connection is dialled beside a quiet one, and ta
   pageSocket.send({ kind: 'pause' });
   assert.equal(sockets[0]?.sent.length, 1);
   sockets[1]?.onopen();
+  pageSocket.send({ kind: 'pause' });
+  assert.deepEqual([sockets[0]?.isClosed, sockets[0]?.sent.length], [false, 2], 'the server may still refuse the other one');
+  sockets[1]?.onmessage({ data: 'hello' });
   assert.equal(sockets[0]?.isClosed, true);
   pageSocket.send({ kind: 'pause' });
-  assert.deepEqual([sockets[0]?.sent.length, sockets[1]?.sent.length], [1, 1], 'over one connection, never over both');
-  assert.deepEqual(heard, ['open', 'closed', 'open']);
+  assert.deepEqual([sockets[0]?.sent.length, sockets[1]?.sent.length], [2, 1], 'over one connection, never over both');
+  assert.deepEqual(heard, ['open', 'closed', 'open', 'hello']);
   assert.equal(sockets[0]?.onmessage, null);
 });
 
-test('a quiet connection that answers before the other one is open stays', () => {
-  const { sockets, heard, look, pageSocket } = slow();
+test('a quiet connection that answers before the other one does stays, and one that the server refuses takes no place', () => {
+  const { sockets, heard, at, look, pageSocket } = slow();
   look(400, 1500);
-  pageSocket.proof(1600);
-  assert.deepEqual([sockets[0]?.isClosed, sockets[1]?.isClosed, sockets[1]?.onopen], [false, true, null]);
-  look(1700, 2500);
-  assert.deepEqual([sockets.length, heard], [2, ['open']]);
+  sockets[1]?.onopen();
+  sockets[1]?.onclose(); // as of a device with too many pages
+  assert.deepEqual([sockets[0]?.isClosed, sockets[1]?.isClosed, pageSocket.isOpen], [false, true, true]);
+  look(1600, 1700);
+  assert.equal(sockets.length, 3);
+  at(1800);
+  pageSocket.proof(1800);
+  assert.equal(sockets[2]?.isClosed, false, 'what it brings may be needed yet');
+  sockets[2]?.onopen();
+  sockets[2]?.onmessage({ data: 'hello' });
+  assert.deepEqual([sockets[0]?.isClosed, sockets[2]?.isClosed, sockets[2]?.onmessage], [false, true, null]);
+  assert.deepEqual([sockets.length, heard], [3, ['open']]);
+});
+
+test('connections that are not needed become seldom: after 1, 2, 4, 8 and 10 s', () => {
+  const one = slow();
+  const { sockets, pageSocket, at } = one;
+  /** @type {number[]} */
+  const gaps = [];
+  let [last_ms, quiet_ms] = [NaN, 0];
+  for (let ms = 400; ms < 60_000; ms += 100) {
+    const count = sockets.length;
+    at(ms);
+    pageSocket.look(ms);
+    if (ms - quiet_ms >= 1200) pageSocket.proof(quiet_ms = ms); // quiet for 1.2 s again and again
+    if (sockets.length === count) continue;
+    gaps.push(ms - last_ms);
+    last_ms = ms;
+    pageSocket.proof(quiet_ms = ms);
+    sockets.at(-1)?.onopen();
+    sockets.at(-1)?.onmessage({ data: 'hello' });
+  }
+  assert.deepEqual(gaps.slice(1).map((ms) => Math.floor(ms / 1000)), [1, 2, 4, 8, 10, 10, 10], String(gaps));
 });
 
 test('nothing is sent on a connection that was quiet for too long, though the other one is not open yet', () => {
@@ -195,6 +229,30 @@ test('a connection over which anything comes is not doubled: the server has noth
   look(1300, 2200);
   assert.equal(sockets.length, 1);
   look(2300, 2400);
+  assert.equal(sockets.length, 2);
+});
+
+test('pages that one server kept waiting do not all dial at once, nor one that stood still itself', () => {
+  const dialled = [0, 0.5, 1].map((now) => {
+    const { sockets, pageSocket, at, chance } = set();
+    chance.now = now;
+    pageSocket.look(0);
+    at(300);
+    sockets[0]?.onopen();
+    pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'], took: 0 }), 400);
+    for (let ms = 400; ms < 2500; ms += 50) {
+      at(ms);
+      pageSocket.look(ms);
+      if (sockets.length === 2) return ms;
+    }
+    return NaN;
+  });
+  assert.deepEqual(dialled, [1350, 1600, 1850]);
+  const { sockets, look } = slow();
+  look(400, 500);
+  look(1900, 1900); // what came meanwhile is not read yet
+  assert.equal(sockets.length, 1);
+  look(2000, 2000);
   assert.equal(sockets.length, 2);
 });
 

@@ -158,6 +158,7 @@ function page(t, story) {
   t.mock.timers.enable({ apis: ['setTimeout', 'setInterval'] });
   t.mock.method(performance, 'now', () => story.now_ms);
   t.mock.method(Date, 'now', () => story.now_ms + story.slept_ms);
+  t.mock.method(Math, 'random', chance(story.offset_ms));
   const store = new Store(() => story.dial());
   store.vehicle = 'car';
   store.painter.picture = store.painter.look = () => {}; // nothing is drawn here

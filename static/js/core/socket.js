@@ -8,6 +8,12 @@ const DIALS_A_LONG_ONE = 3;
 /** Least time from one dial to the next [ms]. */
 const FIRST_WAIT_MS = 300;
 const LAST_WAIT_MS = 2000;
+/** Waits are longer by up to this share, by chance: pages that one server kept waiting do not all dial at once. */
+const SPREAD = 0.5;
+/** After one that was not needed, another connection beside a quiet one is dialled after so long; twice as long after each further one, until there was none for a while [ms]. */
+const FIRST_SPARE_MS = 1000;
+const LAST_SPARE_MS = 10_000;
+const CALM_MS = 60_000;
 /** A page sends at most 25 messages a second: frames are taken up to the first, a replay is led up to the second; what a person orders never waits. */
 const TAKES_A_S = 24;
 export const LEADS_A_S = 25;
@@ -31,7 +37,7 @@ const KEPT_TAKES = 100;
 export class PageSocket {
   /** The one that is open. @type {Socket | null} */
   #socket = null;
-  /** One that is connecting: it takes the place of the open one, unless that one answers first. @type {Socket | null} */
+  /** One that is connecting: it takes the place of the open one with its first message, unless that one has answered meanwhile. @type {Socket | null} */
   #next = null;
   /** How long an answer takes here, over all connections. @type {import('./round-trip.js').RoundTrip | null} */
   trip = null;
@@ -53,6 +59,11 @@ export class PageSocket {
   #trustedFrom = 0;
   #wait_ms = FIRST_WAIT_MS;
   #mayDial_ms = -Infinity;
+  /** By how much the next waits are longer. */
+  #longer = 1;
+  #spareWait_ms = FIRST_SPARE_MS;
+  #maySpare_ms = -Infinity;
+  #looked_ms = -Infinity;
   /** The last messages. @type {{kind: unknown, at_ms: number}[]} */
   #sent = [];
   /** What waits for its turn to take: an offer, a state that came ahead. @type {Set<string>} */
@@ -62,11 +73,13 @@ export class PageSocket {
    * @param {Ear} ear
    * @param {() => Socket} dial makes a socket that is connecting
    * @param {() => number} [now] monotonic [ms]
+   * @param {() => number} [chance] from 0 to 1
    */
-  constructor(ear, dial, now = () => performance.now()) {
+  constructor(ear, dial, now = () => performance.now(), chance = () => Math.random()) {
     this.ear = ear;
     this.dial = dial;
     this.now = now;
+    this.chance = chance;
   }
 
   get isOpen() {
@@ -122,7 +135,6 @@ export class PageSocket {
    * @param {number} now_ms
    */
   proof(now_ms) {
-    if (this.#socket) this.#forsake();
     this.#proof_ms = now_ms;
     this.#wait_ms = FIRST_WAIT_MS;
   }
@@ -139,9 +151,17 @@ export class PageSocket {
    */
   look(now_ms) {
     const { dial_ms, quiet_ms, spare_ms } = limitsOf(this.trip);
+    const isLate = now_ms - this.#looked_ms > spare_ms; // the page itself stood still: what came meanwhile may not be read yet
+    this.#looked_ms = now_ms;
     if (this.#socket && now_ms - this.#proof_ms > quiet_ms) this.#drop();
     if (this.#next && now_ms - this.#dialled_ms > (this.#isLongDial() ? Math.max(2 * dial_ms, limitsOf(null).dial_ms) : dial_ms)) this.#failedDial();
-    if (!this.#next && (!this.#socket || now_ms - Math.max(this.#proof_ms, this.#came_ms) > spare_ms) && now_ms >= this.#mayDial_ms) this.#open(now_ms);
+    const isDue = !this.#socket || (!isLate && now_ms >= this.#maySpare_ms && this.#isQuiet(now_ms, this.#longer * spare_ms));
+    if (!this.#next && isDue && now_ms >= this.#mayDial_ms) this.#open(now_ms);
+  }
+
+  /** Nothing came over the open one for so long. @param {number} now_ms @param {number} limit_ms */
+  #isQuiet(now_ms, limit_ms) {
+    return now_ms - Math.max(this.#proof_ms, this.#came_ms) > limit_ms;
   }
 
   #isLongDial() {
@@ -211,12 +231,32 @@ export class PageSocket {
   /** @param {number} now_ms */
   #open(now_ms) {
     this.#dialled_ms = now_ms;
+    this.#longer = 1 + SPREAD * this.chance();
     const socket = this.dial();
     socket.binaryType = 'arraybuffer';
     this.#next = socket;
-    socket.onopen = (/** @type {{at_ms?: number} | undefined} */ event) => this.#opened(socket, socket.dialled_ms ?? now_ms, event?.at_ms ?? this.now());
+    socket.onopen = (/** @type {{at_ms?: number} | undefined} */ event) => this.#connected(socket, socket.dialled_ms ?? now_ms, event?.at_ms ?? this.now());
     socket.onclose = () => this.#failedDial();
     socket.onerror = () => {}; // a close always follows
+  }
+
+  /** Where another one is open, only a message proves that the server serves this one too. @param {Socket} socket @param {number} asked_ms @param {number} at_ms */
+  #connected(socket, asked_ms, at_ms) {
+    if (!this.#socket) return this.#opened(socket, asked_ms, at_ms);
+    socket.onmessage = (/** @type {unknown} */ event) => {
+      if (this.#socket && !this.#isQuiet(this.now(), limitsOf(this.trip).spare_ms)) return this.#spared(this.now());
+      this.#spareWait_ms = FIRST_SPARE_MS;
+      this.#opened(socket, asked_ms, at_ms);
+      socket.onmessage(event);
+    };
+  }
+
+  /** The open one has answered meanwhile: the other one is not needed. @param {number} now_ms */
+  #spared(now_ms) {
+    this.#forsake();
+    if (now_ms - this.#maySpare_ms > CALM_MS) this.#spareWait_ms = FIRST_SPARE_MS;
+    this.#maySpare_ms = now_ms + this.#longer * this.#spareWait_ms;
+    this.#spareWait_ms = Math.min(LAST_SPARE_MS, 2 * this.#spareWait_ms);
   }
 
   /** @param {Socket} socket @param {number} asked_ms @param {number} at_ms */
@@ -258,7 +298,7 @@ export class PageSocket {
 
   /** Where each dial fails at once, they become seldom. */
   #wait() {
-    this.#mayDial_ms = this.#dialled_ms + this.#wait_ms;
+    this.#mayDial_ms = this.#dialled_ms + this.#longer * this.#wait_ms;
     this.#wait_ms = Math.min(LAST_WAIT_MS, this.#wait_ms * 1.7);
   }
 
