@@ -244,7 +244,7 @@ for (const [radio, least] of /** @type {[string, number][]} */ ([['fair', 4], ['
   });
 }
 
-test('what came ahead while the phone slept is not shown, though its clock stood still meanwhile', (t) => {
+for (const isLookedFirst of [true, false]) test(`what came ahead while the phone slept is not shown, though its clock stood still meanwhile${isLookedFirst ? '' : ', and though it is read before the page looks'}`, (t) => {
   let most = 0;
   for (let seed = 1; seed <= 8; seed += 1) {
     const story = new Story('fair', seed);
@@ -256,8 +256,10 @@ test('what came ahead while the phone slept is not shown, though its clock stood
     const held = story.held;
     story.held = null;
     story.slept_ms += 60_000;
-    look(); // the page wakes
+    if (isLookedFirst) look(); // the page wakes
+    const shown = store.frame;
     for (const arrive of held) arrive();
+    assert.equal(store.frame, shown, 'nothing of before the sleep is taken');
     look();
     run(5000);
     most = Math.max(most, held.length);

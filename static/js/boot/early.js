@@ -39,6 +39,7 @@
   /** @param {string | null} ticket */
   function dial(ticket) {
     if (ticket === undefined) throw new Error('no ticket'); // why, is asked and said once the page is there
+    if (early.isGivenUp) return;
     const address = new URL('/ws', location.href);
     address.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';
     if (vehicle) address.searchParams.set('vehicle', vehicle);

@@ -195,6 +195,7 @@ export class Store extends Known {
 
   /** @param {string} text @param {number} [at_ms] when it came */
   #heard(text, at_ms = this.now()) {
+    this.#woke();
     const message = readMessage(text);
     if (!message) return void (this.unreadable += 1);
     if (message.kind === 'state' || message.kind === 'cars') this.socket.answered(at_ms, message.kind);
@@ -263,12 +264,17 @@ export class Store extends Known {
   #look() {
     this.painter.look(!document.hidden);
     const now_ms = this.now();
-    if (this.#watch.slept_ms(now_ms) > 2000 && this.frame) this.#cover();
+    this.#woke();
     this.deadMan.look(now_ms);
     this.socket.look(now_ms);
     if (this.socket.isOpen) this.#requests.look(now_ms);
     if (!document.hidden) this.painter.keepUp(now_ms, this.deadMan.heard_ms);
     this.#emitter.emit('tick');
+  }
+
+  /** A phone that wakes may read what came before it looks at the time. */
+  #woke() {
+    if (this.#watch.slept_ms(this.now()) > 2000 && this.frame) this.#cover();
   }
 
   #cover = () => void [this.deadMan.cover(), this.socket.slept()];
