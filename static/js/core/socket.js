@@ -1,19 +1,9 @@
 // The page's end of the socket: dials for ever, and hangs up on a connection that has gone quiet (a browser may never report
 // that one is dead) and on a dial that does not open (a server may be stopped while its port still accepts).
 
+import { Dials } from './dials.js';
 import { aheadOf, isSlower, limitsOf, measured } from './round-trip.js';
 
-/** Of so many dials in a row one gets twice the time, and that of an unknown radio at least: it may be another one than was measured. */
-const DIALS_A_LONG_ONE = 3;
-/** Least time from one dial to the next [ms]. */
-const FIRST_WAIT_MS = 300;
-const LAST_WAIT_MS = 2000;
-/** Waits are longer by up to this share, by chance: pages that one server kept waiting do not all dial at once. */
-const SPREAD = 0.5;
-/** After one that was not needed, another connection beside a quiet one is dialled after so long; twice as long after each further one, until there was none for a while [ms]. */
-const FIRST_SPARE_MS = 1000;
-const LAST_SPARE_MS = 10_000;
-const CALM_MS = 60_000;
 /** A page sends at most 25 messages a second: frames are taken up to the first, a replay is led up to the second; what a person orders never waits. */
 const TAKES_A_S = 24;
 export const LEADS_A_S = 25;
@@ -44,9 +34,6 @@ export class PageSocket {
   #proof_ms = 0;
   /** When anything came. */
   #came_ms = -Infinity;
-  #dialled_ms = -Infinity;
-  /** Dials in a row that did not open. */
-  #failed = 0;
   /** When the last frame was asked for, or this connection; and whether it is still to come. */
   #asked_ms = -Infinity;
   #isOwed = false;
@@ -57,13 +44,7 @@ export class PageSocket {
   #ahead = 0;
   /** States count again once the server has answered this take; 0: they do. */
   #trustedFrom = 0;
-  #wait_ms = FIRST_WAIT_MS;
-  #mayDial_ms = -Infinity;
-  /** By how much the next waits are longer. */
-  #longer = 1;
-  #spareWait_ms = FIRST_SPARE_MS;
-  #maySpare_ms = -Infinity;
-  #looked_ms = -Infinity;
+  #dials;
   /** The last messages. @type {{kind: unknown, at_ms: number}[]} */
   #sent = [];
   /** What waits for its turn to take: an offer, a state that came ahead. @type {Set<string>} */
@@ -79,7 +60,7 @@ export class PageSocket {
     this.ear = ear;
     this.dial = dial;
     this.now = now;
-    this.chance = chance;
+    this.#dials = new Dials(chance);
   }
 
   get isOpen() {
@@ -136,13 +117,13 @@ export class PageSocket {
    */
   proof(now_ms) {
     this.#proof_ms = now_ms;
-    this.#wait_ms = FIRST_WAIT_MS;
+    this.#came_ms = Math.max(this.#came_ms, now_ms);
+    this.#dials.proved();
   }
 
   /** Something changed for the better (the page is seen again, the phone is online): dial without waiting. */
   hurry() {
-    this.#mayDial_ms = -Infinity;
-    this.#wait_ms = FIRST_WAIT_MS;
+    this.#dials.hurry();
   }
 
   /**
@@ -151,21 +132,10 @@ export class PageSocket {
    */
   look(now_ms) {
     const { dial_ms, quiet_ms, spare_ms } = limitsOf(this.trip);
-    const isLate = now_ms - this.#looked_ms > spare_ms; // the page itself stood still: what came meanwhile may not be read yet
-    this.#looked_ms = now_ms;
     if (this.#socket && now_ms - this.#proof_ms > quiet_ms) this.#drop();
-    if (this.#next && now_ms - this.#dialled_ms > (this.#isLongDial() ? Math.max(2 * dial_ms, limitsOf(null).dial_ms) : dial_ms)) this.#failedDial();
-    const isDue = !this.#socket || (!isLate && now_ms >= this.#maySpare_ms && this.#isQuiet(now_ms, this.#longer * spare_ms));
-    if (!this.#next && isDue && now_ms >= this.#mayDial_ms) this.#open(now_ms);
-  }
-
-  /** Nothing came over the open one for so long. @param {number} now_ms @param {number} limit_ms */
-  #isQuiet(now_ms, limit_ms) {
-    return now_ms - Math.max(this.#proof_ms, this.#came_ms) > limit_ms;
-  }
-
-  #isLongDial() {
-    return this.#failed % DIALS_A_LONG_ONE === DIALS_A_LONG_ONE - 1;
+    if (this.#next && now_ms - this.#dials.last_ms > this.#dials.limit_ms(dial_ms, limitsOf(null).dial_ms)) this.#failedDial();
+    const isSpareDue = this.#dials.isSpareDue(now_ms, this.#came_ms, spare_ms);
+    if (!this.#next && (!this.#socket || isSpareDue) && this.#dials.isDue(now_ms)) this.#open(now_ms);
   }
 
   /**
@@ -230,8 +200,7 @@ export class PageSocket {
 
   /** @param {number} now_ms */
   #open(now_ms) {
-    this.#dialled_ms = now_ms;
-    this.#longer = 1 + SPREAD * this.chance();
+    this.#dials.begin(now_ms);
     const socket = this.dial();
     socket.binaryType = 'arraybuffer';
     this.#next = socket;
@@ -244,19 +213,13 @@ export class PageSocket {
   #connected(socket, asked_ms, at_ms) {
     if (!this.#socket) return this.#opened(socket, asked_ms, at_ms);
     socket.onmessage = (/** @type {unknown} */ event) => {
-      if (this.#socket && !this.#isQuiet(this.now(), limitsOf(this.trip).spare_ms)) return this.#spared(this.now());
-      this.#spareWait_ms = FIRST_SPARE_MS;
+      if (this.#socket && this.now() - this.#came_ms <= limitsOf(this.trip).spare_ms) { // it has answered meanwhile
+        this.#forsake();
+        return this.#dials.unneeded(this.now());
+      }
       this.#opened(socket, asked_ms, at_ms);
       socket.onmessage(event);
     };
-  }
-
-  /** The open one has answered meanwhile: the other one is not needed. @param {number} now_ms */
-  #spared(now_ms) {
-    this.#forsake();
-    if (now_ms - this.#maySpare_ms > CALM_MS) this.#spareWait_ms = FIRST_SPARE_MS;
-    this.#maySpare_ms = now_ms + this.#longer * this.#spareWait_ms;
-    this.#spareWait_ms = Math.min(LAST_SPARE_MS, 2 * this.#spareWait_ms);
   }
 
   /** @param {Socket} socket @param {number} asked_ms @param {number} at_ms */
@@ -264,7 +227,7 @@ export class PageSocket {
     this.#next = null;
     if (this.#socket) this.#drop();
     this.#socket = socket;
-    this.#failed = 0;
+    this.#dials.opened();
     this.#proof_ms = this.#came_ms = this.now();
     this.#asked_ms = asked_ms;
     this.#takes = new Map([[0, asked_ms]]);
@@ -286,20 +249,13 @@ export class PageSocket {
     this.#close(this.#socket);
     this.#socket = null;
     this.#isOwed = false;
-    this.#wait();
+    this.#dials.gone();
     this.ear.closed();
   }
 
   #failedDial() {
-    this.#failed += 1;
     this.#forsake();
-    this.#wait();
-  }
-
-  /** Where each dial fails at once, they become seldom. */
-  #wait() {
-    this.#mayDial_ms = this.#dialled_ms + this.#longer * this.#wait_ms;
-    this.#wait_ms = Math.min(LAST_WAIT_MS, this.#wait_ms * 1.7);
+    this.#dials.failed();
   }
 
   /** Give up the one that is connecting. */

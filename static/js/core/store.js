@@ -67,8 +67,7 @@ export class Store extends Known {
     this.socket = new PageSocket(
       {
         opened: () => this.#emitter.guard(() => {
-          this.#granted = null;
-          this.unserved = '';
+          [this.#granted, this.unserved] = [null, ''];
           this.sync.closed();
           this.scans.opened();
         }),
@@ -189,13 +188,12 @@ export class Store extends Known {
    * @param {number} [within_ms]
    */
   ask(kind, fields, within_ms) {
-    const { fence } = this;
-    return this.#requests.ask(kind, /** @type {any} */ ({ ...momentOf(kind, this), ...fields, ...(fence === null ? {} : { fence }) }), within_ms);
+    return this.#requests.ask(kind, /** @type {any} */ ({ ...momentOf(kind, this), ...fields, ...(this.fence === null ? {} : { fence: this.fence }) }), within_ms);
   }
 
   /** @param {string} text @param {number} [at_ms] when it came */
   #heard(text, at_ms = this.now()) {
-    this.#woke();
+    this.#woke(); // a phone that wakes may read what came before the page looks at the time
     const message = readMessage(text);
     if (!message) return void (this.unreadable += 1);
     if (message.kind === 'state' || message.kind === 'cars') this.socket.answered(at_ms, message.kind);
@@ -272,11 +270,7 @@ export class Store extends Known {
     this.#emitter.emit('tick');
   }
 
-  /** A phone that wakes may read what came before it looks at the time. */
-  #woke() {
-    if (this.#watch.slept_ms(this.now()) > 2000 && this.frame) this.#cover();
-  }
-
+  #woke = () => void (this.#watch.slept_ms(this.now()) > 2000 && this.frame && this.#cover());
   #cover = () => void [this.deadMan.cover(), this.socket.slept()];
 
   /** Hidden, frozen or back: the veil comes first, whatever the clocks say. @param {boolean} isBack @param {boolean} isRestored */
