@@ -206,6 +206,7 @@ class LogEvent(NewEvent):
     """One event of the log."""
 
     n: Annotated[int, doc("its number: grows by one, never given twice")]
+    brought_from: NotRequired[Annotated[str, doc("the log had lost it, and it was brought back from this recording")]]
 
 
 class Note(Protocol):

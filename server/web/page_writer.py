@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import cast
 
 import orjson
@@ -23,13 +23,14 @@ from server.protocol.slow_down_state import FORMER_PHASES
 from server.replay.view_source import ViewSource
 from server.web.event_feed import EventFeed
 from server.web.fair_wakeup import FairWakeup
+from server.web.page_offers import PageOffers
 
 _FORMER = {present: former for former, present in FORMER_PHASES.items()}
 
 RESTARTED = 1012  # RFC 6455: the page dials again, and is greeted anew
 HELLO_WITHIN_S = 10.0  # until then no event is sent: the hello names the newest that the page has; it waits 8 s at most
-OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
 BATCH_EVERY_S = 0.2  # to a page that catches up: with its other messages it sends at most 25 a second
+ROUNDING_S = 1e-6  # what rounding leaves of a wait is none
 MAX_REPLIES = 200  # waiting for a page that does not read
 
 
@@ -67,16 +68,12 @@ class PageWriter:
         self._view = view
         self._wakeup = wakeup
         self._now = now
-        self._wall_ms = wall_ms
-        self._took_ms = wall_ms()
+        self._offers = PageOffers(now, wall_ms)
         self._since_s = now()
         self._wake = asyncio.Event()
         self._sent: dict[FrameKind, int] = dict.fromkeys(view.kinds, 0)  # the newest frame of each kind
         self._watches_scan = False
-        self._seq = 0
-        self._is_offered = False  # an offer is unanswered
-        self._offered_s = float("-inf")  # when the last offer was sent
-        self._offering: asyncio.TimerHandle | None = None  # an offer that is due later
+        self._later: asyncio.TimerHandle | None = None  # an offer or a state is due then
         self._is_taking = False  # the page requested the newest
         self._replies: list[messages.ToPage] = []
         self._event = 0  # the last number sent; from the greeting on
@@ -106,7 +103,9 @@ class PageWriter:
                 self.queue({"kind": "unserved", "why": why})
         elif kind == "scan" and self._view.is_replaying:
             return
-        elif self._is_offered or (kind == "scan" and not self._watches_scan):
+        elif kind == "state" and self._offers.may_push:
+            self._wakeup.queue(self._wake)
+        elif self._offers.is_open or (kind == "scan" and not self._watches_scan):
             if kind == "state":
                 self.skipped += 1
         else:
@@ -114,7 +113,7 @@ class PageWriter:
 
     def on_replay(self, kind: str) -> None:
         """Something new of the page's replay."""
-        if kind == "failed" or not self._is_offered:
+        if kind == "failed" or self._offers.may_push or not self._offers.is_open:
             self._wake.set()
 
     def on_turned(self) -> None:
@@ -153,11 +152,10 @@ class PageWriter:
         self._are_events_due = True
         self._wake.set()
 
-    def take(self) -> None:
-        """The page takes what was offered."""
-        self._took_ms = self._wall_ms()
-        self._is_offered = False
-        self._is_taking = True
+    def take(self, message: Mapping[str, object]) -> None:
+        """The page takes what was offered, or has a state that was sent ahead."""
+        if self._offers.taken(message.get("seq"), message.get("n"), message.get("ahead")):
+            self._is_taking = True
         self._wakeup.queue(self._wake)
 
     def have_events(self) -> None:
@@ -214,8 +212,8 @@ class PageWriter:
     def close(self) -> None:
         """Leaves what wakes it."""
         self._feed.close()
-        if self._offering is not None:
-            self._offering.cancel()
+        if self._later is not None:
+            self._later.cancel()
         self._wakeup.leave(self._wake)
         self.watch_scan(False)
 
@@ -241,7 +239,9 @@ class PageWriter:
             for kind in self._view.kinds:
                 if self._is_new(kind):
                     await self._send_newest(kind)
-        if not self._is_offered:
+        elif self._offers.may_push and self._is_new("state") and self._is_time(self._offers.push_wait_s()):
+            await self._send_newest("state", is_ahead=True)
+        if self._offers.is_echo_due or not self._offers.is_open:
             await self._offer()
 
     async def _send_events(self) -> None:
@@ -258,35 +258,37 @@ class PageWriter:
             await self._send(message)
 
     async def _offer(self) -> None:
-        fresh = [kind for kind in self._view.kinds if self._is_new(kind)]
-        if not fresh or self._offering is not None:
+        is_echo = self._offers.is_open
+        waits = () if is_echo else tuple(kind for kind in self._view.kinds if self._is_new(kind))
+        fresh = [kind for kind in waits if kind != "state" or not self._offers.may_push]
+        if not (fresh or self._offers.is_echo_due) or not self._is_time(self._offers.offer_wait_s()):
             return
-        wait_s = self._offered_s + OFFER_EVERY_S - self._now()
-        if wait_s > 0:
-            self._offering = asyncio.get_running_loop().call_later(wait_s, self._offer_is_due)
-            return
-        self._seq += 1
-        self._is_offered = True
-        self._offered_s = self._now()
-        await self._send({"kind": "offer", "seq": self._seq, "of": fresh, "took_ms": self._took_ms})
+        seq = self._offers.offered(is_echo=not fresh)
+        took_ms, took = self._offers.took_ms, self._offers.took
+        await self._send({"kind": "offer", "seq": seq, "of": fresh, "took_ms": took_ms, "took": took})
 
-    def _offer_is_due(self) -> None:
-        self._offering = None
-        self._offered_s = float("-inf")  # it has waited: no rounding of the clock makes it wait again
-        self._wake.set()
+    def _is_time(self, wait_s: float) -> bool:
+        """Whether nothing is to be waited for; else another round follows when it is over."""
+        if is_early := wait_s > ROUNDING_S:
+            if self._later is not None:
+                self._later.cancel()
+            self._later = asyncio.get_running_loop().call_later(wait_s, self._wake.set)
+        return not is_early
 
     def _is_new(self, kind: FrameKind) -> bool:
         if kind == "scan" and not self._watches_scan:
             return False
         return self._view.number(kind) > self._sent[kind]
 
-    async def _send_newest(self, kind: FrameKind, *, unasked: bool = False) -> None:
+    async def _send_newest(self, kind: FrameKind, *, unasked: bool = False, is_ahead: bool = False) -> None:
         number, frame = self._view.number(kind), self._view.newest(kind)
         is_new = frame is not None and (unasked or frame.number > self._sent[kind])
         self._sent[kind] = max(self._sent[kind], number)  # also of one without a payload: it is not offered again
         if frame is None or not is_new:
             return
         self._sent[kind] = frame.number
+        if kind == "state":
+            self._offers.sent_state(is_ahead=is_ahead)
         if isinstance(frame.payload, bytes):
             await self._socket.send_bytes(frame.payload)
         else:

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { isWeak, limitsOf, measured } from '../../static/js/core/round-trip.js';
+import { aheadOf, isWeak, limitsOf, measured } from '../../static/js/core/round-trip.js';
 
 /** @param {number[]} samples @returns {import('../../static/js/core/round-trip.js').RoundTrip | null} */
 const after = (...samples) => samples.reduce(measured, /** @type {any} */ (null));
@@ -19,10 +19,15 @@ test('the limits follow it, between bounds', () => {
   assert.ok(Number(good?.dial_ms) >= 2000 && Number(good?.dial_ms) < 2010);
   assert.ok(Number(weak?.dial_ms) > 2300 && Number(weak?.dial_ms) < Number(bad?.dial_ms));
   assert.ok(Number(bad?.quiet_ms) > 3000 && Number(bad?.quiet_ms) < 8000);
-  assert.deepEqual(worst, { dial_ms: 8000, ticket_ms: 8000, quiet_ms: 8000 });
+  assert.deepEqual(worst, { dial_ms: 8000, ticket_ms: 8000, quiet_ms: 8000, spare_ms: 1500 });
   assert.ok(unknown.dial_ms >= 5000 && unknown.quiet_ms > Number(good?.quiet_ms));
 });
 
 test('a radio is weak from 0.3 s on', () => {
   assert.deepEqual([null, after(290), after(300)].map(isWeak), [false, false, true]);
+});
+
+test('over a slow radio states come ahead, and beside a quiet connection another is dialled', () => {
+  assert.deepEqual([null, after(99), after(100)].map(aheadOf), [0, 0, 12]);
+  assert.deepEqual([null, after(99), after(100), after(600), after(3000)].map((trip) => limitsOf(trip).spare_ms), [Infinity, Infinity, 1000, 1200, 1500]);
 });

@@ -27,8 +27,13 @@ class Story {
   #sockets = 0;
   random;
   isCut = false;
+  /** What arrived while the phone slept. @type {(() => void)[] | null} */
+  held = null;
+  slept_ms = 0; // the page's monotonic clock stood still for so long
+  frames = 0;
   accepts_ms = 0; // how long the server takes to accept a connection
   every_ms = 100; // from one state to the next
+  isFormer = false; // a server that sends nothing ahead
 
   /** @param {string} radio @param {number} seed */
   constructor(radio, seed) {
@@ -45,7 +50,7 @@ class Story {
 
   /** The server's time of day. */
   serverTime() {
-    return Math.floor(this.offset_ms + this.now_ms * this.drift);
+    return Math.floor(this.offset_ms + this.slept_ms + this.now_ms * this.drift);
   }
 
   /** How long a packet and its repetitions are under way. */
@@ -56,12 +61,22 @@ class Story {
     return way_ms;
   }
 
-  /** A direction of a connection: what is sent arrives in its order, as over TCP. */
+  /** A direction of a connection: what is sent arrives in its order, as over TCP, and is repeated while the radio is cut. */
   direction() {
     let free_ms = 0;
-    return (/** @type {() => void} */ arrive) => {
+    /** @type {(() => void)[]} */
+    const waiting = [];
+    const send = (/** @type {() => void} */ arrive) => {
       free_ms = Math.max(free_ms, this.now_ms + this.#way_ms());
-      if (!this.isCut) this.later(free_ms - this.now_ms, arrive);
+      this.later(free_ms - this.now_ms, () => this.held ? this.held.push(arrive) : arrive());
+    };
+    const repeat = (/** @type {number} */ after_ms) => this.later(after_ms, () => {
+      if (this.isCut) repeat(2 * after_ms);
+      else for (const arrive of waiting.splice(0)) send(arrive);
+    });
+    return (/** @type {() => void} */ arrive) => {
+      if (!this.isCut && waiting.length === 0) return send(arrive);
+      if (waiting.push(arrive) === 1) repeat(1000);
     };
   }
 
@@ -71,21 +86,41 @@ class Story {
     /** @type {any} */
     const socket = { onopen: null, onmessage: null, isClosed: false, isOffered: false, made: 0, close() { this.isClosed = true; } };
     const say = (/** @type {object} */ message) => down(() => socket.onmessage?.({ data: JSON.stringify(message) }));
-    const frame = () => ({ ...state(), vehicle: 'car', made_ms: this.now_ms, server: { time_ms: this.serverTime(), boot: 'a' } });
+    const frame = () => ({ ...state(), vehicle: 'car', made_ms: this.now_ms + this.slept_ms, server: { time_ms: this.serverTime(), boot: 'a' } });
     let newest = frame();
-    let took_ms = 0;
+    let [took_ms, took, ahead, pushed_ms, offered_ms] = [0, 0, 0, 0, 0];
+    const offer = (/** @type {string[]} */ of) => {
+      offered_ms = this.now_ms;
+      say({ kind: 'offer', seq: (socket.made += 1), of, took_ms, ...(this.isFormer ? {} : { took }) });
+    };
+    const push = () => {
+      this.frames += 1;
+      pushed_ms = this.now_ms;
+      say(newest);
+    };
     const beat = () => {
       if (socket.isClosed) return;
       newest = frame();
-      if (!socket.isOffered) say({ kind: 'offer', seq: (socket.made += 1), of: ['state'], took_ms });
-      socket.isOffered = true;
+      if (ahead && this.now_ms - pushed_ms >= 150) {
+        ahead -= 1;
+        push();
+      } else if (!ahead && !socket.isOffered) {
+        socket.isOffered = true;
+        offer(['state']);
+      }
       this.later(this.every_ms, beat);
     };
     socket.send = (/** @type {string} */ text) => up(() => {
-      if (JSON.parse(text).kind !== 'take') return;
+      const message = JSON.parse(text);
+      if (message.kind !== 'take') return;
+      [took_ms, took] = [this.serverTime(), message.n];
+      ahead = this.isFormer ? 0 : message.ahead ?? 0;
+      if (ahead && message.seq === 0) {
+        if (this.now_ms - offered_ms >= 500) offer([]);
+        return;
+      }
       socket.isOffered = false;
-      took_ms = this.serverTime();
-      say(newest);
+      push();
     });
     up(() => down(() => up(() => this.later(this.accepts_ms, () => { // the connection, then the request on it
       took_ms = this.serverTime();
@@ -115,45 +150,59 @@ class Story {
 }
 
 /**
- * A minute, with the radio cut now and then; returns what the page showed.
+ * A page before the story's server. `run` lets time pass, with a look at what the page shows ten times a second.
  * @param {import('node:test').TestContext} t
  * @param {Story} story
  */
-function watch(t, story) {
+function page(t, story) {
   t.mock.timers.enable({ apis: ['setTimeout', 'setInterval'] });
   t.mock.method(performance, 'now', () => story.now_ms);
+  t.mock.method(Date, 'now', () => story.now_ms + story.slept_ms);
+  t.mock.method(Math, 'random', chance(story.offset_ms));
   const store = new Store(() => story.dial());
   store.vehicle = 'car';
   store.painter.picture = store.painter.look = () => {}; // nothing is drawn here
+  /** @type {number[]} */
   const errors_ms = [];
-  let [seen, shown, last_ms] = [0, 0, 0];
+  let [seen, last_ms, beats] = [0, story.now_ms, 0];
+  store.on('beat', () => { beats += 1; });
   store.start();
   const look = () => {
     t.mock.timers.tick(Math.round(story.now_ms - last_ms));
     last_ms = story.now_ms;
     const frame = /** @type {any} */ (store.frame);
     seen += 1;
-    if (!frame || store.isSilent) return;
-    shown += 1;
-    errors_ms.push(store.lag_s * 1000 - (story.now_ms - frame.made_ms));
+    if (frame && !store.isSilent) errors_ms.push(store.lag_s * 1000 - (story.now_ms + story.slept_ms - frame.made_ms));
   };
-  last_ms = story.now_ms;
+  const end = () => {
+    store.stop();
+    t.mock.timers.reset();
+    t.mock.restoreAll();
+    return { errors_ms, share: errors_ms.length / seen, beats };
+  };
+  return { store, look, end, errors_ms, run: (/** @type {number} */ lasts_ms) => story.run(story.now_ms + lasts_ms, look) };
+}
+
+/**
+ * A minute, with the radio cut now and then; returns what the page showed.
+ * @param {import('node:test').TestContext} t
+ * @param {Story} story
+ */
+function watch(t, story) {
+  const { run, end } = page(t, story);
   for (let s = 0; s < 60; s += 10) {
     story.isCut = s % 20 === 10 && story.random() < 0.5;
-    story.run(story.now_ms + 3000, look);
+    run(3000);
     story.isCut = false;
-    story.run(story.now_ms + 7000, look);
+    run(7000);
   }
-  store.stop();
-  t.mock.timers.reset();
-  return { errors_ms, share: shown / seen };
+  return end();
 }
 
 for (const radio of Object.keys(RADIOS)) {
   test(`over a ${radio} radio no age is shown that is more than 0.2 s too young, from the first frame on`, (t) => {
     for (let seed = 1; seed <= 8; seed += 1) {
       const { errors_ms, share } = watch(t, new Story(radio, seed));
-      t.mock.restoreAll();
       assert.ok(Math.min(...errors_ms) >= -200, `seed ${seed}: ${Math.min(...errors_ms)} ms`);
       const middle_ms = errors_ms.sort((a, b) => a - b)[errors_ms.length >> 1] ?? Infinity;
       assert.ok(middle_ms <= 200, `seed ${seed}: ${middle_ms} ms too old`);
@@ -176,4 +225,48 @@ test('a server that took long to accept makes the first frame look old, and no o
   const { errors_ms, share } = watch(t, story);
   assert.ok(Math.min(...errors_ms) >= -200);
   assert.ok(share > 0.6, `${share} of the time live`);
+});
+
+for (const [radio, least] of /** @type {[string, number][]} */ ([['fair', 4], ['weak', 3], ['bad', 1]])) {
+  test(`over a ${radio} radio states come ahead: more than ${least} a second, and more than one by one`, (t) => {
+    const rates = [false, true].map((isFormer) => {
+      let beats = 0;
+      for (let seed = 1; seed <= 4; seed += 1) {
+        const story = new Story(radio, seed);
+        story.isFormer = isFormer;
+        const { run, end } = page(t, story);
+        run(60_000);
+        beats += end().beats;
+      }
+      return beats / 240;
+    });
+    assert.ok(Number(rates[0]) > least && Number(rates[0]) > 1.2 * Number(rates[1]), String(rates));
+  });
+}
+
+for (const isLookedFirst of [true, false]) test(`what came ahead while the phone slept is not shown, though its clock stood still meanwhile${isLookedFirst ? '' : ', and though it is read before the page looks'}`, (t) => {
+  let most = 0;
+  for (let seed = 1; seed <= 8; seed += 1) {
+    const story = new Story('fair', seed);
+    const { run, look, end, errors_ms, store } = page(t, story);
+    run(10_000);
+    const before = errors_ms.length;
+    story.held = [];
+    story.run(story.now_ms + 1500, () => {}); // the server sends what it may, and nothing is read
+    const held = story.held;
+    story.held = null;
+    story.slept_ms += 60_000;
+    if (isLookedFirst) look(); // the page wakes
+    const shown = store.frame;
+    for (const arrive of held) arrive();
+    assert.equal(store.frame, shown, 'nothing of before the sleep is taken');
+    look();
+    run(5000);
+    most = Math.max(most, held.length);
+    assert.ok(errors_ms.length > before + 20, 'then it is live again');
+    assert.equal(store.isSilent, false);
+    const { errors_ms: all } = end();
+    assert.ok(Math.min(...all) >= -200, `seed ${seed}: ${Math.min(...all)} ms`);
+  }
+  assert.ok(most >= 5, `${most} waited`);
 });
