@@ -35,11 +35,10 @@ class Take(TypedDict):
     """Takes what was offered, or states that a state came which was sent ahead."""
 
     kind: Literal["take"]
-    seq: Annotated[int, doc("of the offer; with `ahead` 0: of none")]
+    seq: Annotated[int, doc("of the offer; 0: of none")]
     n: NotRequired[Annotated[int, doc("counts the takes of a connection from 1 on")]]
-    ahead: NotRequired[
-        Annotated[int, doc("so many states may be sent before the next take, without an offer; at most 12")]
-    ]
+    ahead: NotRequired[Annotated[int, doc("so many states may be under way, sent without an offer; at most 12")]]
+    got: NotRequired[Annotated[int, doc("with `ahead`: how many states this connection has brought")]]
 
 
 class Have(TypedDict):

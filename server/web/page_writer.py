@@ -1,7 +1,7 @@
 """The writer of one page: offers of frames and events, at most one of each unanswered, and replies to commands.
 
-Nothing else is pushed (see docs/protocol.md), so a page that stops reading costs nothing, delays nobody, and gets
-nothing outdated when it resumes.
+Of states it also sends as many ahead as the page allows (see docs/protocol.md), and nothing else. So a page that stops
+reading costs nothing, delays nobody, and gets nothing else that is outdated when it resumes.
 """
 
 from __future__ import annotations
@@ -88,7 +88,8 @@ class PageWriter:
         self._are_events_unanswered = False
         self._has_begun = False  # the page said hello
         self._is_former = False
-        self.skipped = 0  # frames that were replaced by newer ones before the page took them
+        self._is_state_waiting = False  # a state of the live car came that was not sent yet
+        self.skipped = 0  # states of the live car that were replaced by newer ones before they were sent
 
     # -- what is new -------------------------------------------------------------------------------------------------
 
@@ -101,15 +102,14 @@ class PageWriter:
             why = self._bus.trouble(self._vehicle)
             if why is not None and not self._replies:  # a page that does not read does not get it again
                 self.queue({"kind": "unserved", "why": why})
-        elif kind == "scan" and self._view.is_replaying:
+        elif kind == "scan" and (self._view.is_replaying or not self._watches_scan):
             return
-        elif kind == "state" and self._offers.may_push:
-            self._wakeup.queue(self._wake)
-        elif self._offers.is_open or (kind == "scan" and not self._watches_scan):
-            if kind == "state":
-                self.skipped += 1
         else:
-            self._wakeup.queue(self._wake)
+            if kind == "state" and not self._view.is_replaying:
+                self.skipped += self._is_state_waiting
+                self._is_state_waiting = True
+            if not self._offers.is_open or (kind == "state" and self._offers.may_push):
+                self._wakeup.queue(self._wake)
 
     def on_replay(self, kind: str) -> None:
         """Something new of the page's replay."""
@@ -119,6 +119,7 @@ class PageWriter:
     def on_turned(self) -> None:
         """Switch the source of the page's frames: none of them was sent yet."""
         self._sent = dict.fromkeys(self._view.kinds, 0)
+        self._is_state_waiting = False
         self._wake.set()
 
     # -- what the page answers ---------------------------------------------------------------------------------------
@@ -154,8 +155,7 @@ class PageWriter:
 
     def take(self, message: Mapping[str, object]) -> None:
         """The page takes what was offered, or has a state that was sent ahead."""
-        if self._offers.taken(message.get("seq"), message.get("n"), message.get("ahead")):
-            self._is_taking = True
+        self._is_taking = self._offers.taken(message) or self._is_taking
         self._wakeup.queue(self._wake)
 
     def have_events(self) -> None:
@@ -237,11 +237,13 @@ class PageWriter:
         if self._is_taking:
             self._is_taking = False
             for kind in self._view.kinds:
-                if self._is_new(kind):
+                if self._is_new(kind) and (kind != "state" or self._offers.has_room):
                     await self._send_newest(kind)
         elif self._offers.may_push and self._is_new("state") and self._is_time(self._offers.push_wait_s()):
-            await self._send_newest("state", is_ahead=True)
-        if self._offers.is_echo_due or not self._offers.is_open:
+            await self._send_newest("state")
+        if self._offers.is_echo_due:
+            await self._send_offer([])  # behind the state: it measures how long the last of those under way takes
+        if not self._offers.is_open:
             await self._offer()
 
     async def _send_events(self) -> None:
@@ -258,14 +260,14 @@ class PageWriter:
             await self._send(message)
 
     async def _offer(self) -> None:
-        is_echo = self._offers.is_open
-        waits = () if is_echo else tuple(kind for kind in self._view.kinds if self._is_new(kind))
+        waits = [kind for kind in self._view.kinds if self._is_new(kind)]
         fresh = [kind for kind in waits if kind != "state" or not self._offers.may_push]
-        if not (fresh or self._offers.is_echo_due) or not self._is_time(self._offers.offer_wait_s()):
-            return
-        seq = self._offers.offered(is_echo=not fresh)
-        took_ms, took = self._offers.took_ms, self._offers.took
-        await self._send({"kind": "offer", "seq": seq, "of": fresh, "took_ms": took_ms, "took": took})
+        if fresh and self._is_time(self._offers.offer_wait_s()):
+            await self._send_offer(fresh)
+
+    async def _send_offer(self, of: list[FrameKind]) -> None:
+        seq, took_ms, took = self._offers.offered(is_echo=not of), self._offers.took_ms, self._offers.took
+        await self._send({"kind": "offer", "seq": seq, "of": of, "took_ms": took_ms, "took": took})
 
     def _is_time(self, wait_s: float) -> bool:
         """Whether nothing is to be waited for; else another round follows when it is over."""
@@ -276,11 +278,9 @@ class PageWriter:
         return not is_early
 
     def _is_new(self, kind: FrameKind) -> bool:
-        if kind == "scan" and not self._watches_scan:
-            return False
-        return self._view.number(kind) > self._sent[kind]
+        return (kind != "scan" or self._watches_scan) and self._view.number(kind) > self._sent[kind]
 
-    async def _send_newest(self, kind: FrameKind, *, unasked: bool = False, is_ahead: bool = False) -> None:
+    async def _send_newest(self, kind: FrameKind, *, unasked: bool = False) -> None:
         number, frame = self._view.number(kind), self._view.newest(kind)
         is_new = frame is not None and (unasked or frame.number > self._sent[kind])
         self._sent[kind] = max(self._sent[kind], number)  # also of one without a payload: it is not offered again
@@ -288,7 +288,8 @@ class PageWriter:
             return
         self._sent[kind] = frame.number
         if kind == "state":
-            self._offers.sent_state(is_ahead=is_ahead)
+            self._offers.sent_state()
+            self._is_state_waiting = False
         if isinstance(frame.payload, bytes):
             await self._socket.send_bytes(frame.payload)
         else:

@@ -273,13 +273,61 @@ test('an offer answers the take that it names, and one of nothing measures the r
     at(ms);
     pageSocket.answered(ms, 'state');
   }
-  assert.deepEqual(sockets[0]?.sent.map((text) => JSON.parse(text).ahead), [12, 12, 12]);
+  const takes = sockets[0]?.sent.map((text) => JSON.parse(text));
+  assert.deepEqual(takes?.map(({ n, ahead, got }) => [n, ahead, got]), [[1, 3, 1], [2, 3, 2], [3, 3, 3]]);
   assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 2, of: ['cars'], took: 2 }), 1400), 1100);
   assert.equal(pageSocket.trip, before);
   assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 3, of: [], took: 3 }), 1400), 1200);
   assert.notEqual(pageSocket.trip, before);
   assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 4, of: ['state'], took: 77 }), 1400), -Infinity, 'of no take of this page');
   assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 5, of: ['state'] }), 1400), 1200, 'of a former server: the last one');
+});
+
+test('a state that came ahead proves nothing, nor does an answer that took longer than a connection may be quiet', () => {
+  for (const [lag_ms, isClosed] of /** @type {[number, boolean][]} */ ([[500, false], [20_000, true]])) {
+    const { sockets, at, pageSocket, look } = slow();
+    for (let ms = 500; ms < 40_000; ms += 500) {
+      at(ms);
+      pageSocket.answered(ms, 'state'); // an old one: nothing calls `proof`
+      pageSocket.offered(/** @type {any} */ ({ seq: 2, of: [], took: (ms - lag_ms) / 500 }), ms);
+      look(ms, ms);
+    }
+    assert.equal(sockets[0]?.isClosed, isClosed);
+  }
+});
+
+test('a take that waits for its turn is not sent over another connection, and keeps none of that waiting', (t) => {
+  t.mock.timers.enable({ apis: ['setTimeout'] });
+  const { sockets, at, pageSocket } = slow();
+  const takes = (/** @type {number} */ i) => sockets[i]?.sent.map((text) => JSON.parse(text)).filter(({ kind }) => kind === 'take').map(({ seq }) => seq);
+  at(1000);
+  for (const seq of [7, 8]) pageSocket.takeInTurn(() => pageSocket.send({ kind: 'take', seq }));
+  pageSocket.takeInTurn(() => pageSocket.send({ kind: 'take', seq: 9 }));
+  assert.deepEqual(takes(0), [7, 8], 'the third waits');
+  sockets[0]?.onclose();
+  at(3500);
+  pageSocket.look(3500);
+  sockets[1]?.onopen();
+  pageSocket.send({ kind: 'watch' });
+  pageSocket.send({ kind: 'watch' });
+  pageSocket.takeInTurn(() => pageSocket.send({ kind: 'take', seq: 1 }));
+  at(3600);
+  t.mock.timers.tick(200);
+  assert.deepEqual([takes(0), takes(1)], [[7, 8], [1]]);
+});
+
+test('after a sleep states are trusted once the take is answered that is sent at once', () => {
+  const { sockets, at, pageSocket } = slow();
+  at(1000);
+  pageSocket.answered(1000, 'state');
+  pageSocket.slept();
+  assert.equal(pageSocket.isTrusted, false);
+  const { n, seq, ahead } = JSON.parse(String(sockets[0]?.sent.at(-1)));
+  assert.deepEqual([n, seq, ahead], [2, 0, 3]);
+  pageSocket.offered(/** @type {any} */ ({ seq: 2, of: [], took: 1 }), 1100);
+  assert.equal(pageSocket.isTrusted, false, 'of before the sleep');
+  pageSocket.offered(/** @type {any} */ ({ seq: 3, of: [], took: 2 }), 1200);
+  assert.equal(pageSocket.isTrusted, true);
 });
 
 test('a server that refuses at once is dialled every two seconds', () => {

@@ -10,6 +10,9 @@ const Store = await storeAlone();
 /** The least that packets need, what more they may need, and of how many one is repeated after a second. @type {Record<string, [base_ms: number, jitter_ms: number, loss: number]>} */
 const RADIOS = { clean: [1, 1, 0], fair: [60, 40, 0.02], weak: [100, 100, 0.05], bad: [200, 200, 0.1] };
 
+/** Bytes on the radio, of a state that is compressed and of any other message. */
+const [STATE, SMALL] = [800, 120];
+
 /** Numbers that look random, the same for each seed. @param {number} seed */
 function chance(seed) {
   let at = seed;
@@ -34,6 +37,12 @@ class Story {
   accepts_ms = 0; // how long the server takes to accept a connection
   every_ms = 100; // from one state to the next
   isFormer = false; // a server that sends nothing ahead
+  kbit_s = Infinity; // what each direction carries
+  mostUnderWay = 0; // states sent ahead
+  /** How long events took that nothing delayed on purpose. @type {number[]} */
+  events_ms = [];
+  /** Of each state, how old it was when it came. @type {number[]} */
+  came_ms = [];
 
   /** @param {string} radio @param {number} seed */
   constructor(radio, seed) {
@@ -63,19 +72,20 @@ class Story {
 
   /** A direction of a connection: what is sent arrives in its order, as over TCP, and is repeated while the radio is cut. */
   direction() {
-    let free_ms = 0;
+    let [free_ms, carried_ms] = [0, 0];
     /** @type {(() => void)[]} */
     const waiting = [];
-    const send = (/** @type {() => void} */ arrive) => {
-      free_ms = Math.max(free_ms, this.now_ms + this.#way_ms());
+    const send = (/** @type {() => void} */ arrive, bytes = SMALL) => {
+      carried_ms = Math.max(carried_ms, this.now_ms) + bytes * 8 / this.kbit_s;
+      free_ms = Math.max(free_ms, carried_ms + this.#way_ms());
       this.later(free_ms - this.now_ms, () => this.held ? this.held.push(arrive) : arrive());
     };
     const repeat = (/** @type {number} */ after_ms) => this.later(after_ms, () => {
       if (this.isCut) repeat(2 * after_ms);
       else for (const arrive of waiting.splice(0)) send(arrive);
     });
-    return (/** @type {() => void} */ arrive) => {
-      if (!this.isCut && waiting.length === 0) return send(arrive);
+    return (/** @type {() => void} */ arrive, /** @type {number} */ bytes = SMALL) => {
+      if (!this.isCut && waiting.length === 0) return send(arrive, bytes);
       if (waiting.push(arrive) === 1) repeat(1000);
     };
   }
@@ -84,29 +94,40 @@ class Story {
     this.#sockets += 1;
     const [up, down] = [this.direction(), this.direction()];
     /** @type {any} */
-    const socket = { onopen: null, onmessage: null, isClosed: false, isOffered: false, made: 0, close() { this.isClosed = true; } };
-    const say = (/** @type {object} */ message) => down(() => socket.onmessage?.({ data: JSON.stringify(message) }));
+    const socket = { onopen: null, onmessage: null, isClosed: false, isOffered: 0, made: 0, close() { this.isClosed = true; } };
+    const say = (/** @type {object} */ message, bytes = SMALL) => {
+      const sent_ms = this.now_ms;
+      down(() => {
+        if ('events' in message && !socket.isClosed) this.events_ms.push(this.now_ms - sent_ms);
+        if ('made_ms' in message && !socket.isClosed) this.came_ms.push(this.now_ms - Number(message.made_ms));
+        socket.onmessage?.({ data: JSON.stringify(message) });
+      }, bytes);
+    };
     const frame = () => ({ ...state(), vehicle: 'car', made_ms: this.now_ms + this.slept_ms, server: { time_ms: this.serverTime(), boot: 'a' } });
     let newest = frame();
-    let [took_ms, took, ahead, pushed_ms, offered_ms] = [0, 0, 0, 0, 0];
+    let pushed = newest;
+    let [took_ms, took, ahead, pushed_ms, echoed_ms, sent, got] = [0, 0, 0, 0, 0, 0, 0];
+    const hasRoom = () => ahead === 0 || sent - got < ahead;
+    const mayPush = () => ahead > 0 && hasRoom() && this.now_ms - pushed_ms >= 150;
     const offer = (/** @type {string[]} */ of) => {
-      offered_ms = this.now_ms;
+      if (of.length === 0) echoed_ms = this.now_ms;
       say({ kind: 'offer', seq: (socket.made += 1), of, took_ms, ...(this.isFormer ? {} : { took }) });
     };
     const push = () => {
       this.frames += 1;
       pushed_ms = this.now_ms;
-      say(newest);
+      pushed = newest;
+      sent += 1;
+      say(newest, STATE);
+      if (ahead) this.mostUnderWay = Math.max(this.mostUnderWay, sent - got);
     };
     const beat = () => {
       if (socket.isClosed) return;
       newest = frame();
-      if (ahead && this.now_ms - pushed_ms >= 150) {
-        ahead -= 1;
-        push();
-      } else if (!ahead && !socket.isOffered) {
-        socket.isOffered = true;
+      if (mayPush()) push();
+      if (!(ahead && hasRoom()) && !socket.isOffered) {
         offer(['state']);
+        socket.isOffered = socket.made;
       }
       this.later(this.every_ms, beat);
     };
@@ -114,20 +135,23 @@ class Story {
       const message = JSON.parse(text);
       if (message.kind !== 'take') return;
       [took_ms, took] = [this.serverTime(), message.n];
-      ahead = this.isFormer ? 0 : message.ahead ?? 0;
-      if (ahead && message.seq === 0) {
-        if (this.now_ms - offered_ms >= 500) offer([]);
-        return;
-      }
-      socket.isOffered = false;
-      push();
+      [ahead, got] = this.isFormer ? [0, 0] : [message.ahead ?? 0, message.got ?? got];
+      const isTaken = socket.isOffered > 0 && message.seq === socket.isOffered;
+      if (isTaken) socket.isOffered = 0;
+      if (isTaken ? hasRoom() : mayPush() && newest !== pushed) push();
+      if (ahead && this.now_ms - echoed_ms >= 500) offer([]);
     });
     up(() => down(() => up(() => this.later(this.accepts_ms, () => { // the connection, then the request on it
       took_ms = this.serverTime();
       down(() => socket.onopen?.());
       say({ kind: 'hello', boot: 'a', run: 'a', time_ms: this.serverTime(), vehicle: 'car', vehicles: ['car'], build: '', last_event: 0 });
-      say(newest);
+      push();
       this.later(50, beat);
+      const event = () => {
+        if (!socket.isClosed) say({ kind: 'events', events: [], last: 0 });
+        if (!socket.isClosed) this.later(1700, event);
+      };
+      this.later(1700, event);
     }))));
     return socket;
   }
@@ -241,6 +265,30 @@ for (const [radio, least] of /** @type {[string, number][]} */ ([['fair', 4], ['
       return beats / 240;
     });
     assert.ok(Number(rates[0]) > least && Number(rates[0]) > 1.2 * Number(rates[1]), String(rates));
+  });
+}
+
+/** A minute over a radio that carries little, from the first connection on. @param {import('node:test').TestContext} t @param {number} kbit_s @param {number} seed */
+function thin(t, kbit_s, seed) {
+  const story = new Story('weak', seed);
+  story.radio = [100, 50, 0];
+  story.kbit_s = kbit_s;
+  const { run, end } = page(t, story);
+  run(60_000);
+  const { beats, share } = end();
+  story.came_ms.sort((a, b) => a - b);
+  return { mostUnderWay: story.mostUnderWay, beats, share, middle_ms: Number(story.came_ms[story.came_ms.length >> 1]), oldest_ms: Number(story.came_ms.at(-1)), latest_ms: Math.max(...story.events_ms) };
+}
+
+for (const [kbit_s, middle_ms, oldest_ms, share] of /** @type {[number, number, number, number][]} */ ([[8, 1200, 3300, 0.6], [16, 1200, 2000, 0.9], [32, 1000, 1600, 0.9], [64, 600, 1000, 0.9]])) {
+  test(`over ${kbit_s} kbit/s no queue of states makes them old, or an event late`, (t) => {
+    for (let seed = 1; seed <= 4; seed += 1) {
+      const found = thin(t, kbit_s, seed);
+      const text = `seed ${seed}: ${JSON.stringify(found)}`;
+      assert.ok(found.middle_ms <= middle_ms && found.oldest_ms <= oldest_ms, text);
+      assert.ok(found.latest_ms <= oldest_ms && found.share >= share, text);
+      assert.ok(found.mostUnderWay <= 12, text);
+    }
   });
 }
 

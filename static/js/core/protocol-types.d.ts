@@ -2581,12 +2581,14 @@ export interface SuppressedAlarm {
 /** Takes what was offered, or states that a state came which was sent ahead. */
 export interface Take {
   kind: "take";
-  /** of the offer; with `ahead` 0: of none */
+  /** of the offer; 0: of none */
   seq: number;
   /** counts the takes of a connection from 1 on */
   n?: number;
-  /** so many states may be sent before the next take, without an offer; at most 12 */
+  /** so many states may be under way, sent without an offer; at most 12 */
   ahead?: number;
+  /** with `ahead`: how many states this connection has brought */
+  got?: number;
 }
 
 /** Takes, gives or requests control; server/control/lease.py says who may do what. */

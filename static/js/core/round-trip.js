@@ -9,8 +9,13 @@
 const WEAK_MS = 300;
 /** Above this a state for each round trip is too few. */
 const AHEAD_MS = 100;
-/** So many states may then come ahead of the next take: as many as the server sends within 1.8 s. */
+/** So many states may then be under way at most: as many as the server sends within 1.8 s. */
 const AHEAD = 12;
+/** And so many at first. */
+const FIRST_AHEAD = 3;
+/** States may wait for each other so long on a radio that carries little; and of so many late answers in a row one was not late by loss. */
+const QUEUE_MS = 400;
+const LATE_IN_A_ROW = 3;
 /** Before anything is measured, the slowest radio is assumed. @type {Limits} */
 const UNKNOWN = { dial_ms: 5000, ticket_ms: 5000, quiet_ms: 5000, spare_ms: Infinity };
 /** The system repeats an unanswered request for a connection after 1 s (RFC 6298, 2.1): sooner, no limit may end. */
@@ -64,4 +69,36 @@ export function isWeak(trip) {
 /** How many states may come ahead of the next take. @param {RoundTrip | null} trip */
 export function aheadOf(trip) {
   return trip !== null && trip.mean_ms >= AHEAD_MS ? AHEAD : 0;
+}
+
+/** How many states may be under way: fewer where each answer is late, for they then wait behind each other. Of one connection. */
+export class AheadWindow {
+  size = FIRST_AHEAD;
+  #least_ms;
+  #changed_ms = -Infinity;
+  /** Answers in a row that were late. @type {number[]} */
+  #late_ms = [];
+
+  /** @param {number} least_ms a round trip with nothing under way */
+  constructor(least_ms) {
+    this.#least_ms = least_ms;
+  }
+
+  /**
+   * A take was answered.
+   * @param {number} asked_ms
+   * @param {number} at_ms
+   */
+  answered(asked_ms, at_ms) {
+    if (asked_ms < this.#changed_ms) return; // before, more were under way
+    const waited_ms = at_ms - asked_ms;
+    this.#least_ms = Math.min(this.#least_ms, waited_ms);
+    const most_ms = this.#least_ms + QUEUE_MS;
+    this.#late_ms = waited_ms > most_ms ? [...this.#late_ms, waited_ms] : [];
+    if (this.#late_ms.length === 0) this.size = Math.min(AHEAD, this.size + 1);
+    if (this.#late_ms.length < LATE_IN_A_ROW) return;
+    this.size = Math.max(1, Math.floor(this.size * most_ms / Math.min(...this.#late_ms)));
+    this.#late_ms = [];
+    this.#changed_ms = at_ms;
+  }
 }

@@ -3,15 +3,13 @@
 
 import { Dials } from './dials.js';
 import { aheadOf, isSlower, limitsOf, measured } from './round-trip.js';
+import { Takes } from './takes.js';
 
 /** A page sends at most 25 messages a second: frames are taken up to the first, a replay is led up to the second; what a person orders never waits. */
 const TAKES_A_S = 24;
 export const LEADS_A_S = 25;
 /** Besides, so that a replay never holds up the frames: a take waits while so many of all were sent within so long [ms], a lead while so many leads were. @type {Record<string, [few: number, ms: number]>} */
 const EVENLY = { take: [2, 85], replay: [2, 250] };
-
-/** Of so many takes it is known when they were sent. */
-const KEPT_TAKES = 100;
 
 /**
  * @typedef {Pick<WebSocket, 'binaryType' | 'send' | 'close'> & {onopen: any, onmessage: any, onclose: any, onerror: any, dialled_ms?: number}} Socket dialled_ms: when it was, where that was not at once [ms, monotonic]
@@ -34,21 +32,11 @@ export class PageSocket {
   #proof_ms = 0;
   /** When anything came. */
   #came_ms = -Infinity;
-  /** When the last frame was asked for, or this connection; and whether it is still to come. */
-  #asked_ms = -Infinity;
-  #isOwed = false;
-  /** When the last takes were sent, by their number; 0: when it was dialled. @type {Map<number, number>} */
-  #takes = new Map();
-  #taken = 0;
-  /** States come without an offer, up to so many. */
-  #ahead = 0;
-  /** States count again once the server has answered this take; 0: they do. */
-  #trustedFrom = 0;
+  /** Of the open one, or of the last. */
+  #takes = new Takes();
   #dials;
   /** The last messages. @type {{kind: unknown, at_ms: number}[]} */
   #sent = [];
-  /** What waits for its turn to take: an offer, a state that came ahead. @type {Set<string>} */
-  #taking = new Set();
 
   /**
    * @param {Ear} ear
@@ -69,7 +57,7 @@ export class PageSocket {
 
   /** When this connection was dialled [ms, monotonic]. */
   get dialled_ms() {
-    return this.#takes.get(0) ?? -Infinity;
+    return this.#takes.sent_ms(0);
   }
 
   /**
@@ -78,23 +66,28 @@ export class PageSocket {
    * @param {number} at_ms when it came
    */
   offered({ took, of }, at_ms) {
-    if (took === undefined) return this.#asked_ms;
-    const asked_ms = this.#takes.get(took) ?? -Infinity;
-    if (took >= this.#trustedFrom) this.#trustedFrom = 0;
-    if (of.length === 0 && asked_ms > -Infinity) this.trip = measured(this.trip, at_ms - asked_ms);
-    this.#ahead = aheadOf(this.trip);
+    if (took === undefined) return this.#takes.asked_ms;
+    const asked_ms = this.#takes.sent_ms(took);
+    const isEcho = of.length === 0 && asked_ms > -Infinity;
+    if (isEcho) {
+      // An answer that comes too late is no proof, nor is a state that came ahead: both may have waited behind others.
+      if (at_ms - asked_ms <= limitsOf(this.trip).quiet_ms) this.proof(at_ms);
+      this.trip = measured(this.trip, at_ms - asked_ms);
+    }
+    this.#takes.received(took, aheadOf(this.trip), isEcho ? at_ms : undefined);
     return asked_ms;
   }
 
   /** The phone slept: states that came ahead meanwhile look young, for its clock may have stood still. */
   slept() {
-    if (this.#ahead) this.#trustedFrom = this.#taken + 1;
-    this.#ahead = 0;
+    if (!this.#takes.ahead) return;
+    this.#takes.distrust();
+    this.send({ kind: 'take', seq: 0 });
   }
 
   /** Whether states are of after the last sleep. */
   get isTrusted() {
-    return this.#trustedFrom === 0;
+    return this.#takes.isTrusted;
   }
 
   /**
@@ -103,12 +96,12 @@ export class PageSocket {
    * @param {'state' | 'cars' | 'scan'} kind
    */
   answered(at_ms, kind) {
-    if (this.#isOwed) {
-      this.#isOwed = false;
-      if (!this.#ahead) this.trip = measured(this.trip, at_ms - this.#asked_ms);
+    const takes = this.#takes;
+    if (takes.got(kind === 'state') && !takes.ahead) {
+      this.trip = measured(this.trip, at_ms - takes.asked_ms);
       this.proof(at_ms);
     }
-    if (kind === 'state' && this.#ahead) this.takeInTurn(() => this.send({ kind: 'take', seq: 0 }), kind);
+    if (kind === 'state' && takes.ahead) this.takeInTurn(() => this.send({ kind: 'take', seq: 0 }), kind);
   }
 
   /**
@@ -146,18 +139,9 @@ export class PageSocket {
   send(message) {
     if (!this.#socket) return false;
     const [kind, at_ms] = ['kind' in message ? message.kind : '', this.now()];
-    this.#socket.send(JSON.stringify(kind === 'take' ? this.#counted(message, at_ms) : message));
+    this.#socket.send(JSON.stringify(kind === 'take' ? this.#takes.counted(message, at_ms) : message));
     this.#sent = [...this.#sent.slice(-LEADS_A_S), { kind, at_ms }];
     return true;
-  }
-
-  /** A take with its number, and how many states may come ahead. @param {object} take @param {number} at_ms */
-  #counted(take, at_ms) {
-    [this.#asked_ms, this.#isOwed] = [at_ms, true];
-    this.#taken += 1;
-    this.#takes.set(this.#taken, at_ms);
-    this.#takes.delete(this.#taken - KEPT_TAKES);
-    return { ...take, n: this.#taken, ...(this.#ahead ? { ahead: this.#ahead } : {}) };
   }
 
   /**
@@ -174,12 +158,14 @@ export class PageSocket {
     else run();
   }
 
-  /** Take a frame in turn; one take of a kind waits at a time, for what is taken is the newest. @param {() => void} take @param {string} [kind] */
+  /** Take a frame in turn, of this connection; one take of a kind waits at a time, for what is taken is the newest. @param {() => void} take @param {string} [kind] */
   takeInTurn(take, kind = 'offer') {
-    if (this.#taking.has(kind)) return;
-    this.#taking.add(kind);
+    const takes = this.#takes;
+    if (takes.waiting.has(kind)) return;
+    takes.waiting.add(kind);
     this.inTurn(TAKES_A_S, () => {
-      this.#taking.delete(kind);
+      if (takes !== this.#takes) return;
+      takes.waiting.delete(kind);
       take();
     }, 'take');
   }
@@ -195,7 +181,7 @@ export class PageSocket {
     this.#forsake();
     this.#close(this.#socket);
     this.#socket = null;
-    this.#isOwed = false;
+    this.#takes.isOwed = false;
   }
 
   /** @param {number} now_ms */
@@ -229,10 +215,8 @@ export class PageSocket {
     this.#socket = socket;
     this.#dials.opened();
     this.#proof_ms = this.#came_ms = this.now();
-    this.#asked_ms = asked_ms;
-    this.#takes = new Map([[0, asked_ms]]);
-    this.#taken = this.#ahead = this.#trustedFrom = 0;
     const opened_ms = (at_ms - asked_ms) / 2; // to connect, and to become a WebSocket
+    this.#takes = new Takes(asked_ms, opened_ms);
     if (isSlower(this.trip, opened_ms)) this.trip = measured(null, opened_ms);
     socket.onmessage = (/** @type {{data: any, at_ms?: number}} */ event) => {
       this.#came_ms = this.now();
@@ -248,7 +232,7 @@ export class PageSocket {
   #drop() {
     this.#close(this.#socket);
     this.#socket = null;
-    this.#isOwed = false;
+    this.#takes.isOwed = false;
     this.#dials.gone();
     this.ear.closed();
   }
