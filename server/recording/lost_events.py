@@ -26,6 +26,8 @@ log = logging.getLogger("catgraph.recording")
 MOST_EVENTS = 50_000  # of a vehicle; some 25 MB of the log
 MOST_CUT_BYTES = 64 << 20  # one that was never closed is read from its beginning: a longer one for an empty log only
 _NONE = Newest(n=0, at_ms=-math.inf)
+# What every event has since, in place of what those of older recordings lack.
+_LATER: Mapping[str, Any] = {"alarm": None, "text": "", "by": None, "settings_version": 0}
 
 
 def lost_events(root: Path, newest: Mapping[str, Newest]) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -50,7 +52,7 @@ def _lost_of(paths: Iterable[Path], newest: Mapping[str, Newest]) -> Iterator[tu
             continue
         have = newest.get(vehicle, _NONE)
         lost = [row for row in rows if have.n < row["n"] < least and row["at_ms"] >= have.at_ms]
-        found += ((vehicle, {**row, "brought_from": id_of(path)}) for row in lost)
+        found += ((vehicle, {**_LATER, **row, "brought_from": id_of(path)}) for row in lost)
         least = lost[0]["n"] if lost else least
         known = [row for row in rows if row["n"] <= have.n]
         has_all = least == have.n + 1

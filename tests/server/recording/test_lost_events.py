@@ -138,6 +138,7 @@ async def test_a_server_whose_log_was_deleted_shows_them_as_brought_back_and_ann
         await page.until(lambda: page.states)
         shown = (await client.get("/api/log", params={"limit": 200})).json()["events"]
         brought = [one["n"] for one in shown if "brought_from" in one]
+        assert {(one["by"], one["settings_version"]) for one in shown if "brought_from" in one} == {(None, 0)}
         assert brought == list(range(50, 0, -1))
         assert any("50 events were brought back" in one["text"] for one in shown if one["n"] > 50)
         assert all(one["n"] > 50 for one in page.events)
