@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import time
 from collections import deque
-from collections.abc import AsyncGenerator, Callable, Iterable, Iterator, Sequence
+from collections.abc import AsyncGenerator, Callable, Iterable, Iterator
 from itertools import islice
 from typing import Any, Protocol, TypeVar
 
@@ -102,8 +102,8 @@ async def play(
     count = 0
     async with contextlib.aclosing(_fetched(iter(messages), ahead)) as fetched:
         async for batch in fetched:
-            await playing.play(batch)
             count += len(batch)
+            await playing.play(batch)
     if on_end is not None:
         on_end()
     return count
@@ -132,11 +132,11 @@ class _Playing:
         self._timer: Timer | None = None
         self._played: asyncio.Future[None]
 
-    async def play(self, batch: Sequence[Message]) -> None:
-        """Returns when the last message is published."""
+    async def play(self, batch: deque[Message]) -> None:
+        """Returns when the last message is published; each is removed from the batch then, for it may be large."""
         if self._origin is None:
             self._origin = batch[0].at_s, self._clock()
-        self._batch = deque(batch)
+        self._batch = batch
         self._played = asyncio.get_running_loop().create_future()
         self._step()
         try:
@@ -193,10 +193,10 @@ class _Playing:
         return began_s + (self._batch[0].at_s - first_at_s) / self._rate - self._clock()
 
 
-async def _fetched(source: Iterator[T], ahead: int) -> AsyncGenerator[list[T], None]:
+async def _fetched(source: Iterator[T], ahead: int) -> AsyncGenerator[deque[T], None]:
     if ahead <= 0:
         for item in source:
-            yield [item]
+            yield deque([item])
         return
     fetch = asyncio.create_task(asyncio.to_thread(_take, source, ahead))
     try:
@@ -210,5 +210,5 @@ async def _fetched(source: Iterator[T], ahead: int) -> AsyncGenerator[list[T], N
             fetch.exception()  # seen, should there be one
 
 
-def _take(source: Iterator[T], count: int) -> list[T]:
-    return list(islice(source, count))
+def _take(source: Iterator[T], count: int) -> deque[T]:
+    return deque(islice(source, count))

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from server.judge.message import Message
+from server.rosbridge_server import player
 from server.rosbridge_server.player import SOON_S, play
 from server.rosbridge_server.server import RosBridge
 from tests.server.rosbridge_server.probe import Probe
@@ -137,8 +142,11 @@ async def test_cancelling_waits_for_the_reading_thread(numbers: RosBridge) -> No
 
 
 @pytest.mark.parametrize("count", [2, 3])
-async def test_nothing_is_published_after_cancelling_while_late(numbers: RosBridge, count: int) -> None:
+async def test_nothing_is_published_after_cancelling_while_late(
+    numbers: RosBridge, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A timer may fire after the cancelling and before the task wakes, for the last message or an earlier one."""
+    monkeypatch.setattr(player, "TURN_S", math.inf)
     wrong: list[object] = []
     loop = asyncio.get_running_loop()
     loop.set_exception_handler(lambda _, context: wrong.append(context))
@@ -161,6 +169,27 @@ async def test_nothing_is_published_after_cancelling_while_late(numbers: RosBrid
     with pytest.raises(asyncio.CancelledError):
         await playing
     assert (len(played), timers, wrong) == (1, [], [])
+
+
+async def test_a_published_message_is_released(numbers: RosBridge) -> None:
+    class Content(dict[str, Any]):
+        """A message that can be watched."""
+
+    contents: list[weakref.ref[Content]] = []
+    alive: list[int] = []
+
+    def messages() -> Iterator[Message]:
+        for message in drive(20):
+            content = Content(message.message)
+            contents.append(weakref.ref(content))
+            yield replace(message, message=content)
+
+    def count_alive(_: Message) -> None:
+        alive.append(sum(one() is not None for one in contents))
+
+    await play(messages(), numbers, rate=1e6, ahead=512, on_message=count_alive)
+    assert len(alive) == 20
+    assert alive[-1] <= 2
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan")])

@@ -93,7 +93,7 @@ async def test_a_message_that_cannot_be_decoded_is_reported_and_the_next_one_com
     assert [one["op"] for one in received] == ["publish", "status", "publish"]
     assert received[1]["msg"] == "subscribe: /n cannot be sent as json: it is negative"
     assert received[2]["msg"] == {"data": 4}
-    assert recorded.decoded == 4, "each once, also in vain"
+    assert recorded.decoded == 4, "each once, also one that cannot be"
 
 
 OTHER = {"std_msgs/msg/Int32": ([], [("data", STANDARD[1]["std_msgs/msg/Float64"][1][0][1])])}
@@ -123,6 +123,17 @@ async def test_what_is_sent_late_has_the_time_of_sending(bridge: RosBridge, prob
     received = [(await probe.hear())["msg"] for _ in messages]
     assert [(one["secs"], one["nsecs"]) for one in received] == [(1_000 + at, 0) for at in range(5)]
     assert [one["bytes"] for one in received] == [bytes_of(at) for at in range(5)]
+
+
+@pytest.mark.parametrize(("now_s", "secs"), [(-1.0, 0), (2.0**33, 2**32 - 1)])
+async def test_a_time_beyond_four_bytes_is_the_nearest_one(
+    bridge: RosBridge, probe: Probe, now_s: float, secs: int
+) -> None:
+    bridge.advertise("/n", "std_msgs/Int32")
+    bridge.now = lambda: now_s
+    await probe.subscribe("/n", compression="cbor-raw")
+    bridge.publish("/n", Recorded().message(7))
+    assert (await probe.hear())["msg"]["secs"] == secs
 
 
 def stamped(at_s: float) -> tuple[float, str, str, dict[str, Any]]:
