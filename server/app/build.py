@@ -60,7 +60,8 @@ def build(
     folder = None if config.data is None else DataFolder(config.data)
     storage = StorageThread()
     kept = None if config.is_node else config.data  # what belongs to the cars is kept at their agents
-    lost = partial(lost_events, kept / "recordings") if kept else nothing_lost
+    names = [vehicle.name for vehicle in config.vehicles]
+    lost = partial(lost_events, kept / "recordings", names, now=now) if kept else nothing_lost
     journal = Journal(kept / "events.sqlite" if kept else None, run=boot, thread=storage, lost=lost)
     bus = LocalBus(journal, now=now, storage=storage)
     access = _access(config, storage, now=now, wall_ms=wall_ms)

@@ -52,18 +52,17 @@ _RUNS_KNOWN = 1000  # the newest; who names an older one is sent the newest even
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Newest:
-    """The newest event of a vehicle."""
+class Kept:
+    """What a log has."""
 
-    n: int
-    at_ms: float
-
-
-# Events that the log has lost, each with its vehicle, to whoever has the newest of each vehicle that it has.
-Lost = Callable[[Mapping[str, Newest]], Iterable[tuple[str, Mapping[str, Any]]]]
+    newest: Mapping[str, int]  # number of each vehicle's newest event
+    find: Callable[[str, int], tuple[int, str | None, str] | None]  # moment [ms], alarm and change of an event
 
 
-def nothing_lost(_: Mapping[str, Newest]) -> Iterable[tuple[str, Mapping[str, Any]]]:
+Lost = Callable[[Kept], Iterable[tuple[str, Mapping[str, Any]]]]  # the events that a log lacks, each with its vehicle
+
+
+def nothing_lost(_: Kept) -> Iterable[tuple[str, Mapping[str, Any]]]:
     return ()
 
 
@@ -156,17 +155,30 @@ def _make_tables(database: sqlite3.Connection, path: Path | None) -> None:
 
 def _bring_back(database: sqlite3.Connection, lost: Lost) -> str | None:
     """Stores what the log has lost, before a run begins: to everybody it is of before. Returns what that was, as a
-    sentence, if anything."""
-    newest: dict[str, Newest] = {}
-    for vehicle, n in _numbers(database):
-        query = "SELECT at_ms FROM event WHERE vehicle = ? AND n = ?"
-        newest[vehicle] = Newest(n=n, at_ms=database.execute(query, (vehicle, n)).fetchone()[0])
-    rows = [(v, e["n"], e["at_ms"], e.get("alarm"), e["change"], orjson.dumps(e)) for v, e in lost(newest)]
-    if not rows:
-        return None
-    database.execute("BEGIN IMMEDIATE")
-    database.executemany("INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?)", rows)
-    database.execute("COMMIT")
+    sentence, if anything. Raises sqlite3.Error where the log is damaged or cannot be written, and nothing else."""
+
+    def find(vehicle: str, n: int) -> tuple[int, str | None, str] | None:
+        query = "SELECT at_ms, alarm, change FROM event WHERE vehicle = ? AND n = ?"
+        found: tuple[int, str | None, str] | None = database.execute(query, (vehicle, n)).fetchone()
+        return found
+
+    newest = dict(_numbers(database))
+    try:
+        events = lost(Kept(newest=newest, find=find))
+        rows = [(v, e["n"], e["at_ms"], e.get("alarm"), e["change"], orjson.dumps(e)) for v, e in events]
+        if not rows:
+            return None
+        database.execute("BEGIN IMMEDIATE")
+        database.executemany("INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?)", rows)
+        database.execute("COMMIT")
+    except Exception as error:  # whatever is found in recordings, the log is opened without it
+        if database.in_transaction:
+            with contextlib.suppress(sqlite3.Error):
+                database.execute("ROLLBACK")
+        if isinstance(error, sqlite3.OperationalError) or _code(error) in _DAMAGED:
+            raise
+        log.exception("events not brought back")
+        return "Events of recordings could not be brought back into the alarm log."
     brought = "1 event was" if len(rows) == 1 else f"{len(rows)} events were"
     return f"The alarm log was not complete: {brought} brought back from recordings."
 
@@ -224,8 +236,8 @@ def _begin_anew(path: Path, run: str, lost: Lost) -> Opened:
         with contextlib.suppress(OSError):
             _remove(made)
         return Opened(database=None, runs=LogRuns((), Run(id=run)), why="the file is damaged")
-    said = f"The alarm log was damaged: it is set aside as {aside.name}; {saved} of its events could be read."
-    return replace(opened, complaint=f"{said} {opened.complaint}" if opened.complaint else said)
+    damaged = f"The alarm log was damaged: it is set aside as {aside.name}; {saved} of its events could be read."
+    return replace(opened, complaint=f"{damaged} {opened.complaint}" if opened.complaint else damaged)
 
 
 def _copy_of(path: Path) -> Path:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import shutil
+import json
+import os
+import random
 import sqlite3
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import orjson
 import pytest
 
 from server.app.config import Config
 from server.bus.journal import Journal
-from server.bus.journal_db import Newest
+from server.recording import lost_events as lost_events_module
 from server.recording.event_channels import ALARMS
 from server.recording.folder import RecordingsFolder, part_id
 from server.recording.lost_events import lost_events
@@ -27,29 +29,44 @@ from tests.server.conftest import serving
 from tests.server.viewer import viewer
 
 BEGAN_MS = 1_790_000_000_000
+ADDRESS = "ws://127.0.0.1:9"
 
 
 def event(n: int, **more: Any) -> dict[str, Any]:
     return {"n": n, "at_ms": BEGAN_MS + 1000 * n, "alarm": None, "change": "note", "text": f"event {n}", **more}
 
 
-def record(data: Path, numbers: Sequence[int], *, part: int = 1, at_ms: int = BEGAN_MS, is_closed: bool = True) -> Path:
+def record(
+    data: Path,
+    events: Iterable[int | dict[str, Any] | bytes],
+    *,
+    part: int = 1,
+    at_ms: int = BEGAN_MS,
+    is_closed: bool = True,
+    vehicle: str = "car",
+    folder: str = "car",
+) -> Path:
     """A recording with these events, as the recorder writes it."""
-    folder = RecordingsFolder(data / "recordings")
-    path = folder.place("car", part_id(folder.first_id("car", at_ms), part))
-    file = PartFile(path, profile="ros1", metadata={"vehicle": "car", "started_ms": str(at_ms)})
+    every = RecordingsFolder(data / "recordings")
+    path = every.place(folder, part_id(every.first_id(folder, at_ms), part))
+    file = PartFile(path, profile="ros1", metadata={"vehicle": vehicle, "started_ms": str(at_ms)})
     channel = file.channel(ALARMS, own_schema("alarms"))
-    for n in numbers:
-        file.add(channel, (at_ms + n) * 1_000_000, orjson.dumps(event(n, time_ms=at_ms)))
+    for place, one in enumerate(events):
+        row = event(one, time_ms=at_ms) if isinstance(one, int) else one
+        file.add(channel, (at_ms + place) * 1_000_000, row if isinstance(row, bytes) else json.dumps(row).encode())
+        file.flush()
     if is_closed:
         return file.close()
-    file.flush()
     file.abandon()
     return path
 
 
-def log_of(data: Path) -> Journal:
-    return Journal(data / "events.sqlite", lost=partial(lost_events, data / "recordings"))
+def log_of(data: Path, *, now: Callable[[], float] = lambda: 0.0) -> Journal:
+    return Journal(data / "events.sqlite", lost=partial(lost_events, data / "recordings", ["car"], now=now))
+
+
+def config(data: Path) -> Config:
+    return Config(vehicles=(Vehicle(name="car", address=ADDRESS),), data=data)
 
 
 def texts(journal: Journal) -> list[str]:
@@ -115,11 +132,102 @@ def test_of_two_logs_with_the_same_numbers_the_newer_one_holds(data: Path) -> No
 
 
 def test_a_recording_of_another_log_brings_nothing(data: Path) -> None:
-    shutil.rmtree(data / "recordings")
+    """Another one follows that is of this log."""
     record(data, range(500, 520), at_ms=BEGAN_MS + 86_400_000)
-    record(data, range(520, 521), at_ms=BEGAN_MS + 86_500_000).write_bytes(bytes(100))
-    assert list(lost_events(data / "recordings", {"car": Newest(n=50, at_ms=BEGAN_MS + 50_000)})) == []
-    assert len(list(lost_events(data / "recordings", {}))) == 20
+    record(data, range(51, 54), part=3)
+    with closing(log_of(data)) as journal:
+        assert texts(journal) == [f"event {n}" for n in range(1, 54)]
+
+
+@pytest.mark.parametrize(
+    ("events", "brought"),
+    [
+        ([event(60), event(61)], [60, 61]),  # numbers go on
+        ([event(49), event(51, at_ms=BEGAN_MS), event(52)], [51, 52]),  # the clock was set back in the drive
+        ([event(49, change="other"), event(51)], []),  # numbers are of another log
+        ([event(49, at_ms=1), event(51)], []),
+        ([event(51, at_ms=BEGAN_MS)], []),
+        ([event(300)], []),
+    ],
+)
+def test_of_which_log_a_recording_is(data: Path, events: list[dict[str, Any]], brought: list[int]) -> None:
+    record(data, events, part=3)
+    with closing(log_of(data)) as journal:
+        assert [one["n"] for one in journal.after("car", 50)] == brought
+
+
+@pytest.mark.parametrize("has_log", [True, False])
+def test_recordings_of_other_cars_bring_nothing(data: Path, has_log: bool) -> None:
+    if not has_log:
+        (data / "events.sqlite").unlink()
+    record(data, range(51, 61), part=3, vehicle="van")
+    record(data, range(51, 61), part=4, vehicle="van", folder="van")
+    with closing(log_of(data)) as journal:
+        assert texts(journal) == [f"event {n}" for n in range(1, 51)]
+        assert journal.last("van") == 0
+
+
+def test_a_recording_that_ended_before_the_newest_event_is_not_opened(data: Path) -> None:
+    path = record(data, range(51, 61), part=3)
+    os.utime(path, (0, BEGAN_MS / 1000))
+    with closing(log_of(data)) as journal:
+        assert journal.last("car") == 50
+
+
+def test_a_closed_recording_without_an_index_is_not_searched(data: Path) -> None:
+    path = record(data, range(51, 61), part=3)
+    raw = bytearray(path.read_bytes())
+    raw[-28:-12] = bytes(16)  # where the index begins
+    path.write_bytes(raw)
+    with closing(log_of(data)) as journal:
+        assert journal.last("car") == 50
+
+
+@pytest.mark.parametrize(("has_log", "within_s"), [(True, 2.0), (False, 20.0)])
+def test_the_start_waits_for_a_bounded_time(
+    data: Path, has_log: bool, within_s: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Each look at the clock takes 0.1 s. What was found by then is brought back."""
+    if not has_log:
+        (data / "events.sqlite").unlink()
+    for path in (data / "recordings" / "car").iterdir():
+        os.utime(path, (0, 0))
+    for part in range(3, 103):
+        record(data, [45 + 2 * part, 46 + 2 * part], part=part)
+    moments = [0.0]
+
+    def now() -> float:
+        moments.append(moments[-1] + 0.1)
+        return moments[-1]
+
+    with closing(log_of(data, now=now)) as journal:
+        numbers = [one["n"] for one in journal.after("car", 0, limit=1000)]
+    assert moments[-1] <= within_s + 0.2
+    assert 2 < len(numbers) - 50 * has_log < 120
+    assert numbers[-1] == numbers[0] + len(numbers) - 1
+    assert numbers[0] == 1 if has_log else numbers[-1] == 250
+    assert "not all searched" in caplog.text
+
+
+def test_of_a_long_recording_that_was_never_closed_only_the_end_is_read(
+    data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lost_events_module, "MOST_OF_CUT", 200_000)
+    path = record(data, [50, 51, *[random.Random(1).randbytes(30_000)] * 40, 60, 61], part=3, is_closed=False)
+    assert path.with_suffix(".mcap.writing").stat().st_size > 1_000_000
+    with closing(log_of(data)) as journal:
+        assert [one["n"] for one in journal.after("car", 50)] == [60, 61]
+
+
+@pytest.mark.parametrize("lost", [[{"n": 51, "at_ms": 2**63, "change": "note"}], [{"n": 51}], [{"n": object()}], None])
+def test_whatever_recordings_hold_the_log_is_opened(data: Path, lost: list[dict[str, Any]] | None) -> None:
+    """The first event could be stored, the other one cannot."""
+    first = {"n": 52, "at_ms": 1, "change": "note"}
+    with closing(Journal(data / "events.sqlite", lost=lambda _: [("car", first), *(("car", e) for e in lost)])) as one:
+        assert (one.trouble, one.last("car")) == (None, 50)
+        assert one.complaint == "Events of recordings could not be brought back into the alarm log."
+        one.append("car", [{"at_ms": BEGAN_MS, "alarm": None, "change": "note"}])
+        assert (one.trouble, one.last("car")) == (None, 51)
 
 
 def test_a_damaged_recording_costs_nothing_but_its_own_events(data: Path) -> None:
@@ -133,8 +241,7 @@ def test_a_damaged_recording_costs_nothing_but_its_own_events(data: Path) -> Non
 @pytest.mark.virtual_time
 async def test_a_server_whose_log_was_deleted_shows_them_as_brought_back_and_announces_none(data: Path) -> None:
     (data / "events.sqlite").unlink()
-    config = Config(vehicles=(Vehicle(name="car", address="ws://127.0.0.1:9"),), data=data)
-    async with serving(config) as server, http_client(base_url=server) as client, viewer(server) as page:
+    async with serving(config(data)) as server, http_client(base_url=server) as client, viewer(server) as page:
         await page.until(lambda: page.states)
         shown = (await client.get("/api/log", params={"limit": 200})).json()["events"]
         brought = [one["n"] for one in shown if "brought_from" in one]
@@ -144,15 +251,45 @@ async def test_a_server_whose_log_was_deleted_shows_them_as_brought_back_and_ann
         assert all(one["n"] > 50 for one in page.events)
 
 
-@pytest.mark.parametrize("rows", [[{"n": 0}, {"n": "7"}, {"n": True}, {"at_ms": 1.5}, {"change": None}, {"alarm": 7}]])
-def test_what_is_no_event_is_left_out(
-    tmp_path: Path, rows: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    made = iter(rows)
-    monkeypatch.setitem(globals(), "event", lambda n, **more: {**_event(n, **more), **next(made, {})})
-    record(tmp_path, range(1, 11))
-    with closing(log_of(tmp_path)) as journal:
-        assert texts(journal) == [f"event {n}" for n in range(7, 11)]
+@pytest.mark.virtual_time
+async def test_what_is_brought_back_restores_no_state(data: Path) -> None:
+    """The recording ended with the drive; that it ended was in the log only."""
+    (data / "events.sqlite").unlink()
+    signed = {"check": "c1", "by": "Ann", "done": 1, "failed": 0, "not_applicable": 0, "of": 1, "hash": "00"}
+    drive: list[dict[str, Any]] = [
+        {"change": "started", "address": ADDRESS},
+        {"change": "departure", "step": "begun", "check": "c1", "by": "Ann"},
+        {"change": "departure", "step": "signed", **signed},
+        {"change": "slow_down", "step": "slows", "order": 1, "at_ms": round(time.time() * 1000)},
+        {"change": "planned_stop", "reason": "workshop", "by": "Ann", "since_ms": BEGAN_MS},
+        {"change": "paused", "by": "Ann", "since_ms": BEGAN_MS},
+    ]
+    record(data, [event(n, **one) for n, one in enumerate(drive, 51)], part=3)
+    for start in range(2):
+        async with serving(config(data)) as server, http_client(base_url=server) as client, viewer(server) as page:
+            state = await page.state(lambda one: one["session"]["address"])
+            session, departure, slow_down = state["session"], state["departure"], state["decelerate"]
+            assert (session["paused"], session["planned_stop"], session["held"]) == (False, None, None), start
+            assert (departure["state"], slow_down.get("order")) == ("none", None), start
+            shown = (await client.get("/api/log", params={"limit": 200})).json()["events"]
+            assert [one["n"] for one in shown if one["change"] == "stopped"] == [57], start
 
 
-_event = event
+async def test_a_damaged_event_keeps_no_server_from_its_start(tmp_path: Path) -> None:
+    """What SQLite or JSON cannot hold, what has other types than declared, and numbers behind which none can follow."""
+    odd: list[dict[str, Any]] = [
+        {"n": 0}, {"n": "7"}, {"n": True}, {"n": 2**53 - 1}, {"n": 2**64 - 1}, {"at_ms": 1.5}, {"at_ms": -1},
+        {"at_ms": 2**63}, {"change": None}, {"change": ["mark"]}, {"alarm": 7}, {"text": "x" * 100_000},
+    ]  # fmt: skip
+    kept = [
+        {"change": "mark", "mark": ["m"], "words": 7}, {"settings_version": 10**30}, {"settings_version": 2**60},
+        {"alarm": "a", "state": "ACKED", "occurrence": 10**30}, {"alarm": "a", "occurrence": 2**63, "causes": 7},
+    ]  # fmt: skip
+    deep = b'{"n":90,"at_ms":1,"change":"note","x":' + b"[" * 300 + b"]" * 300 + b"}"
+    rows = [event(n) | one for n, one in enumerate(odd + kept, 1)]
+    record(tmp_path, [deep, b"{", b"[]", *rows, 91])
+    async with serving(config(tmp_path)) as server, http_client(base_url=server) as client:
+        shown = (await client.get("/api/log", params={"limit": 200})).json()["events"]
+        assert [one["n"] for one in shown if "brought_from" in one] == [91, *range(17, 12, -1)]
+        assert all(one["settings_version"] < 100 for one in shown)
+        assert (await client.get("/api/state")).json()["log_trouble"] is None
