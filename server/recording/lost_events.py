@@ -25,7 +25,7 @@ from server.bus.journal_db import Kept
 from server.protocol.alarm_state import LogEvent
 from server.protocol.rate_limit import nests_deeper
 from server.recording.event_channels import ALARMS
-from server.recording.folder import RecordingsFolder, first_part, id_of, part_number
+from server.recording.folder import WRITING, RecordingsFolder, first_part, id_of, part_number
 from server.recording.mcap.channel_rows import Check, channel_rows, metadata_of
 
 log = logging.getLogger("catgraph.recording")
@@ -33,7 +33,7 @@ log = logging.getLogger("catgraph.recording")
 WITHIN_S = 2.0  # the start waits so long
 WITHIN_OF_EMPTY_S = 20.0  # as long as no vehicle has an event
 MOST_EVENTS = 50_000  # of a vehicle; some 25 MB of the log
-MOST_OF_CUT = 64 << 20  # bytes at the end of a recording that was never closed; all of it for an empty log
+MOST_OF_CUT = 64 << 20  # bytes at the end of a recording that was never closed, which are read first
 MOST_BETWEEN = 200  # numbers between two recordings: of events while nothing was recorded
 _BUFFER = 1 << 16  # bytes
 _MOST_BYTES = 1 << 16  # of an event
@@ -87,10 +87,14 @@ def _behind(paths: Sequence[Path], vehicle: str, kept: Kept, check: Check) -> It
     at_ms = (kept.find(vehicle, newest) or (0,))[0]
     for path in paths:
         check()
-        with suppress(FileNotFoundError):
-            if path.stat().st_mtime * 1000 <= at_ms:
-                continue
+        file = path.stat()
+        if file.st_mtime * 1000 <= at_ms:
+            continue
         rows = _events_of(path, vehicle, MOST_OF_CUT, check)
+        is_long = path.name.endswith(WRITING) and file.st_size > MOST_OF_CUT
+        if is_long and (not rows or rows[0]["n"] > newest):  # events before its end may be lost too
+            with suppress(TimeoutError):  # then those of its end, so that their numbers are not given again
+                rows = _events_of(path, vehicle, None, check)
         behind = [row for row in rows if row["n"] > newest]
         known = [(row, kept.find(vehicle, row["n"])) for row in rows if row["n"] <= newest][-_COMPARED:]
         same = [found == _identity(row) for row, found in known if found is not None]
@@ -98,6 +102,7 @@ def _behind(paths: Sequence[Path], vehicle: str, kept: Kept, check: Check) -> It
         if all(same) if same else goes_on:
             yield from (row for row in behind if row["n"] > top)
             top = behind[-1]["n"] if behind else top
+    check()
 
 
 def _identity(row: Mapping[str, Any]) -> tuple[int, str | None, str]:

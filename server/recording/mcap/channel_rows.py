@@ -106,11 +106,11 @@ def _of_cut(file: IO[bytes], topic: str, most: int | None, check: Check) -> Iter
             return
         if opcode == Opcode.CHUNK:
             check()
-            if numbers and most is not None:
-                at, most = _link_behind(file, size - most, at), None
-                continue
+            if not numbers and (numbers := _declared(file, at, topic)) and most is not None:
+                begin, at = at, _link_behind(file, size - most, at)
+                if at > begin:
+                    continue
             chunk_at = at
-            numbers = numbers or _declared(file, at, topic)
         elif opcode == Opcode.MESSAGE_INDEX and int.from_bytes(file.read(2), "little") in numbers:
             yield chunk_at, numbers
         at = end

@@ -23,6 +23,7 @@ from server.recording.folder import RecordingsFolder, part_id
 from server.recording.lost_events import lost_events
 from server.recording.mcap.write import PartFile
 from server.recording.own import own_schema
+from server.recording.recover import recover
 from server.vehicle.vehicle import Vehicle
 from tests.http import http_client
 from tests.server.conftest import serving
@@ -209,14 +210,54 @@ def test_the_start_waits_for_a_bounded_time(
     assert "not all searched" in caplog.text
 
 
-def test_of_a_long_recording_that_was_never_closed_only_the_end_is_read(
-    data: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("first", "within", "brought"),
+    [
+        ([50, 51], 0, [51, *range(55, 62)]),
+        ([50, 51], 60, [60, 61]),  # the time is over before all of it is read
+        ([], 0, [*range(55, 62)]),
+    ],
+)
+def test_of_a_long_recording_that_was_never_closed_the_end_is_read_first(
+    data: Path, monkeypatch: pytest.MonkeyPatch, first: list[int], within: int, brought: list[int]
 ) -> None:
     monkeypatch.setattr(lost_events_module, "MOST_OF_CUT", 200_000)
-    path = record(data, [50, 51, *[random.Random(1).randbytes(30_000)] * 40, 60, 61], part=3, is_closed=False)
+    ballast = [random.Random(1).randbytes(30_000)] * 20
+    path = record(data, [*first, 55, *ballast, *range(56, 60), *ballast, 60, 61], part=3, is_closed=False)
     assert path.with_suffix(".mcap.writing").stat().st_size > 1_000_000
+    for one in (data / "recordings" / "car").glob("*.mcap"):
+        os.utime(one, (0, 0))
+    looks = iter([0.0] * within + [10.0] * 1000 if within else [0.0] * 1000)
+    with closing(log_of(data, now=lambda: next(looks))) as journal:
+        assert [one["n"] for one in journal.after("car", 50)] == brought
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_only_the_end_is_read_where_the_log_has_an_event_of_it(
+    data: Path, monkeypatch: pytest.MonkeyPatch, is_known: bool
+) -> None:
+    """Before each chunk that is read, the clock is looked at."""
+    monkeypatch.setattr(lost_events_module, "MOST_OF_CUT", 200_000)
+    ballast = [random.Random(1).randbytes(30_000)] * 40
+    for one in (data / "recordings" / "car").iterdir():
+        os.utime(one, (0, 0))
+    record(data, [49, *ballast, 50, 51] if is_known else [49, 50, *ballast, 51], part=3, is_closed=False)
+    looks: list[float] = []
+
+    def now() -> float:
+        looks.append(0.0)
+        return 0.0
+
+    with closing(log_of(data, now=now)) as journal:
+        assert journal.last("car") == 51
+    assert (len(looks) > 60) is not is_known
+
+
+def test_a_recording_that_was_recovered_brings_its_events(data: Path) -> None:
+    path = record(data, range(49, 61), part=3, is_closed=False)
+    assert recover(path.with_suffix(".mcap.writing")).path == path
     with closing(log_of(data)) as journal:
-        assert [one["n"] for one in journal.after("car", 50)] == [60, 61]
+        assert journal.last("car") == 60
 
 
 @pytest.mark.parametrize("lost", [[{"n": 51, "at_ms": 2**63, "change": "note"}], [{"n": 51}], [{"n": object()}], None])
