@@ -100,7 +100,9 @@ def _behind(paths: Sequence[Path], vehicle: str, kept: Kept, check: Check) -> It
         same = [found == _identity(row) for row, found in known if found is not None]
         goes_on = not known and behind and behind[0]["n"] <= top + MOST_BETWEEN and behind[0]["at_ms"] >= at_ms
         if all(same) if same else goes_on:
-            yield from (row for row in behind if row["n"] > top)
+            was_cut = path.name.endswith(WRITING) and top == newest and behind[:1] and behind[0]["n"] == newest + 1
+            cut: dict[str, Any] = {"was_cut": True} if was_cut else {}
+            yield from ({**row, **cut} for row in behind if row["n"] > top)
             top = behind[-1]["n"] if behind else top
     check()
 

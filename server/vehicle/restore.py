@@ -113,14 +113,18 @@ def _order(bus: SessionBus, vehicle: str, wall_ms: int) -> Mapping[str, Any] | N
 
 
 def is_brought_back(bus: SessionBus, vehicle: str) -> bool:
-    """Whether the newest event was brought back from a recording: the log lacks what happened after it."""
-    return any("brought_from" in event for event in bus.past_events(vehicle, limit=1))
+    """Whether the newest event was brought back from a recording that had ended: the log lacks what happened after it."""
+    return any(_is_history(event) for event in bus.past_events(vehicle, limit=1))
+
+
+def _is_history(event: Mapping[str, Any]) -> bool:
+    return "brought_from" in event and not event.get("was_cut")
 
 
 def phone_chosen(bus: SessionBus, vehicle: str) -> str | None:
     """The phone that rides in the car, as the operator said last."""
     newest = bus.past_events(vehicle, change="ride", limit=1)
-    return text_of(newest[0].get("phone")) if newest and "brought_from" not in newest[0] else None
+    return text_of(newest[0].get("phone")) if newest and not _is_history(newest[0]) else None
 
 
 def _recent(bus: SessionBus, vehicle: str, wall_ms: int, moment_s: Clock, shelf_s: Clock) -> list[Transition]:

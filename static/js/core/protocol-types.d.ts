@@ -1148,6 +1148,8 @@ export interface LogEvent {
   n: number;
   /** the log had lost it, and it was brought back from this recording */
   brought_from?: string;
+  /** it follows the log without a gap, and the server was killed then: state is restored from it too */
+  was_cut?: boolean;
 }
 
 /** `GET /api/logbook`. */

@@ -316,6 +316,19 @@ async def test_what_is_brought_back_restores_no_state(data: Path) -> None:
             assert [one["n"] for one in shown if one["change"] == "stopped"] == [57], start
 
 
+@pytest.mark.parametrize("is_closed", [False, True])
+async def test_a_pause_that_only_the_recording_of_a_killed_server_has_stands(data: Path, *, is_closed: bool) -> None:
+    """The recorder was a moment ahead of the log. Of a recording that had ended nobody knows what came after it."""
+    started, paused = {"change": "started", "address": ADDRESS}, {"change": "paused", "by": "Ann", "since_ms": BEGAN_MS}
+    with closing(Journal(data / "events.sqlite", run="killed")) as journal:
+        journal.append("car", [{key: value for key, value in event(51, **started).items() if key != "n"}])
+    record(data, [event(51, **started), event(52, **paused)], part=3, is_closed=is_closed)
+    for start in range(2):
+        async with serving(config(data)) as server, viewer(server) as page:
+            session = (await page.state(lambda one: one["session"]["address"]))["session"]
+            assert session["paused"] is not is_closed, start
+
+
 async def test_a_damaged_event_keeps_no_server_from_its_start(tmp_path: Path) -> None:
     """What SQLite or JSON cannot hold, what has other types than declared, and numbers behind which none can follow."""
     odd: list[dict[str, Any]] = [
