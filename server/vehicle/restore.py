@@ -113,7 +113,7 @@ def _order(bus: SessionBus, vehicle: str, wall_ms: int) -> Mapping[str, Any] | N
 
 
 def is_brought_back(bus: SessionBus, vehicle: str) -> bool:
-    """Whether the newest event was brought back from a recording that had ended: the log lacks what happened after it."""
+    """Whether the newest event is of a recording that had ended: the log lacks what happened after it."""
     return any(_is_history(event) for event in bus.past_events(vehicle, limit=1))
 
 
