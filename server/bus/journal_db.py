@@ -163,11 +163,20 @@ def _bring_back(database: sqlite3.Connection, lost: Lost) -> str | None:
         return found
 
     newest = dict(_numbers(database))
+    rows: list[tuple[Any, ...]] = []
+    late = ""
     try:
-        events = lost(Kept(newest=newest, find=find))
-        rows = [(v, e["n"], e["at_ms"], e.get("alarm"), e["change"], orjson.dumps(e)) for v, e in events]
+        try:
+            for vehicle, one in lost(Kept(newest=newest, find=find)):
+                row = (vehicle, one["n"], one["at_ms"], one.get("alarm"), one["change"], orjson.dumps(one))
+                rows.append(row)
+        except TimeoutError as error:
+            log.warning("recordings not all searched for events: error=%s", error)
+            late = (
+                "Not all recordings were searched for events that the alarm log lacks: it would have delayed the start."
+            )
         if not rows:
-            return None
+            return late or None
         database.execute("BEGIN IMMEDIATE")
         database.executemany("INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?)", rows)
         database.execute("COMMIT")
@@ -180,7 +189,7 @@ def _bring_back(database: sqlite3.Connection, lost: Lost) -> str | None:
         log.exception("events not brought back")
         return "Events of recordings could not be brought back into the alarm log."
     brought = "1 event was" if len(rows) == 1 else f"{len(rows)} events were"
-    return f"The alarm log was not complete: {brought} brought back from recordings."
+    return f"The alarm log was not complete: {brought} brought back from recordings. {late}".rstrip()
 
 
 def note_run(database: sqlite3.Connection, run: Run) -> None:

@@ -2,7 +2,7 @@
 
 A recording has each event of its time as the log numbered it. Of a log with events, only recordings count that were
 written to after its newest event and that are shown to be of this log: by an event that both have, or by numbers that
-go on. Of an empty log each recording of the vehicle counts, the newest one first, since numbers began anew where a log
+continue. Of an empty log each recording of the vehicle counts, the newest one first, since numbers began anew where a log
 was lost before. The search is bounded in time: a server waits for it before it opens its port.
 """
 
@@ -51,7 +51,7 @@ Rows = Sequence[dict[str, Any]]
 def lost_events(
     root: Path, vehicles: Iterable[str], kept: Kept, *, now: Callable[[], float] = time.monotonic
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Vehicle and event, in no order, of what `kept` lacks. Raises nothing."""
+    """Vehicle and event, in no order, of what `kept` lacks. Raises TimeoutError behind what was found in time."""
     until_s = now() + (WITHIN_S if kept.newest else WITHIN_OF_EMPTY_S)
 
     def check() -> None:
@@ -65,6 +65,8 @@ def lost_events(
             own = [path for path in paths if path.parent == folder.place(vehicle, "any").parent]
             lost = _behind(own, vehicle, kept, check) if vehicle in kept.newest else _all(own, vehicle, check)
             yield from ((vehicle, event) for event in islice(lost, MOST_EVENTS))
+    except TimeoutError:
+        raise
     except OSError as error:
         log.warning("recordings not all searched for events: error=%s", error)
 
@@ -76,7 +78,7 @@ def _age(path: Path) -> tuple[str, int]:
 def _all(paths: Sequence[Path], vehicle: str, check: Check) -> Iterator[dict[str, Any]]:
     least = math.inf
     for path in reversed(paths):
-        if rows := [row for row in _events_of(path, vehicle, None, check) if row["n"] < least]:
+        if rows := [row for row in _newest_of(path, vehicle, 0, check) if row["n"] < least]:
             yield from rows
             least = rows[0]["n"]
 
@@ -87,24 +89,31 @@ def _behind(paths: Sequence[Path], vehicle: str, kept: Kept, check: Check) -> It
     at_ms = (kept.find(vehicle, newest) or (0,))[0]
     for path in paths:
         check()
-        file = path.stat()
-        if file.st_mtime * 1000 <= at_ms:
+        if path.stat().st_mtime * 1000 <= at_ms:
             continue
-        rows = _events_of(path, vehicle, MOST_OF_CUT, check)
-        is_long = path.name.endswith(WRITING) and file.st_size > MOST_OF_CUT
-        if is_long and (not rows or rows[0]["n"] > newest):  # events before its end may be lost too
-            with suppress(TimeoutError):  # then those of its end, so that their numbers are not given again
-                rows = _events_of(path, vehicle, None, check)
+        rows = _newest_of(path, vehicle, newest, check)
         behind = [row for row in rows if row["n"] > newest]
         known = [(row, kept.find(vehicle, row["n"])) for row in rows if row["n"] <= newest][-_COMPARED:]
         same = [found == _identity(row) for row, found in known if found is not None]
         goes_on = not known and behind and behind[0]["n"] <= top + MOST_BETWEEN and behind[0]["at_ms"] >= at_ms
         if all(same) if same else goes_on:
-            was_cut = path.name.endswith(WRITING) and top == newest and behind[:1] and behind[0]["n"] == newest + 1
+            is_whole = [row["n"] for row in behind] == list(range(newest + 1, newest + 1 + len(behind)))
+            was_cut = is_whole and top == newest and path.name.endswith(WRITING)
             cut: dict[str, Any] = {"was_cut": True} if was_cut else {}
             yield from ({**row, **cut} for row in behind if row["n"] > top)
             top = behind[-1]["n"] if behind else top
     check()
+
+
+def _newest_of(path: Path, vehicle: str, newest: int, check: Check) -> Rows:
+    """As `_events_of`; where the time does not suffice for a long recording that was never closed, those of its end, so
+    that their numbers are not given again."""
+    rows = _events_of(path, vehicle, MOST_OF_CUT, check)
+    is_long = path.name.endswith(WRITING) and path.stat().st_size > MOST_OF_CUT
+    if is_long and (not rows or rows[0]["n"] > newest):  # events before its end may be lost too
+        with suppress(TimeoutError):
+            rows = _events_of(path, vehicle, None, check)
+    return rows
 
 
 def _identity(row: Mapping[str, Any]) -> tuple[int, str | None, str]:
@@ -146,7 +155,7 @@ def _event(raw: bytes, recording: str) -> dict[str, Any] | None:
     wrong = _wrong(row) | large
     if wrong & {"n", "at_ms", "alarm", "change"} or row["n"] <= 0 or row["at_ms"] < 0:
         return None
-    right = {name: value for name, value in row.items() if name not in wrong | {"time_ms"}}
+    right = {name: value for name, value in row.items() if name not in wrong | {"time_ms", "was_cut"}}
     return {**_LATER, **right, "brought_from": recording}
 
 

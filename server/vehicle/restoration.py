@@ -38,9 +38,11 @@ class Restoration:
         """At the start: reads the log; numbers of occurrences and settings count on."""
         parts = self._parts
         judgement, event_log = parts.judgement, parts.event_log
-        if restore.is_brought_back(self._bus, self._vehicle):  # how the drive went on is in no recording
-            event_log.note("stopped", _BROUGHT_BACK)
         before = self._recall()
+        settings_version = before.settings_version
+        if restore.is_brought_back(self._bus, self._vehicle):  # what came after it in the drive is in no recording
+            event_log.note("stopped", _BROUGHT_BACK)
+            before = self._recall()
         judgement.monitor.number_on(before.transitions)
         judgement.add_load(before.recent)
         parts.marks.restore(self._bus, self._vehicle)
@@ -53,7 +55,7 @@ class Restoration:
         for sentence in (self._bus.log_complaint, parts.settings.complaint):
             if sentence:
                 event_log.note("restarted", sentence)
-        if parts.settings.number_on(before.settings_version):
+        if parts.settings.number_on(settings_version):
             event_log.settings("The settings differ from the last ones in force, which were lost.", by=None)
         if before.address is not None or before.standing:
             self.held = before

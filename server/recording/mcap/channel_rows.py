@@ -84,7 +84,7 @@ def _of_closed(file: IO[bytes], topic: str, check: Check) -> Iterator[tuple[int,
         at += HEAD_BYTES + length
         if opcode == Opcode.CHANNEL:
             numbers |= _number(body, topic)
-        elif opcode == Opcode.CHUNK_INDEX and numbers:
+        elif opcode == Opcode.CHUNK_INDEX:
             check()
             place, size = int.from_bytes(body[16:24], "little"), int.from_bytes(body[32:36], "little")
             if any(int.from_bytes(body[one : one + 2], "little") in numbers for one in range(36, 36 + size, 10)):

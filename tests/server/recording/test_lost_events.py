@@ -203,6 +203,8 @@ def test_the_start_waits_for_a_bounded_time(
 
     with closing(log_of(data, now=now)) as journal:
         numbers = [one["n"] for one in journal.after("car", 0, limit=1000)]
+        assert journal.complaint is not None
+        assert "Not all recordings were searched" in journal.complaint
     assert moments[-1] <= within_s + 0.2
     assert 2 < len(numbers) - 50 * has_log < 120
     assert numbers[-1] == numbers[0] + len(numbers) - 1
@@ -230,6 +232,19 @@ def test_of_a_long_recording_that_was_never_closed_the_end_is_read_first(
     looks = iter([0.0] * within + [10.0] * 1000 if within else [0.0] * 1000)
     with closing(log_of(data, now=lambda: next(looks))) as journal:
         assert [one["n"] for one in journal.after("car", 50)] == brought
+
+
+def test_of_an_empty_log_the_end_of_a_long_recording_counts_where_the_time_is_over(
+    data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lost_events_module, "MOST_OF_CUT", 200_000)
+    ballast = [random.Random(1).randbytes(30_000)] * 20
+    record(data, [55, *ballast, *range(56, 60), *ballast, 60, 61], part=3, is_closed=False)
+    (data / "events.sqlite").unlink()
+    looks = iter([0.0] * 60 + [100.0] * 1000)
+    with closing(log_of(data, now=lambda: next(looks))) as journal:
+        assert [one["n"] for one in journal.after("car", 0)] == [60, 61]
+        assert journal.append("car", [{"at_ms": BEGAN_MS, "alarm": None, "change": "note"}])[0]["n"] == 62
 
 
 @pytest.mark.parametrize("is_known", [True, False])
@@ -316,17 +331,27 @@ async def test_what_is_brought_back_restores_no_state(data: Path) -> None:
             assert [one["n"] for one in shown if one["change"] == "stopped"] == [57], start
 
 
-@pytest.mark.parametrize("is_closed", [False, True])
-async def test_a_pause_that_only_the_recording_of_a_killed_server_has_stands(data: Path, *, is_closed: bool) -> None:
-    """The recorder was a moment ahead of the log. Of a recording that had ended nobody knows what came after it."""
+@pytest.mark.parametrize(("is_closed", "lacks", "stands"), [(False, 0, True), (True, 0, False), (False, 1, False)])
+async def test_a_pause_that_only_the_recording_of_a_killed_server_has_stands(
+    data: Path, *, is_closed: bool, lacks: int, stands: bool
+) -> None:
+    """The recorder was a moment ahead of the log. What came after a recording that ended, or in its gap, is unknown."""
     started, paused = {"change": "started", "address": ADDRESS}, {"change": "paused", "by": "Ann", "since_ms": BEGAN_MS}
     with closing(Journal(data / "events.sqlite", run="killed")) as journal:
         journal.append("car", [{key: value for key, value in event(51, **started).items() if key != "n"}])
-    record(data, [event(51, **started), event(52, **paused)], part=3, is_closed=is_closed)
+    rows = [event(51, **started), event(52, **paused, was_cut=True), event(53 + lacks)]
+    record(data, rows, part=3, is_closed=is_closed)
     for start in range(2):
         async with serving(config(data)) as server, viewer(server) as page:
             session = (await page.state(lambda one: one["session"]["address"]))["session"]
-            assert session["paused"] is not is_closed, start
+            assert session["paused"] is stands, start
+
+
+async def test_settings_that_are_older_than_those_of_the_recordings_are_reported(data: Path) -> None:
+    record(data, [event(n, settings_version=9) for n in (50, 51)], part=3)
+    async with serving(config(data)) as server, http_client(base_url=server) as client:
+        shown = (await client.get("/api/log", params={"limit": 200})).json()["events"]
+        assert [one["settings_version"] for one in shown if "The settings differ" in one["text"]] == [10]
 
 
 async def test_a_damaged_event_keeps_no_server_from_its_start(tmp_path: Path) -> None:
