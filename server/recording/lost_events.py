@@ -2,8 +2,8 @@
 
 A recording has each event of its time as the log numbered it. Of a log with events, only recordings count that were
 written to after its newest event and that are shown to be of this log: by an event that both have, or by numbers that
-continue. Of an empty log each recording of the vehicle counts, the newest one first, since numbers began anew where a log
-was lost before. The search is bounded in time: a server waits for it before it opens its port.
+continue. Of an empty log each recording of the vehicle counts, the newest one first, since numbers began anew where a
+log was lost before. The search is bounded in time: a server waits for it before it opens its port.
 """
 
 from __future__ import annotations
