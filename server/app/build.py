@@ -19,6 +19,7 @@ from server.app import store
 from server.app.config import Config
 from server.bus.bus import PageBus, SessionBus
 from server.bus.journal import Journal
+from server.bus.journal_db import nothing_lost
 from server.bus.local import LocalBus
 from server.judge.settings import SettingsFile
 from server.mail.mailer import Mailer
@@ -26,6 +27,7 @@ from server.mail.recorded import Recorded
 from server.recording.catalog.catalog import Catalog
 from server.recording.export.jobs import Exports
 from server.recording.folder import RecordingsFolder
+from server.recording.lost_events import lost_events
 from server.recording.marks.keeper import MarkKeeper
 from server.recording.marks.pending import PendingMedia
 from server.replay.manager import ReplayManager, ReplaySource
@@ -58,7 +60,9 @@ def build(
     folder = None if config.data is None else DataFolder(config.data)
     storage = StorageThread()
     kept = None if config.is_node else config.data  # what belongs to the cars is kept at their agents
-    journal = Journal(kept / "events.sqlite" if kept else None, run=boot, thread=storage)
+    names = [vehicle.name for vehicle in config.vehicles]
+    lost = partial(lost_events, kept / "recordings", names, now=now) if kept else nothing_lost
+    journal = Journal(kept / "events.sqlite" if kept else None, run=boot, thread=storage, lost=lost)
     bus = LocalBus(journal, now=now, storage=storage)
     access = _access(config, storage, now=now, wall_ms=wall_ms)
     orders = _orders(config, storage, lambda name, by, text: _note_device(running, name, by, text), now, wall_ms)

@@ -45,11 +45,12 @@ class Journal:
         *,
         run: str | None = None,
         thread: StorageThread | None = None,
+        lost: journal_db.Lost = journal_db.nothing_lost,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         """At `path`, or in memory where it is None; written by `thread`, else by the caller. `run`: of this process,
-        None: any that is new. `now`: in seconds."""
-        opened = journal_db.open_at(path, run or secrets.token_hex(8))
+        None: any that is new. `lost`: the events that a log has lost, from elsewhere. `now`: in seconds."""
+        opened = journal_db.open_at(path, run or secrets.token_hex(8), lost)
         self._thread = thread
         self._now = now
         self.on_saved: Callable[[], None] = lambda: None  # called by the writing thread, whatever became of it

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -52,6 +52,21 @@ _RUNS_KNOWN = 1000  # the newest; who names an older one is sent the newest even
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Kept:
+    """What a log has."""
+
+    newest: Mapping[str, int]  # number of each vehicle's newest event
+    find: Callable[[str, int], tuple[int, str | None, str] | None]  # moment [ms], alarm and change of an event
+
+
+Lost = Callable[[Kept], Iterable[tuple[str, Mapping[str, Any]]]]  # the events that a log lacks, each with its vehicle
+
+
+def nothing_lost(_: Kept) -> Iterable[tuple[str, Mapping[str, Any]]]:
+    return ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Opened:
     """What became of opening the log."""
 
@@ -75,34 +90,36 @@ def _code(error: Exception) -> int:
     return code & 0xFF if isinstance(code, int) else 0
 
 
-def open_at(path: Path | None, run: str) -> Opened:
-    """The log at `path`, in memory where it is None, for a run that no log has had."""
+def open_at(path: Path | None, run: str, lost: Lost = nothing_lost) -> Opened:
+    """The log at `path`, in memory where it is None, for a run that no log has had, with what `lost` brings back."""
     try:
         if path is not None and not path.exists() and _copy_of(path).exists():
             _put_in_place(path, free_name(path, "damaged"))  # a kill left it there: it is whole once the log is aside
-        return _open_either_way(path, run)
+        return _open_either_way(path, run, lost)
     except (OSError, sqlite3.Error) as error:
         if path is None or _code(error) not in _DAMAGED:
             return Opened(database=None, runs=LogRuns((), Run(id=run)), why=why(error))
-    return _begin_anew(path, run)
+    return _begin_anew(path, run, lost)
 
 
-def _open_either_way(path: Path | None, run: str) -> Opened:
+def _open_either_way(path: Path | None, run: str, lost: Lost) -> Opened:
     """On a full disk SQLite cannot make the file that processes share (-shm); alone it does without."""
     try:
-        return _open(path, run)
+        return _open(path, run, lost)
     except sqlite3.OperationalError as error:
         if _code(error) not in _NO_ROOM:
             raise
-        return _open(path, run, is_alone=True)
+        return _open(path, run, lost, is_alone=True)
 
 
-def _open(path: Path | None, run: str, *, is_alone: bool = False) -> Opened:
+def _open(path: Path | None, run: str, lost: Lost, *, is_alone: bool = False) -> Opened:
     database = _connect(path, is_alone=is_alone)
     refused: str | None = None
+    complaint: str | None = None
     try:
         try:
             _make_tables(database, path)
+            complaint = _bring_back(database, lost)
         except (sqlite3.OperationalError, OSError) as error:
             refused = why(error)  # it may still be read, so that its numbers and its alarms go on
         last = dict(_numbers(database))
@@ -113,7 +130,7 @@ def _open(path: Path | None, run: str, *, is_alone: bool = False) -> Opened:
             except sqlite3.OperationalError as error:
                 refused = why(error)
         database.execute("PRAGMA busy_timeout=0")
-        return Opened(database=database, runs=runs, last=last, why=refused)
+        return Opened(database=database, runs=runs, last=last, why=refused, complaint=complaint)
     except sqlite3.Error:
         database.close()
         raise
@@ -134,6 +151,45 @@ def _make_tables(database: sqlite3.Connection, path: Path | None) -> None:
         database.execute(statement)
     if path is not None:
         durable_file.sync_folder(path.parent)
+
+
+def _bring_back(database: sqlite3.Connection, lost: Lost) -> str | None:
+    """Stores what the log has lost, before a run begins: to everybody it is of before. Returns what that was, as a
+    sentence, if anything. Raises sqlite3.Error where the log is damaged or cannot be written, and nothing else."""
+
+    def find(vehicle: str, n: int) -> tuple[int, str | None, str] | None:
+        query = "SELECT at_ms, alarm, change FROM event WHERE vehicle = ? AND n = ?"
+        found: tuple[int, str | None, str] | None = database.execute(query, (vehicle, n)).fetchone()
+        return found
+
+    newest = dict(_numbers(database))
+    rows: list[tuple[Any, ...]] = []
+    late = ""
+    try:
+        try:
+            for vehicle, one in lost(Kept(newest=newest, find=find)):
+                row = (vehicle, one["n"], one["at_ms"], one.get("alarm"), one["change"], orjson.dumps(one))
+                rows.append(row)
+        except TimeoutError as error:
+            log.warning("recordings not all searched for events: error=%s", error)
+            late = (
+                "Not all recordings were searched for events that the alarm log lacks: it would have delayed the start."
+            )
+        if not rows:
+            return late or None
+        database.execute("BEGIN IMMEDIATE")
+        database.executemany("INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?)", rows)
+        database.execute("COMMIT")
+    except Exception as error:  # whatever is found in recordings, the log is opened without it
+        if database.in_transaction:
+            with contextlib.suppress(sqlite3.Error):
+                database.execute("ROLLBACK")
+        if isinstance(error, sqlite3.OperationalError) or _code(error) in _DAMAGED:
+            raise
+        log.exception("events not brought back")
+        return "Events of recordings could not be brought back into the alarm log."
+    brought = "1 event was" if len(rows) == 1 else f"{len(rows)} events were"
+    return f"The alarm log was not complete: {brought} brought back from recordings. {late}".rstrip()
 
 
 def note_run(database: sqlite3.Connection, run: Run) -> None:
@@ -171,7 +227,7 @@ def _numbers(database: sqlite3.Connection) -> Iterator[tuple[str, int]]:
         name = vehicle
 
 
-def _begin_anew(path: Path, run: str) -> Opened:
+def _begin_anew(path: Path, run: str, lost: Lost) -> Opened:
     """What can be read is copied first. Until the copy is on the disk the damaged log keeps its name: where there is no
     room for the copy, the next start tries again."""
     aside, made = free_name(path, "damaged"), _copy_of(path)
@@ -183,14 +239,14 @@ def _begin_anew(path: Path, run: str) -> Opened:
                 new.execute(statement)
             saved = _take_over(path, new)
         _put_in_place(path, aside)
-        opened = _open_either_way(path, run)
+        opened = _open_either_way(path, run, lost)
     except (OSError, sqlite3.Error) as error:
         log.error("damaged log not set aside: path=%s error=%s", path, error)
         with contextlib.suppress(OSError):
             _remove(made)
         return Opened(database=None, runs=LogRuns((), Run(id=run)), why="the file is damaged")
-    said = f"The alarm log was damaged: it is set aside as {aside.name}; {saved} of its events could be read."
-    return replace(opened, complaint=said)
+    damaged = f"The alarm log was damaged: it is set aside as {aside.name}; {saved} of its events could be read."
+    return replace(opened, complaint=f"{damaged} {opened.complaint}" if opened.complaint else damaged)
 
 
 def _copy_of(path: Path) -> Path:

@@ -206,6 +206,12 @@ class LogEvent(NewEvent):
     """One event of the log."""
 
     n: Annotated[int, doc("its number: grows by one, never given twice")]
+    brought_from: NotRequired[Annotated[str, doc("the log had lost it, and it was brought back from this recording")]]
+    was_cut: NotRequired[
+        Annotated[
+            bool, doc("it follows the log without a gap, and the server was killed then: state is restored from it too")
+        ]
+    ]
 
 
 class Note(Protocol):

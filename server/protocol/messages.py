@@ -61,6 +61,7 @@ class Offer(TypedDict):
     seq: int
     of: list[FrameKind]
     took_ms: Annotated[int, doc("when the page's last take was received; before the first, when it connected")]
+    took: NotRequired[Annotated[int, doc("its number `n`; 0: it had none, or there was none yet")]]
 
 
 class Resumed(TypedDict):

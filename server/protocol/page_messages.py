@@ -14,7 +14,7 @@ from server.protocol.replay_commands import ReplayOrder
 
 class PageHello(TypedDict):
     """Before everything else but `take`: the server then sends what the page missed, and no event before it (or 1 s
-    after the connection, where none comes)."""
+    after the connection, where none comes). A command that comes before it is refused."""
 
     kind: Literal["hello"]
     have_event: NotRequired[Annotated[int | None, doc("number of the newest event that the page has")]]
@@ -32,10 +32,13 @@ class PageHello(TypedDict):
 
 
 class Take(TypedDict):
-    """Takes what was offered."""
+    """Takes what was offered, or states that a state came which was sent ahead."""
 
     kind: Literal["take"]
-    seq: int
+    seq: Annotated[int, doc("of the offer; 0: of none")]
+    n: NotRequired[Annotated[int, doc("counts the takes of a connection from 1 on")]]
+    ahead: NotRequired[Annotated[int, doc("so many states may be under way, sent without an offer; at most 12")]]
+    got: NotRequired[Annotated[int, doc("with `ahead`: how many states this connection has brought")]]
 
 
 class Have(TypedDict):

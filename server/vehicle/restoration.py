@@ -9,6 +9,11 @@ from server.vehicle import restore
 from server.vehicle.restore import RestoredState
 from server.vehicle.session_parts import SessionParts
 
+_BROUGHT_BACK = (
+    "The newest events were brought back from recordings. What was in force is not restored: "
+    "pause, planned stop, slow-down, departure check."
+)
+
 
 class Restoration:
     """Of one vehicle's session. `now` is a monotonic clock in seconds, `wall_ms` the time of day in ms since 1970."""
@@ -31,8 +36,13 @@ class Restoration:
 
     def begin(self) -> None:
         """At the start: reads the log; numbers of occurrences and settings count on."""
-        before, parts = self._recall(), self._parts
+        parts = self._parts
         judgement, event_log = parts.judgement, parts.event_log
+        before = self._recall()
+        settings_version = before.settings_version
+        if restore.is_brought_back(self._bus, self._vehicle):  # what came after it in the drive is in no recording
+            event_log.note("stopped", _BROUGHT_BACK)
+            before = self._recall()
         judgement.monitor.number_on(before.transitions)
         judgement.add_load(before.recent)
         parts.marks.restore(self._bus, self._vehicle)
@@ -45,7 +55,7 @@ class Restoration:
         for sentence in (self._bus.log_complaint, parts.settings.complaint):
             if sentence:
                 event_log.note("restarted", sentence)
-        if parts.settings.number_on(before.settings_version):
+        if parts.settings.number_on(settings_version):
             event_log.settings("The settings differ from the last ones in force, which were lost.", by=None)
         if before.address is not None or before.standing:
             self.held = before

@@ -103,18 +103,28 @@ def recall(bus: SessionBus, vehicle: str, *, now_s: float, wall_ms: int) -> Rest
 
 def _order(bus: SessionBus, vehicle: str, wall_ms: int) -> Mapping[str, Any] | None:
     """The newest event of an unreleased slow-down, if it is not older than the longest hold."""
+    stopped = _newest(bus, vehicle, "stopped")
     for event in bus.past_events(vehicle, change="slow_down", limit=_PORTION):
-        if event.get("step") in ORDER_ENDED:
+        if event.get("step") in ORDER_ENDED or _number(event) < stopped:
             return None
         if event.get("step") in ORDER_STANDS:
             return event if wall_ms - event["at_ms"] < LONGEST_HOLD_S * 1000 else None
     return None
 
 
+def is_brought_back(bus: SessionBus, vehicle: str) -> bool:
+    """Whether the newest event is of a recording that had ended: the log lacks what happened after it."""
+    return any(_is_history(event) for event in bus.past_events(vehicle, limit=1))
+
+
+def _is_history(event: Mapping[str, Any]) -> bool:
+    return "brought_from" in event and not event.get("was_cut")
+
+
 def phone_chosen(bus: SessionBus, vehicle: str) -> str | None:
     """The phone that rides in the car, as the operator said last."""
     newest = bus.past_events(vehicle, change="ride", limit=1)
-    return text_of(newest[0].get("phone")) if newest else None
+    return text_of(newest[0].get("phone")) if newest and not _is_history(newest[0]) else None
 
 
 def _recent(bus: SessionBus, vehicle: str, wall_ms: int, moment_s: Clock, shelf_s: Clock) -> list[Transition]:

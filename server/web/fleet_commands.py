@@ -12,7 +12,7 @@ from server.control import display_name
 from server.protocol import commands, messages
 from server.protocol.rate_limit import Allowance, Limits
 from server.web.announcements import LEAVES, Announcements
-from server.web.page_commands import NOT_A_VIEWERS, TOO_MANY, passed_on
+from server.web.page_commands import NO_HELLO, NOT_A_VIEWERS, TOO_MANY, passed_on
 from server.web.page_sender import PageSender
 
 NOT_FROM_HERE = "Open the car's own page for this."
@@ -72,6 +72,8 @@ class FleetCommands:
         """Why a command does not reach a session; None: it does."""
         if not self._sender.is_operator:
             return NOT_A_VIEWERS
+        if not self._sender.has_begun:
+            return NO_HELLO
         command = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
         if command is None:
             return commands.NO_SUCH

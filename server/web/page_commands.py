@@ -23,6 +23,7 @@ log = logging.getLogger("catgraph.web")
 
 TOO_MANY = "Too many commands at once from this page: wait a second."
 NOT_A_VIEWERS = "This device is paired as a viewer and cannot make changes."
+NO_HELLO = "Not carried out: this page has not sent its hello yet."
 NOT_FROM_A_REPLAY = "This page shows a replay and cannot send commands. Return to live first."
 
 
@@ -103,6 +104,8 @@ class PageCommands:
         """Why a command does not reach the session; None: it does."""
         if not self._sender.is_operator:  # whatever it is: no command of the union needs less than an operator
             return NOT_A_VIEWERS
+        if not self._sender.has_begun:  # it would be filed under an id by which the page never asks for its outcome
+            return NO_HELLO
         command = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
         if command is None:  # commands of the server to a session are not allowed for a page
             return commands.NO_SUCH

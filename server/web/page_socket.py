@@ -120,7 +120,7 @@ class Page:
     async def _obey(self, message: dict[str, Any]) -> None:
         match message.get("kind"):
             case "take":
-                self._writer.take()
+                self._writer.take(message)
             case "have":
                 self._writer.have_events()
             case "watch":

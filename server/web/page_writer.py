@@ -1,14 +1,14 @@
 """The writer of one page: offers of frames and events, at most one of each unanswered, and replies to commands.
 
-Nothing else is pushed (see docs/protocol.md), so a page that stops reading costs nothing, delays nobody, and gets
-nothing outdated when it resumes.
+Of states it also sends as many ahead as the page allows (see docs/protocol.md), and nothing else. So a page that stops
+reading costs nothing, delays nobody, and gets nothing else that is outdated when it resumes.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import cast
 
 import orjson
@@ -23,13 +23,14 @@ from server.protocol.slow_down_state import FORMER_PHASES
 from server.replay.view_source import ViewSource
 from server.web.event_feed import EventFeed
 from server.web.fair_wakeup import FairWakeup
+from server.web.page_offers import PageOffers
 
 _FORMER = {present: former for former, present in FORMER_PHASES.items()}
 
 RESTARTED = 1012  # RFC 6455: the page dials again, and is greeted anew
 HELLO_WITHIN_S = 10.0  # until then no event is sent: the hello names the newest that the page has; it waits 8 s at most
-OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
 BATCH_EVERY_S = 0.2  # to a page that catches up: with its other messages it sends at most 25 a second
+ROUNDING_S = 1e-6  # what rounding leaves of a wait is none
 MAX_REPLIES = 200  # waiting for a page that does not read
 
 
@@ -67,16 +68,12 @@ class PageWriter:
         self._view = view
         self._wakeup = wakeup
         self._now = now
-        self._wall_ms = wall_ms
-        self._took_ms = wall_ms()
+        self._offers = PageOffers(now, wall_ms)
         self._since_s = now()
         self._wake = asyncio.Event()
         self._sent: dict[FrameKind, int] = dict.fromkeys(view.kinds, 0)  # the newest frame of each kind
         self._watches_scan = False
-        self._seq = 0
-        self._is_offered = False  # an offer is unanswered
-        self._offered_s = float("-inf")  # when the last offer was sent
-        self._offering: asyncio.TimerHandle | None = None  # an offer that is due later
+        self._later: asyncio.TimerHandle | None = None  # an offer or a state is due then
         self._is_taking = False  # the page requested the newest
         self._replies: list[messages.ToPage] = []
         self._event = 0  # the last number sent; from the greeting on
@@ -91,7 +88,8 @@ class PageWriter:
         self._are_events_unanswered = False
         self._has_begun = False  # the page said hello
         self._is_former = False
-        self.skipped = 0  # frames that were replaced by newer ones before the page took them
+        self._is_state_waiting = False  # a state of the live car came that was not sent yet
+        self.skipped = 0  # states of the live car that were replaced by newer ones before they were sent
 
     # -- what is new -------------------------------------------------------------------------------------------------
 
@@ -104,22 +102,24 @@ class PageWriter:
             why = self._bus.trouble(self._vehicle)
             if why is not None and not self._replies:  # a page that does not read does not get it again
                 self.queue({"kind": "unserved", "why": why})
-        elif kind == "scan" and self._view.is_replaying:
+        elif kind == "scan" and (self._view.is_replaying or not self._watches_scan):
             return
-        elif self._is_offered or (kind == "scan" and not self._watches_scan):
-            if kind == "state":
-                self.skipped += 1
         else:
-            self._wakeup.queue(self._wake)
+            if kind == "state" and not self._view.is_replaying:
+                self.skipped += self._is_state_waiting
+                self._is_state_waiting = True
+            if not self._offers.is_open or (kind == "state" and self._offers.may_push):
+                self._wakeup.queue(self._wake)
 
     def on_replay(self, kind: str) -> None:
         """Something new of the page's replay."""
-        if kind == "failed" or not self._is_offered:
+        if kind == "failed" or self._offers.may_push or not self._offers.is_open:
             self._wake.set()
 
     def on_turned(self) -> None:
         """Switch the source of the page's frames: none of them was sent yet."""
         self._sent = dict.fromkeys(self._view.kinds, 0)
+        self._is_state_waiting = False
         self._wake.set()
 
     # -- what the page answers ---------------------------------------------------------------------------------------
@@ -153,11 +153,9 @@ class PageWriter:
         self._are_events_due = True
         self._wake.set()
 
-    def take(self) -> None:
-        """The page takes what was offered."""
-        self._took_ms = self._wall_ms()
-        self._is_offered = False
-        self._is_taking = True
+    def take(self, message: Mapping[str, object]) -> None:
+        """The page takes what was offered, or has a state that was sent ahead."""
+        self._is_taking = self._offers.taken(message) or self._is_taking
         self._wakeup.queue(self._wake)
 
     def have_events(self) -> None:
@@ -214,8 +212,8 @@ class PageWriter:
     def close(self) -> None:
         """Leaves what wakes it."""
         self._feed.close()
-        if self._offering is not None:
-            self._offering.cancel()
+        if self._later is not None:
+            self._later.cancel()
         self._wakeup.leave(self._wake)
         self.watch_scan(False)
 
@@ -239,9 +237,13 @@ class PageWriter:
         if self._is_taking:
             self._is_taking = False
             for kind in self._view.kinds:
-                if self._is_new(kind):
+                if self._is_new(kind) and (kind != "state" or self._offers.has_room):
                     await self._send_newest(kind)
-        if not self._is_offered:
+        elif self._offers.may_push and self._is_new("state") and self._is_time(self._offers.push_wait_s()):
+            await self._send_newest("state")
+        if self._offers.is_echo_due:
+            await self._send_offer([])  # behind the state: it measures how long the last of those under way takes
+        if not self._offers.is_open:
             await self._offer()
 
     async def _send_events(self) -> None:
@@ -258,27 +260,25 @@ class PageWriter:
             await self._send(message)
 
     async def _offer(self) -> None:
-        fresh = [kind for kind in self._view.kinds if self._is_new(kind)]
-        if not fresh or self._offering is not None:
-            return
-        wait_s = self._offered_s + OFFER_EVERY_S - self._now()
-        if wait_s > 0:
-            self._offering = asyncio.get_running_loop().call_later(wait_s, self._offer_is_due)
-            return
-        self._seq += 1
-        self._is_offered = True
-        self._offered_s = self._now()
-        await self._send({"kind": "offer", "seq": self._seq, "of": fresh, "took_ms": self._took_ms})
+        waits = [kind for kind in self._view.kinds if self._is_new(kind)]
+        fresh = [kind for kind in waits if kind != "state" or not self._offers.may_push]
+        if fresh and self._is_time(self._offers.offer_wait_s()):
+            await self._send_offer(fresh)
 
-    def _offer_is_due(self) -> None:
-        self._offering = None
-        self._offered_s = float("-inf")  # it has waited: no rounding of the clock makes it wait again
-        self._wake.set()
+    async def _send_offer(self, of: list[FrameKind]) -> None:
+        seq, took_ms, took = self._offers.offered(is_echo=not of), self._offers.took_ms, self._offers.took
+        await self._send({"kind": "offer", "seq": seq, "of": of, "took_ms": took_ms, "took": took})
+
+    def _is_time(self, wait_s: float) -> bool:
+        """Whether nothing is to be waited for; else another round follows when it is over."""
+        if is_early := wait_s > ROUNDING_S:
+            if self._later is not None:
+                self._later.cancel()
+            self._later = asyncio.get_running_loop().call_later(wait_s, self._wake.set)
+        return not is_early
 
     def _is_new(self, kind: FrameKind) -> bool:
-        if kind == "scan" and not self._watches_scan:
-            return False
-        return self._view.number(kind) > self._sent[kind]
+        return (kind != "scan" or self._watches_scan) and self._view.number(kind) > self._sent[kind]
 
     async def _send_newest(self, kind: FrameKind, *, unasked: bool = False) -> None:
         number, frame = self._view.number(kind), self._view.newest(kind)
@@ -287,6 +287,9 @@ class PageWriter:
         if frame is None or not is_new:
             return
         self._sent[kind] = frame.number
+        if kind == "state":
+            self._offers.sent_state()
+            self._is_state_waiting = False
         if isinstance(frame.payload, bytes):
             await self._socket.send_bytes(frame.payload)
         else:

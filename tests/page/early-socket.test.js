@@ -1,5 +1,7 @@
 import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
 import { test } from 'node:test';
+import vm from 'node:vm';
 import { takeEarly } from '../../static/js/boot/early-socket.js';
 import { PageSocket } from '../../static/js/core/socket.js';
 
@@ -80,16 +82,38 @@ test('one that failed is not taken over, and none is taken twice', () => {
   assert.equal(takeEarly(), null);
 });
 
-test('one that was given up while its ticket was under way is hung up when it opens', async () => {
-  const { early, socket } = dialled([]);
-  const { pageSocket, heard } = wired();
-  early.socket = null; // the ticket is asked for
-  pageSocket.look(0);
-  await Promise.resolve();
-  pageSocket.look(6000); // given up, and dialled anew
-  pageSocket.look(9000);
-  early.socket = /** @type {any} */ (socket);
-  early.handle?.({ type: 'open', at_ms: 9100 });
-  assert.equal(socket.isClosed, true);
-  assert.deepEqual(heard, []);
+test('a ticket is waited for as long as the page waits for the socket, and one that comes after that opens none', async (t) => {
+  const source = await readFile(new URL('../../static/js/boot/early.js', import.meta.url), 'utf8');
+  t.mock.timers.enable({ apis: ['setTimeout'] });
+  for (const [after_ms, isOpen] of /** @type {[number, boolean][]} */ ([[4900, true], [5200, false]])) {
+    const opened = [];
+    class Dialled extends Socket {
+      constructor() {
+        super();
+        opened.push(this);
+      }
+    }
+    const fetched = (/** @type {string} */ _way, /** @type {RequestInit} */ { signal }) => new Promise((resolve, reject) => {
+      signal?.addEventListener('abort', () => reject(signal.reason));
+      setTimeout(() => resolve({ json: async () => ({ ticket: 'one' }) }), after_ms);
+    });
+    const scope = {
+      document: { documentElement: { dataset: { access: 'paired', vehicle: 'car' } } }, localStorage: { getItem: () => null },
+      location: { search: '', href: 'https://catgraph.local/', protocol: 'https:' }, URL, URLSearchParams, performance,
+      AbortSignal: { timeout: (/** @type {number} */ ms) => { const stop = new AbortController(); setTimeout(() => stop.abort(new Error('late')), ms); return stop.signal; } },
+      fetch: fetched, WebSocket: Dialled, Error, Promise,
+    };
+    vm.runInNewContext(source, scope);
+    /** @type {any} */ (globalThis).catgraphEarly = /** @type {any} */ (scope).catgraphEarly;
+    const { pageSocket, dials } = wired();
+    for (let ms = 0; ms <= 5500 && !pageSocket.isOpen; ms += 100) {
+      pageSocket.look(ms);
+      t.mock.timers.tick(100);
+      for (let turn = 0; turn < 10; turn += 1) await Promise.resolve();
+      /** @type {any} */ (opened[0])?.onopen();
+    }
+    assert.equal(pageSocket.isOpen, isOpen, `a ticket after ${after_ms} ms`);
+    assert.equal(opened.length, isOpen ? 1 : 0);
+    assert.equal(dials.count, isOpen ? 1 : 2);
+  }
 });

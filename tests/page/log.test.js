@@ -116,3 +116,9 @@ test('what a hand-over made of an alarm is said, and one that is unacknowledged 
   assert.deepEqual([words('handed_over').icon, words('handed_over').title, words('handed_over').text], ['ok', 'Speed above limit taken over', '12.6 m/s · by Ben']);
   assert.deepEqual([words('unacknowledged').icon, words('unacknowledged').title], ['crit', 'Speed above limit unacknowledged again']);
 });
+
+test('what the log had lost says from where it is', () => {
+  const brought = { brought_from: 'car_20261128T080000Z' };
+  assert.equal(eventWords(event(1, { by: 'Ben', ...brought })).text, '12.6 m/s · by Ben · brought back from car_20261128T080000Z');
+  assert.equal(eventWords(event(2, { alarm: null, change: 'connected', text: 'Connected', ...brought })).text, 'brought back from car_20261128T080000Z');
+});

@@ -12,6 +12,7 @@ const { leftWords, removalWords, seenWords } = await import('../../static/js/pai
 const { thenOf } = await import('../../static/js/boot/pairing-token.js');
 const { forgetWork, OF_THE_WORK } = await import('../../static/js/boot/forget.js');
 const { Admission } = await import('../../static/js/pairing/admission.js');
+const { PageSocket } = await import('../../static/js/core/socket.js');
 const { screenOf } = await import('../../static/js/shell/router.js');
 
 test('the next socket has the ticket that the one before brought, until the server refuses it', async (t) => {
@@ -47,6 +48,48 @@ test('the next socket has the ticket that the one before brought, until the serv
   await dial();
   assert.deepEqual(dialled.map(({ address }) => decodeURIComponent(address.split('ticket=')[1])), ['fetched 0', 'next', 'next', 'fetched 3']);
   assert.equal(closed.length, 3);
+});
+
+test('a connection that was dialled beside a quiet one and is not needed brings the ticket of the next one', async (t) => {
+  /** @type {any[]} */
+  const dialled = [];
+  t.mock.method(globalThis, 'fetch', async () => ({ ok: true, json: async () => ({ ticket: 'fetched' }) }));
+  t.after(() => { delete /** @type {any} */ (globalThis).WebSocket; });
+  globalThis.WebSocket = /** @type {any} */ (class {
+    /** @param {string} address */
+    constructor(address) {
+      this.ticket = new URL(address).searchParams.get('ticket');
+      dialled.push(this);
+    }
+
+    close() {}
+  });
+  const admission = new Admission(() => 'ws://car/ws', () => {});
+  let now_ms = 0;
+  t.mock.method(performance, 'now', () => now_ms);
+  const ear = { opened() {}, closed() {}, text() {}, bytes() {} };
+  const page = new PageSocket(ear, () => admission.dial(page.trip), () => now_ms, () => 0);
+  const look = async (/** @type {number} */ until_ms) => {
+    for (; now_ms < until_ms; now_ms += 100) page.look(now_ms);
+    await new Promise((resolve) => { setTimeout(resolve); });
+  };
+  const hello = (/** @type {string} */ ticket) => ({ data: JSON.stringify({ kind: 'hello', boot: 'a', time_ms: 0, ticket }) });
+  await look(100);
+  await look(400);
+  dialled[0].onopen();
+  dialled[0].onmessage(hello('first'));
+  page.offered(/** @type {any} */ ({ seq: 1, of: ['state'], took: 0 }), 500); // a slow radio
+  await look(1600);
+  page.proof(now_ms); // it answers while the other one is under way
+  dialled[1].onopen();
+  dialled[1].onmessage(hello('second'));
+  dialled[0].onclose();
+  await look(2200);
+  assert.deepEqual(dialled.map(({ ticket }) => ticket), ['fetched', 'first', 'second']);
+  dialled[2].onopen();
+  dialled[2].onclose(); // a server that refuses it after it opened
+  await look(5000);
+  assert.equal(dialled[3].ticket, 'fetched');
 });
 
 test('a PIN is its digits, however it is typed', () => {

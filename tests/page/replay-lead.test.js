@@ -21,8 +21,11 @@ function opened(t) {
   const sent = [];
   const socket = /** @type {any} */ ({ send: (/** @type {string} */ text) => sent.push({ at_ms: now_ms, ...JSON.parse(text) }), close() {} });
   const store = new Store(() => socket);
+  store.sync.greet();
   store.socket.look(0);
   socket.onopen();
+  socket.onmessage({ data: JSON.stringify({ kind: 'hello', boot: 'a', run: 'a', time_ms: 0 }) });
+  sent.length = 0;
   const pass = async (/** @type {number} */ ms) => {
     for (const end_ms = now_ms + ms; now_ms < end_ms; ) {
       now_ms += 1;
@@ -173,12 +176,44 @@ test('a connection that breaks while the recording is opened again keeps the ord
   const { store, asked, turn, lead } = breakable();
   store.socket.isOpen = false;
   const answer = lead.order({ do: 'seek', at_s: 9 });
-  await lead.reopen(async () => ({ ok: false }));
+  await lead.reopen(async () => ({ ok: false, isBroken: true }));
   await turn();
   assert.deepEqual(asked, []);
   lead.end();
   assert.deepEqual(await answer, { ok: true });
   assert.deepEqual(asked, []);
+});
+
+test('another connection that takes the place of the one over which the recording is opened again keeps the order', async () => {
+  const { asked, turn, lead } = breakable();
+  /** @type {((answer: {ok: boolean, isBroken?: boolean}) => void)[]} */
+  const opens = [];
+  const reopen = () => lead.reopen(() => new Promise((resolve) => opens.push(resolve)));
+  void reopen();
+  const answer = lead.order({ do: 'seek', at_s: 9 });
+  opens[0]?.({ ok: false, isBroken: true });
+  void reopen(); // the other one is open at once
+  await turn();
+  assert.deepEqual(asked, []);
+  opens[1]?.({ ok: true });
+  await turn();
+  assert.equal(asked[0].at_s, 9);
+  asked[0].resolve({ ok: true });
+  assert.deepEqual(await answer, { ok: true });
+});
+
+test('an answer that a connection took with it when it broke is none of the server', async (t) => {
+  const { store, socket, pass } = opened(t);
+  const asked = store.ask('replay', { do: 'play' });
+  socket.onclose();
+  assert.equal((await asked).isBroken, true);
+  assert.equal((await store.ask('replay', { do: 'play' })).isBroken, true);
+  store.socket.look(10_000);
+  socket.onopen();
+  socket.onmessage({ data: JSON.stringify({ kind: 'hello', boot: 'a', run: 'a', time_ms: 0 }) });
+  const late = store.ask('replay', { do: 'play' });
+  await pass(4001);
+  assert.equal((await late).isBroken, undefined, 'not in time');
 });
 
 const alarm = (/** @type {number} */ at_s, /** @type {object} */ more = {}) => ({ at_s, alarm: 'speed_limit', title: 'Speed above limit', priority: 'critical', text: '12.4 m/s', duration_s: 8, ...more });

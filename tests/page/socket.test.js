@@ -27,6 +27,7 @@ class Socket {
 
 function set() {
   let now_ms = 0;
+  const chance = { now: 0 };
   /** @type {Socket[]} */
   const sockets = [];
   /** @type {string[]} */
@@ -35,13 +36,14 @@ function set() {
     { opened: () => heard.push('open'), closed: () => heard.push('closed'), text: (text) => heard.push(text), bytes: () => heard.push('bytes') },
     () => /** @type {any} */ (sockets[sockets.push(new Socket()) - 1]),
     () => now_ms,
+    () => chance.now,
   );
   const at = (/** @type {number} */ ms) => { now_ms = ms; };
   /** Looks as the page does, from then to then. @param {number} from_ms @param {number} to_ms */
   const look = (from_ms, to_ms) => {
     for (now_ms = from_ms; now_ms <= to_ms; now_ms += 100) pageSocket.look(now_ms);
   };
-  return { pageSocket, sockets, heard, at, look };
+  return { pageSocket, sockets, heard, at, look, chance };
 }
 
 test('a quiet connection is given up though the browser reports nothing, and what it still brings is not heard', () => {
@@ -67,7 +69,7 @@ test('a connection that has just opened is alive, however long its dial took', (
   at(4000);
   sockets[0]?.onopen();
   look(4100, 8900);
-  assert.deepEqual([sockets.length, sockets[0]?.isClosed], [1, false]);
+  assert.equal(sockets[0]?.isClosed, false);
   look(9000, 20_000);
   assert.equal(sockets[0]?.isClosed, true);
 });
@@ -80,15 +82,15 @@ test('a connection of a weak radio gets more time, and what was measured holds f
   for (const [took_ms, came_ms] of [[2000, 2800], [3000, 4500], [5000, 5700]]) {
     at(Number(took_ms));
     pageSocket.send({ kind: 'take', seq: 1 });
-    pageSocket.answered(Number(came_ms));
-    pageSocket.answered(Number(came_ms) + 500); // a frame that nobody asked for says nothing of the round trip
+    pageSocket.answered(Number(came_ms), 'state');
+    pageSocket.answered(Number(came_ms) + 500, 'state'); // a frame that nobody asked for says nothing of the round trip
     pageSocket.proof(Number(came_ms));
   }
   look(5700, 8700);
   assert.equal(sockets[0]?.isClosed, false);
-  look(8800, 12_700);
+  look(8800, 10_700);
   assert.deepEqual([sockets[0]?.isClosed, sockets.length, sockets[1]?.isClosed], [true, 2, false]); // the dial, too
-  look(12_800, 13_200);
+  look(10_800, 12_000);
   assert.equal(sockets.length, 3);
 });
 
@@ -99,7 +101,7 @@ test('what was asked for proves the connection, whatever is known of the clocks 
   sockets[0]?.onopen();
   at(2400);
   pageSocket.send({ kind: 'take', seq: 1 });
-  pageSocket.answered(2450);
+  pageSocket.answered(2450, 'state');
   look(2500, 4900);
   assert.equal(sockets[0]?.isClosed, false);
   look(5000, 5100);
@@ -139,6 +141,195 @@ test('a page that knew a fast radio connects over one on which a connection take
   assert.ok(pageSocket.isOpen);
 });
 
+/** Opens at 0.3 s, as over a radio with a round trip of 0.15 s; a server that sends states ahead. */
+function slow() {
+  const one = set();
+  one.pageSocket.look(0);
+  one.at(300);
+  one.sockets[0]?.onopen();
+  one.pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'], took: 0 }), 400);
+  return one;
+}
+
+test('over a slow radio another connection is dialled beside a quiet one, and takes its place with its first message', () => {
+  const { sockets, heard, at, look, pageSocket } = slow();
+  look(400, 1300);
+  assert.equal(sockets.length, 1);
+  look(1400, 1500);
+  assert.equal(sockets.length, 2);
+  assert.deepEqual([sockets[0]?.isClosed, pageSocket.isOpen], [false, true]);
+  at(1600);
+  pageSocket.send({ kind: 'pause' });
+  assert.equal(sockets[0]?.sent.length, 1);
+  sockets[1]?.onopen();
+  pageSocket.send({ kind: 'pause' });
+  assert.deepEqual([sockets[0]?.isClosed, sockets[0]?.sent.length], [false, 2], 'the server may still refuse the other one');
+  sockets[1]?.onmessage({ data: 'hello' });
+  assert.equal(sockets[0]?.isClosed, true);
+  pageSocket.send({ kind: 'pause' });
+  assert.deepEqual([sockets[0]?.sent.length, sockets[1]?.sent.length], [2, 1], 'over one connection, never over both');
+  assert.deepEqual(heard, ['open', 'closed', 'open', 'hello']);
+  assert.equal(sockets[0]?.onmessage, null);
+});
+
+test('a quiet connection that answers before the other one does stays, and one that the server refuses takes no place', () => {
+  const { sockets, heard, at, look, pageSocket } = slow();
+  look(400, 1500);
+  sockets[1]?.onopen();
+  sockets[1]?.onclose(); // as of a device with too many pages
+  assert.deepEqual([sockets[0]?.isClosed, sockets[1]?.isClosed, pageSocket.isOpen], [false, true, true]);
+  look(1600, 1700);
+  assert.equal(sockets.length, 3);
+  at(1800);
+  pageSocket.proof(1800);
+  assert.equal(sockets[2]?.isClosed, false, 'what it brings may be needed yet');
+  sockets[2]?.onopen();
+  sockets[2]?.onmessage({ data: 'hello' });
+  assert.deepEqual([sockets[0]?.isClosed, sockets[2]?.isClosed, sockets[2]?.onmessage], [false, true, null]);
+  assert.deepEqual([sockets.length, heard], [3, ['open']]);
+});
+
+test('connections that are not needed become seldom: after 1, 2, 4, 8 and 10 s', () => {
+  const one = slow();
+  const { sockets, pageSocket, at } = one;
+  /** @type {number[]} */
+  const gaps = [];
+  let [last_ms, quiet_ms] = [NaN, 0];
+  for (let ms = 400; ms < 60_000; ms += 100) {
+    const count = sockets.length;
+    at(ms);
+    pageSocket.look(ms);
+    if (ms - quiet_ms >= 1200) pageSocket.proof(quiet_ms = ms); // quiet for 1.2 s again and again
+    if (sockets.length === count) continue;
+    gaps.push(ms - last_ms);
+    last_ms = ms;
+    pageSocket.proof(quiet_ms = ms);
+    sockets.at(-1)?.onopen();
+    sockets.at(-1)?.onmessage({ data: 'hello' });
+  }
+  assert.deepEqual(gaps.slice(1).map((ms) => Math.floor(ms / 1000)), [1, 2, 4, 8, 10, 10, 10], String(gaps));
+});
+
+test('nothing is sent on a connection that was quiet for too long, though the other one is not open yet', () => {
+  const { sockets, heard, look, pageSocket } = slow();
+  look(400, 2800);
+  assert.equal(pageSocket.isOpen, true);
+  look(2900, 3000);
+  assert.deepEqual([pageSocket.isOpen, pageSocket.send({ kind: 'pause' }), sockets[0]?.isClosed], [false, false, true]);
+  assert.equal(sockets[1]?.isClosed, false, 'its dial is not over');
+  sockets[1]?.onopen();
+  assert.deepEqual(heard, ['open', 'closed', 'open']);
+});
+
+test('a connection over which anything comes is not doubled: the server has nothing fresh', () => {
+  const { sockets, at, look } = slow();
+  look(400, 1200);
+  at(1250);
+  sockets[0]?.onmessage({ data: '{"kind":"offer"}' });
+  look(1300, 2200);
+  assert.equal(sockets.length, 1);
+  look(2300, 2400);
+  assert.equal(sockets.length, 2);
+});
+
+test('pages that one server kept waiting do not all dial at once, nor one that stood still itself', () => {
+  const dialled = [0, 0.5, 1].map((now) => {
+    const { sockets, pageSocket, at, chance } = set();
+    chance.now = now;
+    pageSocket.look(0);
+    at(300);
+    sockets[0]?.onopen();
+    pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'], took: 0 }), 400);
+    for (let ms = 400; ms < 2500; ms += 50) {
+      at(ms);
+      pageSocket.look(ms);
+      if (sockets.length === 2) return ms;
+    }
+    return NaN;
+  });
+  assert.deepEqual(dialled, [1350, 1600, 1850]);
+  const { sockets, look } = slow();
+  look(400, 500);
+  look(1900, 1900); // what came meanwhile is not read yet
+  assert.equal(sockets.length, 1);
+  look(2000, 2000);
+  assert.equal(sockets.length, 2);
+});
+
+test('over a good radio no connection is dialled beside a quiet one', () => {
+  const { sockets, at, look, pageSocket } = set();
+  pageSocket.look(0);
+  at(20);
+  sockets[0]?.onopen();
+  pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'], took: 0 }), 30);
+  look(100, 2500);
+  assert.equal(sockets.length, 1);
+});
+
+test('an offer answers the take that it names, and one of nothing measures the round trip', () => {
+  const { sockets, at, pageSocket } = slow();
+  const before = pageSocket.trip;
+  for (const ms of [1000, 1100, 1200]) {
+    at(ms);
+    pageSocket.answered(ms, 'state');
+  }
+  const takes = sockets[0]?.sent.map((text) => JSON.parse(text));
+  assert.deepEqual(takes?.map(({ n, ahead, got }) => [n, ahead, got]), [[1, 3, 1], [2, 3, 2], [3, 3, 3]]);
+  assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 2, of: ['cars'], took: 2 }), 1400), 1100);
+  assert.equal(pageSocket.trip, before);
+  assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 3, of: [], took: 3 }), 1400), 1200);
+  assert.notEqual(pageSocket.trip, before);
+  assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 4, of: ['state'], took: 77 }), 1400), -Infinity, 'of no take of this page');
+  assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 5, of: ['state'] }), 1400), 1200, 'of a former server: the last one');
+});
+
+test('a state that came ahead proves nothing, nor does an answer that took longer than a connection may be quiet', () => {
+  for (const [lag_ms, isClosed] of /** @type {[number, boolean][]} */ ([[500, false], [20_000, true]])) {
+    const { sockets, at, pageSocket, look } = slow();
+    for (let ms = 500; ms < 40_000; ms += 500) {
+      at(ms);
+      pageSocket.answered(ms, 'state'); // an old one: nothing calls `proof`
+      pageSocket.offered(/** @type {any} */ ({ seq: 2, of: [], took: (ms - lag_ms) / 500 }), ms);
+      look(ms, ms);
+    }
+    assert.equal(sockets[0]?.isClosed, isClosed);
+  }
+});
+
+test('a take that waits for its turn is not sent over another connection, and keeps none of that waiting', (t) => {
+  t.mock.timers.enable({ apis: ['setTimeout'] });
+  const { sockets, at, pageSocket } = slow();
+  const takes = (/** @type {number} */ i) => sockets[i]?.sent.map((text) => JSON.parse(text)).filter(({ kind }) => kind === 'take').map(({ seq }) => seq);
+  at(1000);
+  for (const seq of [7, 8]) pageSocket.takeInTurn(() => pageSocket.send({ kind: 'take', seq }));
+  pageSocket.takeInTurn(() => pageSocket.send({ kind: 'take', seq: 9 }));
+  assert.deepEqual(takes(0), [7, 8], 'the third waits');
+  sockets[0]?.onclose();
+  at(3500);
+  pageSocket.look(3500);
+  sockets[1]?.onopen();
+  pageSocket.send({ kind: 'watch' });
+  pageSocket.send({ kind: 'watch' });
+  pageSocket.takeInTurn(() => pageSocket.send({ kind: 'take', seq: 1 }));
+  at(3600);
+  t.mock.timers.tick(200);
+  assert.deepEqual([takes(0), takes(1)], [[7, 8], [1]]);
+});
+
+test('after a sleep states are trusted once the take is answered that is sent at once', () => {
+  const { sockets, at, pageSocket } = slow();
+  at(1000);
+  pageSocket.answered(1000, 'state');
+  pageSocket.slept();
+  assert.equal(pageSocket.isTrusted, false);
+  const { n, seq, ahead } = JSON.parse(String(sockets[0]?.sent.at(-1)));
+  assert.deepEqual([n, seq, ahead], [2, 0, 3]);
+  pageSocket.offered(/** @type {any} */ ({ seq: 2, of: [], took: 1 }), 1100);
+  assert.equal(pageSocket.isTrusted, false, 'of before the sleep');
+  pageSocket.offered(/** @type {any} */ ({ seq: 3, of: [], took: 2 }), 1200);
+  assert.equal(pageSocket.isTrusted, true);
+});
+
 test('a server that refuses at once is dialled every two seconds', () => {
   const { pageSocket, sockets } = set();
   for (let ms = 0; ms < 60_000; ms += 100) {
@@ -166,7 +357,7 @@ test('nothing is sent while it is not open, and nothing is kept', () => {
   sockets[0]?.onopen();
   assert.deepEqual(sockets[0]?.sent, []);
   assert.equal(pageSocket.send({ kind: 'take', seq: 1 }), true);
-  assert.deepEqual(sockets[0]?.sent, ['{"kind":"take","seq":1}']);
+  assert.deepEqual(sockets[0]?.sent, ['{"kind":"take","seq":1,"n":1}']);
 });
 
 test('messages that are none of ours are refused', () => {

@@ -22,7 +22,7 @@ test('a listener that throws is a failure, and stops none of the others', () => 
   assert.deepEqual([heard, failed.length], [['one'], 2]);
 });
 
-const NOT_SENT = { ok: false, outcome: 'not_delivered', reason: 'Not sent: the server does not answer.' };
+const NOT_SENT = { ok: false, outcome: 'not_delivered', reason: 'Not sent: the server does not answer.', isBroken: true };
 
 test('what is asked is answered once, not sent where it cannot be, and not known when no answer comes', async (t) => {
   t.mock.timers.enable({ apis: ['setTimeout'] });
@@ -41,7 +41,7 @@ test('what is asked is answered once, not sent where it cannot be, and not known
   requests.broke();
   const cut = 'It may have been carried out. The link is cut between this page and the server. Not known yet in which direction.';
   const broken = `The connection to the server broke. ${cut}`;
-  assert.deepEqual(await second, { ok: false, outcome: 'unknown', reason: broken });
+  assert.deepEqual(await second, { ok: false, outcome: 'unknown', reason: broken, isBroken: true });
   const third = requests.ask('pause', {}, 100);
   t.mock.timers.tick(100);
   const late = `The server did not answer in time. ${cut}`;
@@ -186,7 +186,7 @@ test('what must be signed is sent once it is, in its order, and never late', asy
   assert.deepEqual(await first, { ok: true });
   const second = requests.ask('pause', {});
   t.mock.timers.tick(4000);
-  assert.deepEqual(await second, { ...NOT_SENT, reason: 'Not sent: this device could not sign it.' }, 'it never went out');
+  assert.deepEqual(await second, { ok: false, outcome: 'not_delivered', reason: 'Not sent: this device could not sign it.' }, 'it never went out');
   done[1]?.({ signed: 2 });
   const third = requests.ask('pause', {});
   isOpen = false;

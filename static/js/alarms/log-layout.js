@@ -29,6 +29,12 @@ const MONTHS = ['January', 'February', 'March', 'April', 'May', 'June', 'July', 
  * @param {AlarmEvent} event
  */
 export function eventWords(event) {
+  const words = wordsOf(event);
+  return event.brought_from ? { ...words, text: [words.text, `brought back from ${event.brought_from}`].filter(Boolean).join(' · ') } : words;
+}
+
+/** @param {AlarmEvent} event */
+function wordsOf(event) {
   if (event.alarm === null && SLOWING.has(event.change)) {
     const [mark, kind] = event.step === 'not_confirmed' ? ['crit', 'c-crit'] : ['slow', 'c-order'];
     return { icon: mark, kind, title: event.text || event.change, text: event.by ? `by ${event.by}` : '' };

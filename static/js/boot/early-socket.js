@@ -2,7 +2,7 @@
 
 /**
  * @typedef {{type: 'open' | 'message' | 'close', data?: string | ArrayBuffer, at_ms: number}} SocketEvent at_ms: when it came, monotonic
- * @typedef {{queue: SocketEvent[], handle: ((event: SocketEvent) => void) | null, socket: WebSocket | null, dialled_ms?: number}} Early
+ * @typedef {{queue: SocketEvent[], handle: ((event: SocketEvent) => void) | null, socket: WebSocket | null, dialled_ms?: number, isGivenUp?: boolean}} Early isGivenUp: none is to be dialled any more
  */
 
 /** The one that was dialled, once; null where there is none any more, or it failed. @returns {import('../core/socket.js').Socket | null} */
@@ -24,7 +24,6 @@ export class EarlySocket {
   onclose = null;
   /** @type {any} */
   onerror = null;
-  #isClosed = false;
 
   get dialled_ms() {
     return this.early.dialled_ms ?? 0;
@@ -45,14 +44,13 @@ export class EarlySocket {
   }
 
   close() {
-    this.#isClosed = true;
+    this.early.isGivenUp = true;
     this.early.socket?.close();
   }
 
   /** @param {SocketEvent} event */
   #handle({ type, data, at_ms }) {
-    if (type === 'open' && this.#isClosed) this.early.socket?.close(); // given up while its ticket was under way
-    else if (type === 'open') this.onopen?.({ at_ms });
+    if (type === 'open') this.onopen?.({ at_ms });
     else if (type === 'message') this.onmessage?.({ data, at_ms });
     else this.onclose?.();
   }

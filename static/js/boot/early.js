@@ -32,13 +32,14 @@
   /** Where devices are paired, a socket needs one. @param {string} way @returns {Promise<string | null>} */
   async function ticketOf(way) {
     if (way !== 'paired') return null;
-    const answer = await fetch('/api/ticket', { method: 'POST', cache: 'no-store', signal: AbortSignal.timeout(4000) });
+    const answer = await fetch('/api/ticket', { method: 'POST', cache: 'no-store' }); // how long to wait, whoever takes the socket over decides
     return (await answer.json()).ticket;
   }
 
   /** @param {string | null} ticket */
   function dial(ticket) {
     if (ticket === undefined) throw new Error('no ticket'); // why, is asked and said once the page is there
+    if (early.isGivenUp) return;
     const address = new URL('/ws', location.href);
     address.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';
     if (vehicle) address.searchParams.set('vehicle', vehicle);

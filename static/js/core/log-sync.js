@@ -6,6 +6,8 @@ export class LogSync {
   /** The answer to the server's greeting, while it is owed. @type {(() => void) | null} */
   #owed = null;
   #mayGreet = false;
+  /** The server knows who this page is, on this connection: before, it files a command under nobody. */
+  hasGreeted = false;
   #log;
   #send;
   #emitter;
@@ -43,7 +45,7 @@ export class LogSync {
     const have_event = this.#log.greet(hello, blind_s, Date.now());
     this.#owed = () => {
       this.#owed = null;
-      this.#send({ kind: 'hello', have_event, boot: this.#log.boot, ...self });
+      this.hasGreeted = this.#send({ kind: 'hello', have_event, boot: this.#log.boot, ...self });
     };
     if (this.#mayGreet) this.#owed();
     this.#caughtUp();
@@ -65,6 +67,7 @@ export class LogSync {
 
   closed() {
     this.#owed = null;
+    this.hasGreeted = false;
   }
 
   #caughtUp() {

@@ -1146,6 +1146,10 @@ export interface LogEvent {
   worst?: Worst | null;
   /** its number: grows by one, never given twice */
   n: number;
+  /** the log had lost it, and it was brought back from this recording */
+  brought_from?: string;
+  /** it follows the log without a gap, and the server was killed then: state is restored from it too */
+  was_cut?: boolean;
 }
 
 /** `GET /api/logbook`. */
@@ -1354,6 +1358,8 @@ export interface Offer {
   of: Array<"state" | "scan" | "timeline" | "cars" | "beside">;
   /** when the page's last take was received; before the first, when it connected */
   took_ms: number;
+  /** its number `n`; 0: it had none, or there was none yet */
+  took?: number;
 }
 
 /** Offers control to another page, whose operator reads back what is in force; until then control stays where it is. */
@@ -1421,7 +1427,7 @@ export interface OrderSteps {
   slows_ms: number | null;
 }
 
-/** Before everything else but `take`: the server then sends what the page missed, and no event before it (or 1 s after the connection, where none comes). */
+/** Before everything else but `take`: the server then sends what the page missed, and no event before it (or 1 s after the connection, where none comes). A command that comes before it is refused. */
 export interface PageHello {
   kind: "hello";
   /** number of the newest event that the page has */
@@ -2574,10 +2580,17 @@ export interface SuppressedAlarm {
   raised_ms: number | null;
 }
 
-/** Takes what was offered. */
+/** Takes what was offered, or states that a state came which was sent ahead. */
 export interface Take {
   kind: "take";
+  /** of the offer; 0: of none */
   seq: number;
+  /** counts the takes of a connection from 1 on */
+  n?: number;
+  /** so many states may be under way, sent without an offer; at most 12 */
+  ahead?: number;
+  /** with `ahead`: how many states this connection has brought */
+  got?: number;
 }
 
 /** Takes, gives or requests control; server/control/lease.py says who may do what. */

@@ -19,17 +19,17 @@ const MOST_LOST = 20;
 /**
  * @typedef {import('./outcome.js').Outcome} Outcome
  * @typedef {import('./outcome.js').Became} Became
- * @typedef {{ok: boolean, reason?: string, outcome?: Outcome, suggestion?: string, version?: number, isConflict?: boolean, heldBy?: string}} Answer
+ * @typedef {{ok: boolean, reason?: string, outcome?: Outcome, suggestion?: string, version?: number, isConflict?: boolean, heldBy?: string, isBroken?: boolean}} Answer
  *   outcome: of one that is not ok; where it is left out, it was refused. suggestion: an address that would do; version: of the settings, once changed;
- *   isConflict: somebody else changed them in between; heldBy: who is in control instead
+ *   isConflict: somebody else changed them in between; heldBy: who is in control instead; isBroken: nobody refused, the connection broke or was not there
  * @typedef {import('./outcome.js').Cut} Cut
  * @typedef {{kind: string, became: Became, reason: string, cut: Cut | null}} Found what became of a command that was not answered
  * @typedef {{kind: string, vehicle: unknown, at_ms: number, cut: Cut | null}} Lost cut: where, where known
  * @typedef {{kind: string, vehicle: unknown, at_ms: number, isSent: boolean, resolve: (answer: Answer) => void}} Waiting at_ms: when it was asked for
  */
 
-const NOT_SENT = { ok: false, outcome: /** @type {const} */ ('not_delivered'), reason: 'Not sent: the server does not answer.' };
-const NOT_SIGNED = { ...NOT_SENT, reason: 'Not sent: this device could not sign it.' };
+const NOT_SENT = { ok: false, outcome: /** @type {const} */ ('not_delivered'), reason: 'Not sent: the server does not answer.', isBroken: true };
+const NOT_SIGNED = { ok: false, outcome: NOT_SENT.outcome, reason: 'Not sent: this device could not sign it.' };
 /** Kinds whose loss changes nothing, or that are sent again until they are answered. */
 const ONLY_OF_PAGE = new Set(['replay', 'outcome', 'mark', 'remove_mark']);
 
@@ -115,7 +115,7 @@ export class Requests {
 
   /** The connection broke: none of them is answered any more. */
   broke() {
-    for (const id of [...this.#waiting.keys()]) this.#lose(id, 'The connection to the server broke.');
+    for (const id of [...this.#waiting.keys()]) this.#lose(id, 'The connection to the server broke.', NOT_SENT, true);
   }
 
   /** Another car is shown: what became of commands to the one before is not asked here. */
@@ -133,13 +133,13 @@ export class Requests {
     }
   }
 
-  /** Nothing came. @param {string} id @param {string} why @param {Answer} [unsent] of one that was not signed yet */
-  #lose(id, why, unsent = NOT_SENT) {
+  /** Nothing came. @param {string} id @param {string} why @param {Answer} [unsent] of one that was not signed yet @param {boolean} [isBroken] */
+  #lose(id, why, unsent = NOT_SENT, isBroken = false) {
     const waiting = this.#waiting.get(id);
     if (!waiting) return;
     if (!waiting.isSent) return this.#settle(id, unsent);
     this.#keep(id, waiting, 'page-server');
-    this.#settle(id, { ok: false, outcome: 'unknown', reason: withCut(maybe(why), 'unknown', 'page-server') });
+    this.#settle(id, { ok: false, outcome: 'unknown', reason: withCut(maybe(why), 'unknown', 'page-server'), ...(isBroken ? { isBroken } : {}) });
   }
 
   /** @param {string} id @param {Waiting} waiting @param {Cut | null} cut */

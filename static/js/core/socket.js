@@ -1,13 +1,10 @@
 // The page's end of the socket: dials for ever, and hangs up on a connection that has gone quiet (a browser may never report
 // that one is dead) and on a dial that does not open (a server may be stopped while its port still accepts).
 
-import { isSlower, limitsOf, measured } from './round-trip.js';
+import { Dials } from './dials.js';
+import { aheadOf, isSlower, limitsOf, measured } from './round-trip.js';
+import { Takes } from './takes.js';
 
-/** Of so many dials in a row one gets twice the time, and that of an unknown radio at least: it may be another one than was measured. */
-const DIALS_A_LONG_ONE = 3;
-/** Least time from one dial to the next [ms]. */
-const FIRST_WAIT_MS = 300;
-const LAST_WAIT_MS = 2000;
 /** A page sends at most 25 messages a second: frames are taken up to the first, a replay is led up to the second; what a person orders never waits. */
 const TAKES_A_S = 24;
 export const LEADS_A_S = 25;
@@ -26,50 +23,85 @@ const EVENLY = { take: [2, 85], replay: [2, 250] };
 
 /** One socket at a time. Time is an argument: whoever owns it calls `look` a few times a second. */
 export class PageSocket {
-  /** @type {Socket | null} */
+  /** The one that is open. @type {Socket | null} */
   #socket = null;
-  #isOpen = false;
+  /** One that is connecting: it takes the place of the open one with its first message, unless that one has answered meanwhile. @type {Socket | null} */
+  #next = null;
   /** How long an answer takes here, over all connections. @type {import('./round-trip.js').RoundTrip | null} */
   trip = null;
   #proof_ms = 0;
-  #dialled_ms = -Infinity;
-  /** Dials in a row that did not open. */
-  #failed = 0;
-  /** When the last frame was asked for, or this connection; and whether it is still to come. */
-  #asked_ms = -Infinity;
-  #isOwed = false;
-  #wait_ms = FIRST_WAIT_MS;
-  #next_ms = -Infinity;
+  /** When anything came. */
+  #came_ms = -Infinity;
+  /** Of the open one, or of the last. */
+  #takes = new Takes();
+  #dials;
   /** The last messages. @type {{kind: unknown, at_ms: number}[]} */
   #sent = [];
-  #isTaking = false;
 
   /**
    * @param {Ear} ear
    * @param {() => Socket} dial makes a socket that is connecting
    * @param {() => number} [now] monotonic [ms]
+   * @param {() => number} [chance] from 0 to 1
    */
-  constructor(ear, dial, now = () => performance.now()) {
+  constructor(ear, dial, now = () => performance.now(), chance = () => Math.random()) {
     this.ear = ear;
     this.dial = dial;
     this.now = now;
+    this.#dials = new Dials(chance);
   }
 
   get isOpen() {
-    return this.#isOpen;
+    return this.#socket !== null;
   }
 
-  /** When that was sent which the server has answered by its next offer or greeting [ms, monotonic]. */
-  get asked_ms() {
-    return this.#asked_ms;
+  /** When this connection was dialled [ms, monotonic]. */
+  get dialled_ms() {
+    return this.#takes.sent_ms(0);
   }
 
-  /** A frame came, fresh or not: if it was asked for, the connection is alive, whatever is known of the clocks yet. @param {number} at_ms */
-  answered(at_ms) {
-    if (!this.#isOwed) return;
-    this.#isOwed = false;
-    this.trip = measured(this.trip, at_ms - this.#asked_ms);
-    this.proof(at_ms);
+  /**
+   * When that was sent which an offer answers [ms, monotonic]; of a server that does not name it, the last.
+   * @param {import('./protocol-types.js').Offer} offer
+   * @param {number} at_ms when it came
+   */
+  offered({ took, of }, at_ms) {
+    if (took === undefined) return this.#takes.asked_ms;
+    const asked_ms = this.#takes.sent_ms(took);
+    const isEcho = of.length === 0 && asked_ms > -Infinity;
+    if (isEcho) {
+      // An answer that comes too late is no proof, nor is a state that came ahead: both may have waited behind others.
+      if (at_ms - asked_ms <= limitsOf(this.trip).quiet_ms) this.proof(at_ms);
+      this.trip = measured(this.trip, at_ms - asked_ms);
+    }
+    this.#takes.received(took, aheadOf(this.trip), isEcho ? at_ms : undefined);
+    return asked_ms;
+  }
+
+  /** The phone slept: states that came ahead meanwhile look young, for its clock may have stood still. */
+  slept() {
+    if (!this.#takes.ahead) return;
+    this.#takes.distrust();
+    this.send({ kind: 'take', seq: 0 });
+  }
+
+  /** Whether states are of after the last sleep. */
+  get isTrusted() {
+    return this.#takes.isTrusted;
+  }
+
+  /**
+   * A frame came, fresh or not: if it was asked for, the connection is alive, whatever is known of the clocks yet.
+   * @param {number} at_ms
+   * @param {'state' | 'cars' | 'scan'} kind
+   */
+  answered(at_ms, kind) {
+    const takes = this.#takes;
+    if (takes.got(kind === 'state') && !takes.ahead) {
+      this.trip = measured(this.trip, at_ms - takes.asked_ms);
+      this.proof(at_ms);
+    }
+    if (kind === 'state' && takes.ahead) this.takeInTurn(() => this.send({ kind: 'take', seq: 0 }), kind);
   }
 
   /**
@@ -78,28 +110,25 @@ export class PageSocket {
    */
   proof(now_ms) {
     this.#proof_ms = now_ms;
-    this.#wait_ms = FIRST_WAIT_MS;
+    this.#came_ms = Math.max(this.#came_ms, now_ms);
+    this.#dials.proved();
   }
 
   /** Something changed for the better (the page is seen again, the phone is online): dial without waiting. */
   hurry() {
-    this.#next_ms = -Infinity;
-    this.#wait_ms = FIRST_WAIT_MS;
+    this.#dials.hurry();
   }
 
   /**
-   * Dial where there is no socket, hang up where it is quiet.
+   * Dial where there is no socket, or beside one over which nothing comes on a slow radio; hang up where nothing fresh comes for too long.
    * @param {number} now_ms
    */
   look(now_ms) {
-    if (this.#socket && now_ms - this.#proof_ms > this.#limit_ms()) this.#drop();
-    if (!this.#socket && now_ms >= this.#next_ms) this.#open(now_ms);
-  }
-
-  #limit_ms() {
-    const { dial_ms, quiet_ms } = limitsOf(this.trip);
-    if (this.#isOpen) return quiet_ms;
-    return this.#failed % DIALS_A_LONG_ONE === DIALS_A_LONG_ONE - 1 ? Math.max(2 * dial_ms, limitsOf(null).dial_ms) : dial_ms;
+    const { dial_ms, quiet_ms, spare_ms } = limitsOf(this.trip);
+    if (this.#socket && now_ms - this.#proof_ms > quiet_ms) this.#drop();
+    if (this.#next && now_ms - this.#dials.last_ms > this.#dials.limit_ms(dial_ms, limitsOf(null).dial_ms)) this.#failedDial();
+    const isSpareDue = this.#dials.isSpareDue(now_ms, this.#came_ms, spare_ms);
+    if (!this.#next && (!this.#socket || isSpareDue) && this.#dials.isDue(now_ms)) this.#open(now_ms);
   }
 
   /**
@@ -108,11 +137,10 @@ export class PageSocket {
    * @returns {boolean} whether it went out
    */
   send(message) {
-    if (!this.#socket || !this.#isOpen) return false;
-    this.#socket.send(JSON.stringify(message));
+    if (!this.#socket) return false;
     const [kind, at_ms] = ['kind' in message ? message.kind : '', this.now()];
+    this.#socket.send(JSON.stringify(kind === 'take' ? this.#takes.counted(message, at_ms) : message));
     this.#sent = [...this.#sent.slice(-LEADS_A_S), { kind, at_ms }];
-    if (kind === 'take') [this.#asked_ms, this.#isOwed] = [at_ms, true];
     return true;
   }
 
@@ -130,66 +158,98 @@ export class PageSocket {
     else run();
   }
 
-  /** Take a frame in turn; one take waits at a time, for what is taken is the newest. @param {() => void} take */
-  takeInTurn(take) {
-    if (this.#isTaking) return;
-    this.#isTaking = true;
+  /** Take a frame in turn, of this connection; one take of a kind waits at a time, for what is taken is the newest. @param {() => void} take @param {string} [kind] */
+  takeInTurn(take, kind = 'offer') {
+    const takes = this.#takes;
+    if (takes.waiting.has(kind)) return;
+    takes.waiting.add(kind);
     this.inTurn(TAKES_A_S, () => {
-      this.#isTaking = false;
+      if (takes !== this.#takes) return;
+      takes.waiting.delete(kind);
       take();
     }, 'take');
   }
 
   /** Hang up; the next `look` dials again, without waiting. */
   hangUp() {
-    this.#hangUp();
+    this.stop();
     this.hurry();
   }
 
   /** Hang up for good; `look` must not be called again. */
   stop() {
-    this.#hangUp();
+    this.#forsake();
+    this.#close(this.#socket);
+    this.#socket = null;
+    this.#takes.isOwed = false;
   }
 
   /** @param {number} now_ms */
   #open(now_ms) {
-    this.#proof_ms = this.#dialled_ms = now_ms;
+    this.#dials.begin(now_ms);
     const socket = this.dial();
     socket.binaryType = 'arraybuffer';
-    this.#socket = socket;
-    socket.onopen = (/** @type {{at_ms?: number} | undefined} */ event) => {
-      this.#isOpen = true;
-      this.#failed = 0;
-      this.#proof_ms = this.now();
-      this.#asked_ms = socket.dialled_ms ?? now_ms;
-      const opened_ms = ((event?.at_ms ?? this.#proof_ms) - this.#asked_ms) / 2; // to connect, and to become a WebSocket
-      if (isSlower(this.trip, opened_ms)) this.trip = measured(null, opened_ms);
-      this.ear.opened();
-    };
-    socket.onmessage = (/** @type {{data: any, at_ms?: number}} */ event) => {
-      if (typeof event.data === 'string') this.ear.text(event.data, event.at_ms);
-      else {
-        this.answered(this.now());
-        this.ear.bytes(event.data);
-      }
-    };
-    socket.onclose = () => this.#drop();
+    this.#next = socket;
+    socket.onopen = (/** @type {{at_ms?: number} | undefined} */ event) => this.#connected(socket, socket.dialled_ms ?? now_ms, event?.at_ms ?? this.now());
+    socket.onclose = () => this.#failedDial();
     socket.onerror = () => {}; // a close always follows
   }
 
-  #drop() {
-    const wasOpen = this.#isOpen;
-    if (!wasOpen) this.#failed += 1;
-    this.#hangUp();
-    this.#next_ms = this.#dialled_ms + this.#wait_ms;
-    this.#wait_ms = Math.min(LAST_WAIT_MS, this.#wait_ms * 1.7);
-    if (wasOpen) this.ear.closed();
+  /** Where another one is open, only a message proves that the server serves this one too. @param {Socket} socket @param {number} asked_ms @param {number} at_ms */
+  #connected(socket, asked_ms, at_ms) {
+    if (!this.#socket) return this.#opened(socket, asked_ms, at_ms);
+    socket.onmessage = (/** @type {unknown} */ event) => {
+      if (this.#socket && this.now() - this.#came_ms <= limitsOf(this.trip).spare_ms) { // it has answered meanwhile
+        this.#forsake();
+        return this.#dials.unneeded(this.now());
+      }
+      this.#opened(socket, asked_ms, at_ms);
+      socket.onmessage(event);
+    };
   }
 
-  #hangUp() {
-    const socket = this.#socket;
+  /** @param {Socket} socket @param {number} asked_ms @param {number} at_ms */
+  #opened(socket, asked_ms, at_ms) {
+    this.#next = null;
+    if (this.#socket) this.#drop();
+    this.#socket = socket;
+    this.#dials.opened();
+    this.#proof_ms = this.#came_ms = this.now();
+    const opened_ms = (at_ms - asked_ms) / 2; // to connect, and to become a WebSocket
+    this.#takes = new Takes(asked_ms, opened_ms);
+    if (isSlower(this.trip, opened_ms)) this.trip = measured(null, opened_ms);
+    socket.onmessage = (/** @type {{data: any, at_ms?: number}} */ event) => {
+      this.#came_ms = this.now();
+      if (typeof event.data === 'string') return this.ear.text(event.data, event.at_ms);
+      this.answered(this.now(), 'scan');
+      this.ear.bytes(event.data);
+    };
+    socket.onclose = () => this.#drop();
+    this.ear.opened();
+  }
+
+  /** The open one is gone or given up. */
+  #drop() {
+    this.#close(this.#socket);
     this.#socket = null;
-    this.#isOpen = this.#isOwed = false;
+    this.#takes.isOwed = false;
+    this.#dials.gone();
+    this.ear.closed();
+  }
+
+  #failedDial() {
+    this.#forsake();
+    this.#dials.failed();
+  }
+
+  /** Give up the one that is connecting. */
+  #forsake() {
+    this.#close(this.#next);
+    this.#next = null;
+  }
+
+  /** @param {Socket | null} socket */
+  #close(socket) {
     if (!socket) return;
     // Forgotten before it is closed: a frame still under way on the old socket is never heard again.
     socket.onopen = socket.onmessage = socket.onclose = socket.onerror = null;

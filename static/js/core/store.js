@@ -45,7 +45,7 @@ export class Store extends Known {
   painter = new Painter(this.#emitter);
   #send = (/** @type {object} */ message) => this.socket.send(message);
   seal = new Seal(() => this);
-  #requests = new Requests(this.#send, (answer) => this.#emitter.emit('refused', answer), (message) => this.seal.sealed(message, this.vehicle, challengeOf(this.frame)), (found) => this.#emitter.emit('became', found));
+  #requests = new Requests((message) => this.sync.hasGreeted && this.#send(message), (answer) => this.#emitter.emit('refused', answer), (message) => this.seal.sealed(message, this.vehicle, challengeOf(this.frame)), (found) => this.#emitter.emit('became', found));
   scans = new ScanFeed(this.#send);
   sync = new LogSync(this.log, this.#send, this.#emitter);
   #watch = new PageWatch({
@@ -67,8 +67,8 @@ export class Store extends Known {
     this.socket = new PageSocket(
       {
         opened: () => this.#emitter.guard(() => {
-          this.#granted = null;
-          this.unserved = '';
+          [this.#granted, this.unserved] = [null, ''];
+          this.sync.closed();
           this.scans.opened();
         }),
         text: (text, at_ms) => this.#emitter.guard(() => this.#heard(text, at_ms)),
@@ -134,9 +134,7 @@ export class Store extends Known {
   }
 
   /** Monotonic time [ms]. */
-  now() {
-    return performance.now();
-  }
+  now = () => performance.now();
 
   /**
    * Listen; the result stops listening.
@@ -190,20 +188,20 @@ export class Store extends Known {
    * @param {number} [within_ms]
    */
   ask(kind, fields, within_ms) {
-    const { fence } = this;
-    return this.#requests.ask(kind, /** @type {any} */ ({ ...momentOf(kind, this), ...fields, ...(fence === null ? {} : { fence }) }), within_ms);
+    return this.#requests.ask(kind, /** @type {any} */ ({ ...momentOf(kind, this), ...fields, ...(this.fence === null ? {} : { fence: this.fence }) }), within_ms);
   }
 
   /** @param {string} text @param {number} [at_ms] when it came */
   #heard(text, at_ms = this.now()) {
+    this.#woke(); // a phone that wakes may read what came before the page looks at the time
     const message = readMessage(text);
     if (!message) return void (this.unreadable += 1);
-    if (message.kind === 'state' || message.kind === 'cars') this.socket.answered(at_ms);
+    if (message.kind === 'state' || message.kind === 'cars') this.socket.answered(at_ms, message.kind);
     switch (message.kind) {
       case 'hello': return this.#greeted(message, at_ms);
       case 'offer':
-        this.#clock.note(message.took_ms, at_ms, this.socket.asked_ms);
-        return this.socket.takeInTurn(() => this.scans.offered(message.seq, this.now()));
+        this.#clock.note(message.took_ms, at_ms, this.socket.offered(message, at_ms));
+        return void (message.of.length && this.socket.takeInTurn(() => this.scans.offered(message.seq, this.now()))); // of nothing: it only answers a take
       case 'state': return this.#state(message, at_ms);
       case 'cars':
         this.list(message);
@@ -231,7 +229,7 @@ export class Store extends Known {
   #greeted(hello, at_ms) {
     if (!this.greet(hello)) return;
     this.seal.greeted(hello);
-    this.#clock.greeted(hello, at_ms, this.socket.asked_ms);
+    this.#clock.greeted(hello, at_ms, this.socket.dialled_ms);
     this.sync.greeted(hello, { name: this.name, build: ownBuild(), ...(this.page ? { page: this.page } : {}) }, this.heard_ms === null ? 0 : this.silence_s);
   }
 
@@ -246,7 +244,7 @@ export class Store extends Known {
     frame.server.boot = `${frame.server.boot} ${this.vehicle}`;
     const delay_ms = this.#clock.note(frame.server.time_ms, now_ms);
     const unseen_m = this.log.open && unseenOf(this);
-    if (!this.deadMan.frame(now_ms, delay_ms)) return; // a memory, not service
+    if (!this.socket.isTrusted || !this.deadMan.frame(now_ms, delay_ms)) return; // a memory, not service
     this.log.seen(unseen_m);
     const isFirst = this.take(frame, Date.now() - (this.now() - now_ms));
     this.#delay_ms = delay_ms;
@@ -264,7 +262,7 @@ export class Store extends Known {
   #look() {
     this.painter.look(!document.hidden);
     const now_ms = this.now();
-    if (this.#watch.slept_ms(now_ms) > 2000 && this.frame) this.deadMan.cover();
+    this.#woke();
     this.deadMan.look(now_ms);
     this.socket.look(now_ms);
     if (this.socket.isOpen) this.#requests.look(now_ms);
@@ -272,9 +270,12 @@ export class Store extends Known {
     this.#emitter.emit('tick');
   }
 
+  #woke = () => void (this.#watch.slept_ms(this.now()) > 2000 && this.frame && this.#cover());
+  #cover = () => void [this.deadMan.cover(), this.socket.slept()];
+
   /** Hidden, frozen or back: the veil comes first, whatever the clocks say. @param {boolean} isBack @param {boolean} isRestored */
   #slept(isBack, isRestored) {
-    if (this.frame && (!isRestored || this.silence_s > 1)) this.deadMan.cover();
+    if (this.frame && (!isRestored || this.silence_s > 1)) this.#cover();
     if (isBack) this.socket.hurry();
     if (this.frame) this.painter.draw(); // before, there is nothing to cover
   }

@@ -1,5 +1,6 @@
 // How this page is let in where devices are paired: each socket with a fresh ticket, and the pairing screen where there is none.
 
+import { readMessage } from '../core/protocol.js';
 import { limitsOf } from '../core/round-trip.js';
 
 const A_DAY_MS = 86_400_000;
@@ -37,9 +38,9 @@ export class Admission {
    */
   dial(trip) {
     const next = this.#next;
-    if (next === null) return new TicketSocket(this.address(), (isWanted) => this.#ticket(isWanted, limitsOf(trip).ticket_ms));
+    const ticketOf = next === null ? (/** @type {() => boolean} */ isWanted) => this.#ticket(isWanted, limitsOf(trip).ticket_ms) : async () => next;
     // One that is given up was hardly shown; one that the server refuses was.
-    return new TicketSocket(this.address(), async () => next, () => { this.#next = null; });
+    return new TicketSocket(this.address(), ticketOf, (hello) => this.greeted(hello), () => { if (this.#next === next) this.#next = null; });
   }
 
   /** The device was paired: what waited so long is dialled anew. @param {{hangUp: () => void}} socket */
@@ -93,6 +94,7 @@ class TicketSocket {
   /** @type {WebSocket | null} */
   #socket = null;
   #isClosed = false;
+  #onHello;
   #onRefused;
   /** @type {number | undefined} */
   dialled_ms;
@@ -100,9 +102,11 @@ class TicketSocket {
   /**
    * @param {string} address
    * @param {(isWanted: () => boolean) => Promise<string | null>} ticketOf
-   * @param {() => void} [onRefused] it closed by itself before it opened
+   * @param {(hello: import('../core/protocol-types.js').Hello) => void} onHello also of a socket that the page then does not need: it used the ticket up, and brings the next
+   * @param {() => void} onRefused it closed by itself before it was greeted
    */
-  constructor(address, ticketOf, onRefused = () => {}) {
+  constructor(address, ticketOf, onHello, onRefused) {
+    this.#onHello = onHello;
     this.#onRefused = onRefused;
     ticketOf(() => !this.#isClosed).catch(() => null).then((ticket) => this.#open(address, ticket));
   }
@@ -127,15 +131,19 @@ class TicketSocket {
     const socket = new WebSocket(`${address}${address.includes('?') ? '&' : '?'}ticket=${encodeURIComponent(ticket)}`);
     this.#socket = socket;
     this.dialled_ms = performance.now();
-    let hasOpened = false;
+    let isGreeted = false;
     socket.binaryType = this.binaryType;
-    socket.onopen = () => {
-      hasOpened = true;
-      this.onopen?.();
+    socket.onopen = () => this.onopen?.();
+    socket.onmessage = (event) => {
+      const hello = isGreeted ? null : readMessage(event.data);
+      if (hello?.kind === 'hello') {
+        isGreeted = true;
+        this.#onHello(hello);
+      }
+      this.onmessage?.(event);
     };
-    socket.onmessage = (event) => this.onmessage?.(event);
     socket.onclose = () => {
-      if (!hasOpened && !this.#isClosed) this.#onRefused();
+      if (!isGreeted && !this.#isClosed) this.#onRefused();
       this.onclose?.();
     };
     socket.onerror = () => this.onerror?.();

@@ -147,7 +147,7 @@ class Compare {
     this.pace.sleep();
     const answer = await this.store.ask('replay', { do: 'beside', recording: this.id, at_s: 0 }, OPENS_MS);
     this.#isReopening = false;
-    if (!answer.ok && this.store.socket.isOpen && !this.#isOver) this.leave(answer.reason ?? 'Refused.');
+    if (!answer.ok && !answer.isBroken && !this.#isOver) this.leave(answer.reason ?? 'Refused.');
   }
 
   /** @param {any} message */

@@ -4,7 +4,7 @@ import { LEADS_A_S } from '../core/socket.js';
 
 /**
  * @typedef {import('../core/requests.js').FieldsOf<'replay'>} Order
- * @typedef {{ok: boolean, reason?: string}} Outcome
+ * @typedef {{ok: boolean, reason?: string, isBroken?: boolean}} Outcome
  */
 
 const LEFT = { ok: true }; // of a replay that was left meanwhile, nothing is refused
@@ -47,7 +47,7 @@ export class ReplayLead {
   async reopen(open) {
     this.#isReopening = true;
     const answer = await open();
-    this.#isReopening = !answer.ok && !this.store.socket.isOpen; // then the next connection opens it
+    this.#isReopening = Boolean(answer.isBroken); // then the next connection opens it
     if (!this.isAway) this.#goOn();
     return answer;
   }

@@ -50,8 +50,8 @@ export async function openReplay(id, store, say, { at_s = 0, staysOnTab = false 
   if (!opening) say('Opening…');
   current ??= opening;
   let answer = await store.ask('replay', { do: 'open', recording: id, at_s }, OPENS_MS);
-  for (let tries = 1; !answer.ok && !store.socket.isOpen && tries < TRIES; tries += 1) {
-    await opened(store); // the connection broke meanwhile: nobody refused
+  for (let tries = 1; answer.isBroken && tries < TRIES; tries += 1) {
+    if (!store.sync.hasGreeted) await opened(store); // else another connection has taken its place already
     answer = await store.ask('replay', { do: 'open', recording: id, at_s }, OPENS_MS);
   }
   if (!answer.ok) {
@@ -207,7 +207,7 @@ class Replay {
     }
     if (why === undefined && this.store.socket.isOpen) {
       const answer = await this.store.ask('replay', { do: 'leave' });
-      if (!answer.ok && this.store.socket.isOpen) {
+      if (!answer.ok && !answer.isBroken) {
         this.#isLeaving = false;
         this.say(answer.reason ?? 'Refused.', 'Still in the replay');
         return;
@@ -249,9 +249,9 @@ class Replay {
 
   /** The socket is there again: back to the moment, and on as it ran. Until then nothing live is shown as recorded. */
   async #again() {
-    if (this.#isOpening) return;
+    if (this.#isOpening || this.#isLeaving) return; // the new connection shows what is live
     const answer = await this.#reopen(this.store.judgedBy);
-    if (current === this && !answer.ok && this.store.socket.isOpen) void this.leave(answer.reason ?? 'Refused.');
+    if (current === this && !answer.ok && !answer.isBroken) void this.leave(answer.reason ?? 'Refused.');
   }
 
   /** @param {Change} change */

@@ -40,13 +40,15 @@ export class FleetStore {
   #cars_ms = -Infinity;
   #started_ms = 0;
   #hasGreeted = false;
+  /** The server knows who this page is, on this connection: before, it files a command under nobody. */
+  #isKnown = false;
   #clock = new ServerClock();
   /** @type {Emitter<Topic>} */
   #emitter = new Emitter((error) => this.painter.failed(error));
   painter = new Painter(this.#emitter);
   seal = new Seal(() => ({ who: this.who, duty: this.duty, ...this.self }));
   #requests = new Requests(
-    (message) => this.socket.send(message), (answer) => this.#emitter.emit('refused', answer), (message) => this.#sealed(message),
+    (message) => this.#isKnown && this.socket.send(message), (answer) => this.#emitter.emit('refused', answer), (message) => this.#sealed(message),
     (found) => this.#emitter.emit('became', found),
   );
   #watch = new PageWatch({
@@ -69,7 +71,7 @@ export class FleetStore {
   constructor(dial, self) {
     this.self = self;
     this.socket = new PageSocket({
-      opened: () => {},
+      opened: () => void (this.#isKnown = false),
       text: (text, at_ms) => this.#emitter.guard(() => this.#heard(text, at_ms)),
       bytes: () => {},
       closed: () => this.#emitter.guard(() => this.#requests.broke()),
@@ -161,7 +163,7 @@ export class FleetStore {
       case 'hello':
         return this.#greeted(message, at_ms);
       case 'offer':
-        this.#clock.note(message.took_ms, at_ms, this.socket.asked_ms);
+        this.#clock.note(message.took_ms, at_ms, this.socket.offered(message, at_ms));
         return void this.socket.send({ kind: 'take', seq: message.seq });
       case 'cars':
         return this.#list(message, at_ms);
@@ -189,15 +191,15 @@ export class FleetStore {
     this.seal.greeted(hello);
     this.isAnswering = true;
     this.unserved = '';
-    this.#clock.greeted(hello, at_ms, this.socket.asked_ms);
-    this.socket.send({ kind: 'hello', boot: hello.boot, name: this.self.name, page: this.self.page });
+    this.#clock.greeted(hello, at_ms, this.socket.dialled_ms);
+    this.#isKnown = this.socket.send({ kind: 'hello', boot: hello.boot, name: this.self.name, page: this.self.page });
     this.#hasGreeted = true;
     this.#emitter.emit('open', hello);
   }
 
   /** @param {Cars} cars @param {number} at_ms */
   #list(cars, at_ms) {
-    this.socket.answered(at_ms);
+    this.socket.answered(at_ms, 'cars');
     const delay_ms = this.#clock.note(cars.time_ms, at_ms);
     if (!this.deadMan.frame(at_ms, delay_ms)) return; // of long ago
     this.cars = cars;

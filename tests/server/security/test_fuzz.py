@@ -159,6 +159,7 @@ async def test_no_order_finds_a_mistake(victim: Victim, orders: int) -> None:
             async with websockets.connect(victim.base.replace("http", "ws") + "/ws", max_size=None) as socket:
                 listening = asyncio.create_task(_listen(socket, answers))
                 try:
+                    await socket.send('{"kind":"hello"}')  # before it, no command is carried out
                     for _ in range(min(150, orders - sent)):
                         await socket.send(_order(chance))
                         sent += 1

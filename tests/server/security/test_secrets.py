@@ -137,6 +137,7 @@ async def _page(base: str, ticket: str, cookie: str, car: str) -> str:
     got = []
     address = f"{base.replace('http', 'ws')}/ws?ticket={ticket}"
     async with websockets.connect(address, additional_headers={"Origin": base, "Cookie": cookie}) as socket:
+        await socket.send('{"kind":"hello"}')
         for n, typed in enumerate((f"ros:{CAR_PASSWORD}@{car}", f"ws://{car}")):
             await socket.send(json.dumps({"kind": "connect", "id": str(n), "address": typed}))
         for _ in range(30):

@@ -171,6 +171,7 @@ async def test_whatever_is_called_nothing_is_published_that_was_not_ordered(brid
         assert walked > 60
         answered: dict[str, Any] = {}
         ordered = every_command()
+        await page.send(json.dumps({"kind": "hello"}))
         for command in ordered:
             await page.send(json.dumps(command))
         waited_for = {command["kind"] for command in ordered if command["kind"] not in UNANSWERED}

@@ -17,7 +17,7 @@ from monitor.restoring import restore
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.protocol import serialize
-from server.vehicle.restore import RestoredState, recall
+from server.vehicle.restore import RestoredState, phone_chosen, recall
 from tests.monitor.test_alarm import SPEC
 from tests.monitor.test_alarm_properties import DAY, SPECS, Judge, Tap, happen
 from tests.monitor.test_restoring import lived, same
@@ -140,6 +140,14 @@ def test_which_planned_stop_was_in_force(changes: list[str], reason: str | None)
     assert ("A planned stop was in force: in the workshop." in past.words()) is (reason is not None)
     if past.planned_stop is not None:
         assert past.planned_stop.since_s == pytest.approx(-10.0)
+
+
+def test_which_phone_rides_is_not_read_from_a_recording() -> None:
+    one = bus()
+    note(one, "ride", phone="a")
+    assert phone_chosen(one, "car") == "a"
+    note(one, "ride", phone="b", brought_from="car_20261128T080000Z")
+    assert phone_chosen(one, "car") is None
 
 
 def test_a_pause_that_outlasted_a_restart_is_counted_from_its_beginning() -> None:

@@ -14,6 +14,8 @@ from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.protocol.rate_limit import Limits
 from server.replay.view_source import ViewSource
+from server.vehicle.outcomes import Outcomes
+from server.web.fleet_commands import FleetCommands
 from server.web.page_commands import PageCommands
 
 pytestmark = pytest.mark.virtual_time
@@ -74,3 +76,54 @@ async def test_other_cars_are_announced_while_the_own_one_is_not_served() -> Non
     await page.leave()
     assert [(one["kind"], one["leaves"]) for one in heard] == [("announces", False), ("announces", True)]
     assert complaints == []
+
+
+@pytest.mark.parametrize("is_fleet", [False, True])
+async def test_before_its_hello_no_command_of_a_page_is_carried_out_and_no_outcome_is_told(is_fleet: bool) -> None:
+    outcomes = Outcomes(lambda: 1000.0)
+    outcomes._since_s = 0.0
+    done: list[str] = []
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        if command["kind"] == "outcome":
+            return outcomes.ask(command["page"], command["of"], command["ago_s"], 1000.0)
+
+        async def carry_out(_: Mapping[str, Any]) -> Mapping[str, Any]:
+            done.append(command["id"])
+            return {"ok": True}
+
+        return await outcomes.keep(command, carry_out)
+
+    bus = LocalBus(Journal(None), now=lambda: 0.0)
+    bus.serve("ocelot", car)
+    replies: list[dict[str, Any]] = []
+
+    def page() -> PageCommands | FleetCommands:
+        def send(message: object) -> None:
+            replies.append(cast(dict[str, Any], message))
+
+        if is_fleet:
+            return FleetCommands(bus, LOCAL, Limits(), now=lambda: 0.0, send=send, complain=print)
+        view = cast(ViewSource, SimpleNamespace(is_replaying=False))
+        return PageCommands(
+            bus, "ocelot", view, LOCAL, Limits(), now=lambda: 0.0, wall_ms=lambda: 0, send=send, complain=print
+        )
+
+    hello = {"kind": "hello", "page": "page-ann"}
+    acknowledge = {"kind": "acknowledge", "vehicle": "ocelot", "alarm": "speed_limit", "occurrence": 1}
+    asked = {"kind": "outcome", "id": "a-1?", "of": "a-1", "ago_s": 1.0, "vehicle": "ocelot"}
+
+    async def answer(to: PageCommands | FleetCommands, message: dict[str, Any]) -> dict[str, Any]:
+        await to.command(message)
+        return next(one for one in reversed(replies) if one.get("id") == message["id"])
+
+    before, after = page(), page()
+    await before.begin(hello)
+    assert (await answer(before, {**acknowledge, "id": "a-1"}))["ok"] is True
+    reply = await answer(after, asked)
+    assert (reply["ok"], reply.get("became")) == (False, None)
+    assert (await answer(after, {**acknowledge, "id": "a-2"}))["ok"] is False
+    await after.begin(hello)
+    assert (await answer(after, asked))["became"] == "done"
+    assert (await answer(after, {**acknowledge, "id": "a-3"}))["ok"] is True
+    assert done == ["a-1", "a-3"]

@@ -78,7 +78,7 @@ class OnePage:
             if len(self.takes_s) >= self._limit:
                 raise RuntimeError("the page is flooded")
             self.takes_s.append(time.monotonic())
-            self.writer.take()
+            self.writer.take({"seq": message["seq"]})
         if message.get("kind") == "events" and self.writer is not None:
             self.events += [event["n"] for event in message["events"]]
             self.writer.have_events()

@@ -1,0 +1,84 @@
+"""What one page was offered, and how many states it gets without an offer.
+
+Over a slow radio a frame per round trip is too few, and a lost packet that nothing follows is repeated late. A page
+that measures such a radio states with each *take* how many states have come, and how many may be under way: a window,
+so that nothing waits behind more than these, however little the radio carries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
+AHEAD_EVERY_S = 0.15  # least time between two states that are sent ahead
+MOST_AHEAD = 12  # to a page that does not answer: its answers may wait 1.8 s for one that was lost
+ECHO_EVERY_S = 0.5  # so often a take is answered at once: by it the page measures the radio and bounds the clock
+
+
+def _count(value: object) -> int:
+    return value if type(value) is int and 0 < value < 1 << 53 else 0
+
+
+class PageOffers:
+    """Of one page. `now` is a monotonic clock [s], `wall_ms` the time of day."""
+
+    def __init__(self, now: Callable[[], float], wall_ms: Callable[[], int]) -> None:
+        self._now = now
+        self._wall_ms = wall_ms
+        self.seq = 0
+        self.is_open = False  # an offer is unanswered
+        self.took_ms = wall_ms()  # when the last take came; before, when the page connected
+        self.took = 0  # its number, as the page counts
+        self.is_echo_due = False
+        self._offered_s = self._echoed_s = float("-inf")
+        self._open_seq = 0  # of the newest offer of anything
+        self._ahead = 0  # so many states may be under way; 0: the page takes them one by one
+        self._ahead_s = float("-inf")
+        self._sent = 0  # states of this connection
+        self._received = 0  # of these, as the page said
+
+    def taken(self, take: Mapping[str, object]) -> bool:
+        """The page takes; whether it took what was offered. One of a former page, without a number, always does."""
+        self.took_ms = self._wall_ms()
+        self.took = _count(take.get("n"))
+        self._ahead = min(_count(take.get("ahead")), MOST_AHEAD)
+        self._received = max(self._received, min(_count(take.get("got")), self._sent))
+        self.is_echo_due = self.is_echo_due or (self._ahead > 0 and self._now() >= self._echoed_s + ECHO_EVERY_S)
+        if self.took and not (self.is_open and take.get("seq") == self._open_seq):
+            return False
+        self.is_open = False
+        return True
+
+    @property
+    def has_room(self) -> bool:
+        """Whether one more state may be under way."""
+        return not self._ahead or self._sent - self._received < self._ahead
+
+    @property
+    def may_push(self) -> bool:
+        """Whether a state may be sent ahead, now or soon."""
+        return self._ahead > 0 and self.has_room
+
+    def push_wait_s(self) -> float:
+        """How long the next state that is sent ahead has to wait."""
+        return self._ahead_s + AHEAD_EVERY_S - self._now()
+
+    def sent_state(self) -> None:
+        self._ahead_s = self._now()
+        self._sent += 1
+
+    def offer_wait_s(self) -> float:
+        """How long the next offer has to wait."""
+        return self._offered_s + OFFER_EVERY_S - self._now()
+
+    def offered(self, *, is_echo: bool) -> int:
+        """An offer is sent now, of nothing where it is an echo; its number."""
+        self.seq += 1
+        if is_echo:
+            self.is_echo_due = False
+            self._echoed_s = self._now()
+        else:
+            self.is_open = True
+            self._open_seq = self.seq
+            self._offered_s = self._now()
+        return self.seq

@@ -1,0 +1,75 @@
+// The takes of one connection, when each was sent, and how many states may come ahead of them.
+
+import { AheadWindow } from './round-trip.js';
+
+/** Of so many takes it is known when they were sent. */
+const KEPT_TAKES = 100;
+
+export class Takes {
+  /** When the last takes were sent, by their number; 0: when it was dialled. @type {Map<number, number>} */
+  #sent;
+  #count = 0;
+  #window;
+  /** States that this connection has brought. */
+  #got = 0;
+  /** States count again once the server has answered this take; 0: they do. */
+  #trustedFrom = 0;
+  /** States come without an offer: so many may be under way. */
+  ahead = 0;
+  /** When the last frame was asked for, or this connection; and whether it is still to come. */
+  asked_ms;
+  isOwed = false;
+  /** What waits for its turn: an offer, a state that came ahead. @type {Set<string>} */
+  waiting = new Set();
+
+  /** @param {number} dialled_ms @param {number} opened_ms how long a round trip took to connect */
+  constructor(dialled_ms = -Infinity, opened_ms = Infinity) {
+    this.#sent = new Map([[0, dialled_ms]]);
+    this.asked_ms = dialled_ms;
+    this.#window = new AheadWindow(opened_ms);
+  }
+
+  /** When a take was sent; −Infinity: it is none of this connection's. @param {number} number */
+  sent_ms(number) {
+    return this.#sent.get(number) ?? -Infinity;
+  }
+
+  /** Whether states are of after the last sleep. */
+  get isTrusted() {
+    return this.#trustedFrom === 0;
+  }
+
+  /** States are trusted once the next take was answered. */
+  distrust() {
+    this.#trustedFrom = this.#count + 1;
+  }
+
+  /**
+   * The server had received a take.
+   * @param {number} number
+   * @param {number} most how many states may come ahead at most
+   * @param {number} [at_ms] when the answer came, where the take was answered at once
+   */
+  received(number, most, at_ms) {
+    if (number >= this.#trustedFrom) this.#trustedFrom = 0;
+    if (at_ms !== undefined) this.#window.answered(this.sent_ms(number), at_ms);
+    this.ahead = Math.min(most, this.#window.size);
+  }
+
+  /** A frame came; whether that was asked for. @param {boolean} isState */
+  got(isState) {
+    const { isOwed } = this;
+    if (isState) this.#got += 1;
+    this.isOwed = false;
+    return isOwed;
+  }
+
+  /** A take with its number, and how many states may be under way, after so many. @param {object} take @param {number} at_ms */
+  counted(take, at_ms) {
+    [this.asked_ms, this.isOwed] = [at_ms, true];
+    this.#count += 1;
+    this.#sent.set(this.#count, at_ms);
+    this.#sent.delete(this.#count - KEPT_TAKES);
+    return { ...take, n: this.#count, ...(this.ahead ? { ahead: this.ahead, got: this.#got } : {}) };
+  }
+}
