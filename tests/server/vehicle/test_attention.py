@@ -209,7 +209,12 @@ async def test_what_is_no_command_changes_nothing(command: dict[str, Any]) -> No
 
 
 def test_items_need_no_control_and_are_commands_of_the_page_of_all_cars() -> None:
-    assert {kind for kind, one in BY_KIND.items() if one.from_fleet} == {*ITEM, "acknowledge", "outcome"}
+    assert {kind for kind, one in BY_KIND.items() if one.from_fleet} == {
+        *ITEM,
+        "acknowledge",
+        "end_planned_stop",
+        "outcome",
+    }
     assert {BY_KIND[kind].needs for kind in ITEM} == {"operator"}
 
 
