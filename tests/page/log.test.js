@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { heldWords } from '../../static/js/shell/connect-layout.js';
-import { asked, dayWords, eventWords, joined, lowest, tookWords } from '../../static/js/alarms/log-layout.js';
+import { asked, dayWords, eventWords, joined, lowest, standingRows, tookWords } from '../../static/js/alarms/log-layout.js';
 import { dialogWords, loadWords, snackWords, standingWords } from '../../static/js/alarms/standing.js';
 
 const ALARM = /** @type {any} */ ({ active: true, text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
@@ -115,4 +115,19 @@ test('what a hand-over made of an alarm is said, and one that is unacknowledged 
   const words = (/** @type {string} */ change) => eventWords(event(1, { change, by: 'Ben' }));
   assert.deepEqual([words('handed_over').icon, words('handed_over').title, words('handed_over').text], ['ok', 'Speed above limit taken over', '12.6 m/s · by Ben']);
   assert.deepEqual([words('unacknowledged').icon, words('unacknowledged').title], ['crit', 'Speed above limit unacknowledged again']);
+});
+
+test('what nobody was alerted of bears a mark, in the list of what stands and in what happened', () => {
+  const shelved = /** @type {any} */ ({ id: 'gps', occurrence: 1, title: 'GPS drift', priority: 'critical', state: 'SHELVED', active: true, raised_ms: 0, text: '6 m', trip_text: '', actions: [], shelved_until_ms: 0, shelved_by: 'Ann' });
+  const suppressed = /** @type {any} */ ({ id: 'fix', title: 'GPS fix lost', priority: 'critical', by: ['Car silent'], raised_ms: null });
+  const rows = standingRows([{ ...shelved, state: 'UNACKED' }, shelved], [suppressed]);
+  assert.deepEqual(rows.map(({ icon, colour, kind }) => [icon, colour, kind]), [['crit', 'c-crit', 'unacknowledged'], ['clock', '', 'shelved'], ['bell-off', '', 'suppressed']]);
+  assert.match(rows[1]?.text ?? '', /shelved by Ann until/);
+  assert.equal(rows[2]?.text, 'suppressed · cause: Car silent');
+  const said = (/** @type {any} */ more) => eventWords(/** @type {any} */ ({ alarm: 'gps', change: 'raised', title: 'GPS drift', text: '6 m', by: null, priority: 'warning', ...more })).text;
+  assert.equal(said({ state: 'SHELVED' }), '6 m · while shelved');
+  assert.equal(said({ state: 'SHELVED', change: 'shelved' }), '6 m');
+  assert.equal(said({ state: 'SUPPRESSED', suppressed_by: ['car_silent'] }), '6 m · suppressed by another alarm');
+  assert.equal(said({ state: 'SUPPRESSED', suppressed_by: ['paused', 'car_silent'] }), '6 m · suppressed: monitoring is paused');
+  assert.equal(said({ state: 'UNACKED' }), '6 m');
 });

@@ -16,6 +16,7 @@ from server.analysis.drive import drawings, link_drawing, sheet_things
 from server.analysis.drive.axis import day_time
 from server.analysis.drive.media import Media
 from server.analysis.drive.sheet_things import MOST_ROWS
+from server.recording.drive.alarms import marks_of
 from server.recording.drive.facts import DriveFacts
 from server.recording.drive.link_way import LinkStretch, link_along
 from server.version import catgraph_version
@@ -216,7 +217,7 @@ def _alarms(alarms: Sequence[Mapping[str, Any]] | None) -> list[tuple[str, str, 
             day_time(one["raised_ms"]),
             one["priority"],
             one["title"],
-            " · ".join(filter(None, ("planned stop" if one["planned_stop"] else "", one["text"]))),
+            " · ".join(filter(None, (marks_of(one), one["text"]))),
             "not acknowledged" if one["to_acknowledge_s"] is None else f"{one['to_acknowledge_s']:.1f} s",
         )
         for one in alarms

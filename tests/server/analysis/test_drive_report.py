@@ -98,6 +98,7 @@ def test_a_planned_stop_is_in_it_with_its_times_its_reason_and_who(tmp_path: Pat
     own = [
         logged(10.0, "planned_stop", reason="workshop", by=EVIL),
         logged(12.0, "raised", "gps_drift", text="0.4 m", state="UNACKED", planned_stop="workshop"),
+        logged(13.0, "shelved", "gps_drift", state="SHELVED"),
         logged(70.0, "planned_stop_ended", reason="workshop", text="The planned stop ended.", by="M. R. (Tablet)"),
         logged(100.0, "planned_stop", reason="parked", by="M. R. (Tablet)"),
     ]
@@ -111,10 +112,11 @@ def test_a_planned_stop_is_in_it_with_its_times_its_reason_and_who(tmp_path: Pat
     for said in (
         f"22:13:30 In the workshop, by {EVIL} {ended} 60.0 s",
         "22:15:00 Parked, by M. R. (Tablet) it was in force to the end 20.0 s",
-        "planned stop · 0.4 m",
+        "planned stop · shelved · 0.4 m",
     ):
         assert " ".join(said.split()) in words, said
     rows = list(csv.reader(io.StringIO((tmp_path / "report.csv").read_text(encoding="utf-8"), newline="")))
+    assert [row[7] for row in rows if row[0] == "alarm"] == ["0.4 m · planned stop · shelved"]
     stops = [row for row in rows if row[0] == "planned stop"]
     assert [row[3:] for row in stops] == [
         ["in the workshop", "", "", EVIL, ended],
