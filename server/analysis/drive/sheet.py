@@ -21,6 +21,7 @@ from server.recording.drive.facts import DriveFacts
 from server.recording.drive.link_way import LinkStretch, link_along
 from server.version import catgraph_version
 
+MOST_NO_RECORD = 20  # times without a record that are shown
 MOST_CHAINS = 3  # at the top of the report; each part has its own in the list of parts
 _MODES = {"autonomous": "Autonomous", "manual": "Manual", "unknown": "Not known"}
 _RESULTS = {"failed": "critical", "not_applicable": "na", "open": "unknown", "done": "ok"}
@@ -33,6 +34,7 @@ def sheet(environment: Environment, template: str, facts: DriveFacts, found: Map
 
 def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str, Any]:
     alarms, stretches = _alarms(found["alarms"]), link_along(facts)
+    no_record = [one["time"] for one in found["no_record"]]
     return {
         "about": _about(found),
         **{name: found[name] for name in ("title", "weather", "remarks", "tags")},
@@ -49,6 +51,9 @@ def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str
         "speed": _both(drawings.speed_plot, facts, (700, 210), (340, 230), (510, 220)),
         "has_limit": bool(facts.limits),
         "alarms": None if alarms is None else alarms[:MOST_ROWS],
+        "no_record": no_record[:MOST_NO_RECORD],
+        "no_record_left": max(0, len(no_record) - MOST_NO_RECORD),
+        "none": "none in what was recorded" if no_record else "none",
         "alarms_left": 0 if alarms is None else max(0, len(alarms) - MOST_ROWS),
         "interventions": sheet_things.interventions(found["interventions"]),
         "marks": sheet_things.marks(found["marks"], media),
@@ -262,7 +267,8 @@ def _blind_head(found: Mapping[str, Any]) -> str:
 
 def _lost(found: Mapping[str, Any]) -> list[str]:
     """What else is missing, in lines."""
-    lines = [*found["parts_missing"][:20], *found["damage"][:20]]
+    lines = [*(one["said"] for one in found["no_record"][:MOST_NO_RECORD]), *found["damage"][:20]]
+    lines += [f"{one['recording']}: {one['sentence']}" for one in found["chain"] if one["is_broken"]][:20]
     for name, what in (("left_out", "not recorded"), ("not_received", "not received")):
         if found[name]:
             shown = ", ".join(found[name][:5])

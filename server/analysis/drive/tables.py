@@ -127,6 +127,8 @@ def _things(found: Mapping[str, Any]) -> Iterator[list[Any]]:
                 "details": unseen_words(one["unseen_m"]),
             }
             yield _row(section, start + one["from_s"] * 1000, start + one["to_s"] * 1000, what=what, **about)
+    for one in found["no_record"]:
+        yield _row("no record", one["from_ms"], one["to_ms"], what=one["said"])
     for name in ("parts_missing", "damage", "left_out", "not_received"):
         for line in found[name]:
             yield _row("missing", what=name, value=line)

@@ -1,0 +1,137 @@
+"""Times of a drive of which no record exists: a part is missing, is damaged, or the server did not run.
+
+A time between two parts that follow each other in one session is none of them: the recorder keeps what the log says
+meanwhile, and the next part has it. Times are seconds since the beginning of the drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from monitor.drive_trends import BLIND_S
+from server.recording.chain_neighbours import named, next_behind, read_first_metadata
+from server.recording.drive.parts import DrivePart
+from server.recording.folder import first_part, known_beside, part_number
+from server.recording.read.read import Recording
+
+MOST_NAMED = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unrecorded:
+    """`from_s`, `to_s` None: it is not known since when, or until when."""
+
+    from_s: float | None
+    to_s: float | None
+    why: str  # as a sentence
+    parts: tuple[int, ...] = ()  # numbers of the missing parts
+
+    def time(self, clock: Callable[[float], str]) -> str:
+        """Its time in words; `clock`: a moment as a time of day."""
+        since = "" if self.from_s is None else f"from {clock(self.from_s)}"
+        if self.to_s is None:
+            return f"{since} on" if since else "at a time that is not known"
+        return f"{since} to {clock(self.to_s)}" if since else f"until {clock(self.to_s)}"
+
+    def sentence(self, clock: Callable[[float], str]) -> str:
+        return f"No record {self.time(clock)}: {self.why}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beside:
+    """What tells of parts that are not among those of a drive."""
+
+    known: frozenset[str] = frozenset()  # names of recordings in the same folders
+    next_s: Mapping[str, float] | None = None  # of a session, by its first part: when the recording behind it began
+
+
+def unrecorded_of(recording: Recording, parts: Sequence[DrivePart]) -> list[Unrecorded]:
+    """All of a recording, in their order; `parts`: its files of ours."""
+    found = [*missing(parts, beside(recording, parts)), *_damaged(recording)]
+    return sorted(found, key=lambda one: (one.from_s is not None, one.from_s or 0.0))
+
+
+def beside(recording: Recording, parts: Sequence[DrivePart]) -> Beside:
+    """What the folders of a recording tell. A part that is gone for good is named by the recording behind it."""
+    folders = {path.parent for path in recording.paths}
+    known = {id for folder in folders for id in known_beside(folder)}
+    next_s: dict[str, float] = {}
+    for first in dict.fromkeys(first_part(part.id) for part in parts):
+        for folder in folders:
+            if (path := next_behind(folder, first)) is None:
+                continue
+            metadata = read_first_metadata(path)
+            before = named(metadata)
+            if before is not None and first_part(before.id) == first:
+                known.add(before.id)
+            if (begun := metadata.get("started_ms", "")).isdecimal():
+                next_s[first] = int(begun[:15]) / 1000 - recording.start_s
+    return Beside(known=frozenset(known), next_s=next_s)
+
+
+def missing(parts: Sequence[DrivePart], beside: Beside = Beside()) -> list[Unrecorded]:
+    """Where parts of its sessions are not there, and where the server was started again between two sessions."""
+    parts = sorted((part for part in parts if "clip_of" not in part.metadata), key=lambda part: part.from_s)
+    sessions = list(dict.fromkeys(part.session for part in parts))
+    found: list[Unrecorded] = []
+    for place, session in enumerate(sessions):
+        own = [part for part in parts if part.session == session]
+        before = [part for part in parts if part.session in sessions[:place]]
+        behind = [part for part in parts if part.session in sessions[place + 1 :]]
+        until_s = max((part.to_s for part in before), default=None)
+        first = own[0]
+        runs = list(_runs(own, beside)) if session else []
+        for numbers, earlier, later in runs:
+            next_s = (beside.next_s or {}).get(first_part(first.id)) if not behind else behind[0].from_s
+            found.append(
+                Unrecorded(
+                    from_s=earlier.to_s if earlier is not None else until_s,
+                    to_s=later.from_s if later is not None else next_s,
+                    why=_why(numbers, first.id),
+                    parts=numbers,
+                )
+            )
+        is_said = any(earlier is None for _, earlier, _ in runs)
+        if until_s is not None and not is_said and first.from_s - until_s > BLIND_S:
+            found.append(Unrecorded(from_s=until_s, to_s=first.from_s, why="the server did not record meanwhile."))
+    return found
+
+
+def _runs(
+    own: Sequence[DrivePart], beside: Beside
+) -> Iterator[tuple[tuple[int, ...], DrivePart | None, DrivePart | None]]:
+    """Missing numbers that follow each other, with the part before and the part behind them."""
+    there = {part.number: part for part in own if part.number is not None}
+    firsts = {first_part(part.id) for part in own}
+    known = {part_number(id) for id in beside.known if first_part(id) in firsts}
+    run: list[int] = []
+    for number in range(1, max({*there, *known}, default=0) + 2):
+        if number not in there and number <= max({*there, *known}):
+            run.append(number)
+        elif run:
+            yield tuple(run), there.get(run[0] - 1), there.get(number)
+            run = []
+
+
+def _why(numbers: Sequence[int], first: str) -> str:
+    more = f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else ""
+    which = ", ".join(map(str, numbers[:MOST_NAMED])) + more
+    return (
+        f"{'Parts' if len(numbers) > 1 else 'Part'} {which} of the drive of {first} "
+        f"{'are' if len(numbers) > 1 else 'is'} not in this report: "
+        "not finished, not readable, deleted, or not among its files."
+    )
+
+
+def _damaged(recording: Recording) -> Iterator[Unrecorded]:
+    """What of the files cannot be read."""
+    for file in recording.files:
+        for start_ns, end_ns in file.damage.lost:
+            from_s, to_s = (ns / 1e9 - recording.start_s for ns in (start_ns, end_ns))
+            yield Unrecorded(from_s=from_s, to_s=to_s, why=f"{_name(file.path)} is damaged there.")
+
+
+def _name(path: Path) -> str:
+    return path.name
