@@ -10,8 +10,7 @@ import re
 import zipfile
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
-from typing import Literal
+from typing import Any, Literal
 
 import pytest
 
