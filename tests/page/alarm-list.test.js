@@ -37,6 +37,7 @@ test('an acknowledged alarm whose owner is off duty says so, can be taken over, 
   assert.match(standingWords(alarm('a', off)), /acknowledged by A\. K\. \(Pixel\), off duty since 14:02/);
   assert.deepEqual(rows[0]?.keys, ['shelve', 'take_alarm']);
   assert.equal(countWords(rows), '1 without an owner on duty');
+  assert.deepEqual(shown([alarm('new', { state: 'ACKED', raised_ms: 9 }), alarm('left', off), alarm('waits')]).map(({ id }) => id), ['waits', 'left', 'new']);
   const owned = shown([alarm('a', { ...off, off_duty_ms: null })]);
   assert.deepEqual([owned[0]?.keys, countWords(owned)], [['shelve'], 'all acknowledged']);
   assert.deepEqual(shown([alarm('a', off)], [], false)[0]?.keys, []);

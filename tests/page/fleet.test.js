@@ -61,7 +61,7 @@ test('what somebody acknowledged who is off duty is asked for like what nobody h
   assert.equal(first?.name, 'b');
   assert.match(first?.detail ?? '', /^12\.6 m\/s, limit 11\.0 m\/s; acknowledged by A\. K\. \(Pixel\), off duty since \d\d:\d\d$/);
   const rows = Object.fromEntries(carRows(of, ['b', 'a'], false).map(({ name, text }) => [name, text]));
-  assert.match(rows['b'] ?? '', / · owner off duty$/);
+  assert.match(rows['b'] ?? '', /^owner off duty · /);
   assert.doesNotMatch(rows['a'] ?? '', /off duty/);
 });
 

@@ -36,7 +36,7 @@ async def test_who_signs_on_takes_over_what_is_left(phone: Phone, canned: Canned
     await opened(phone, canned)
     sheet = phone.page.locator("#sheet-left")
     await expect(sheet).to_contain_text("0 of 2 taken over")
-    await expect(sheet.locator("li").first).to_contain_text("Acknowledged by A. K. (Desk). · off duty since")
+    await expect(sheet.locator("li").first).to_contain_text("Acknowledged by A. K. (Desk), off duty since")
     await no_barrier(phone.page, "alarms without an owner", "#sheet-left")
     done = sheet.locator("[data-f=left-done]")
     await expect(done).to_have_text("Later")
@@ -78,3 +78,31 @@ async def test_what_its_owner_left_after_this_person_signed_on_opens_nothing(pho
     await phone.drawn()
     await expect(phone.page.locator("#sheet-left")).to_have_count(0)
     assert sent(canned, "take_alarm") == []
+
+
+async def test_its_row_is_read_whole_beside_its_two_keys(phone: Phone, canned: Canned) -> None:
+    await phone.page.set_viewport_size({"width": 360, "height": 740})
+    canned.state["alarms"] = [left("gps_drift", "GPS drift at standstill")]
+    await opened(phone, canned)
+    await phone.f("strip").tap()
+    row = phone.page.locator("[data-f=alarms] > li")
+    await expect(row.locator(".ac .key")).to_have_text(["Shelve", "Take over"])
+    text, keys = await row.locator(".tx").bounding_box(), await row.locator(".ac").bounding_box()
+    assert text is not None
+    assert keys is not None
+    assert text["width"] >= 150, "the words of one column"
+    assert text["x"] + text["width"] <= keys["x"]
+
+
+async def test_a_low_phone_shows_people_to_choose_among(phone: Phone, canned: Canned) -> None:
+    await phone.page.set_viewport_size({"width": 360, "height": 740})
+    canned.duty = DUTY | {"me": None}
+    await opened(phone, canned)
+    sheet = phone.page.locator("#sheet-duty")
+    await sheet.locator("[data-person]").first.tap()
+    await expect(sheet.locator(".roles button")).to_have_count(4)
+    rows, body = sheet.locator("[data-person]"), await sheet.locator(".duty-body").bounding_box()
+    second = await rows.nth(1).bounding_box()
+    assert body is not None
+    assert second is not None
+    assert second["y"] + second["height"] <= body["y"] + body["height"] + 1, "two rows are whole"

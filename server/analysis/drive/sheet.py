@@ -38,9 +38,9 @@ def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str
     return {
         "about": _about(found),
         **{name: found[name] for name in ("title", "weather", "remarks", "tags")},
-        "chain": _chain(found["chain"]),
+        "chain": [*_chain(found["chain"]), *_parts_missing(found)],
         "parts": sheet_things.parts(found),
-        "chain_is_bad": any(one["is_broken"] for one in found["chain"]),
+        "chain_is_bad": bool(found["parts_missing"]) or any(one["is_broken"] for one in found["chain"]),
         "figures": _figures(found),
         "people": None if found["people"] is None else _people(found["people"]),
         "departure": _departure(found["departure"]),
@@ -98,6 +98,13 @@ def _chain(chain: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
     broken = [(f"{one['recording']}: {_state(one)}", _head(one)) for one in chain if one["is_broken"]]
     intact = sum(one["state"] == "intact" and not one["is_broken"] for one in chain)
     return [(f"{intact} of {len(chain)} parts intact", "heads below"), *broken[:MOST_CHAINS]]
+
+
+def _parts_missing(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Beside chains that are intact: what is not there has none."""
+    numbers = [str(number) for one in found["no_record"] for number in one["parts"]]
+    which = ", ".join(numbers[:MOST_CHAINS]) + (" …" if len(numbers) > MOST_CHAINS else "")
+    return [(f"Missing: part{'s' if len(numbers) > 1 else ''} {which}", "see data lost")] if numbers else []
 
 
 def _state(one: Mapping[str, Any]) -> str:

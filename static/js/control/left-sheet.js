@@ -31,9 +31,9 @@ export class LeftSheet {
     this.keyTitle = html('b');
     this.key = html('button', { type: 'button', class: 'main sign', 'data-f': 'left-done' }, this.keyTitle);
     this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed duty-sheet', id: 'sheet-left', 'aria-labelledby': 'left-title', 'aria-describedby': 'left-words' },
-      html('div', { class: 'duty-head' }, html('h2', { id: 'left-title', tabindex: '-1' }, 'Alarms without an owner'), this.count, html('button', { type: 'button', class: 'btn', 'aria-label': 'Close', 'data-f': 'no' }, icon('close'))),
+      html('div', { class: 'duty-head' }, html('h2', { id: 'left-title', tabindex: '-1' }, 'Left behind'), this.count, html('button', { type: 'button', class: 'btn', 'aria-label': 'Close', 'data-f': 'no' }, icon('close'))),
       html('div', { class: 'duty-body', tabindex: '0', role: 'group', 'aria-label': 'Alarms without an owner' },
-        html('p', { class: 'sub', id: 'left-words' }, 'They are active and acknowledged, and who acknowledged them is off duty. Press each line: from then on it is yours.'), this.list),
+        html('p', { class: 'sub', id: 'left-words' }, 'Active alarms, acknowledged by people who are off duty. Press each line: from then on it is yours.'), this.list),
       html('div', { class: 'duty-keys' }, this.bad, this.key)));
     const stops = [store.on('draw', () => this.#draw()), addSheet(this.sheet)];
     this.sheet.addEventListener('close', () => stops.forEach((stop) => stop()), { once: true });

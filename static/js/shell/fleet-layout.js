@@ -35,6 +35,7 @@ import { speedWords } from '../core/units.js';
  * @property {string} cause cars with one cause are one item in a flood
  * @property {number} raised_s for so long
  * @property {boolean} isUnassigned
+ * @property {boolean} [isUnowned] who has acknowledged an alarm of it is off duty
  * @property {boolean} [isOff] a person said that it is off on purpose: it is in no count
  * @property {import('../core/protocol-types.js').Sound} sound of an alarm that nobody has, or of a car that fell silent
  *
@@ -127,7 +128,7 @@ function itemOf(name, summary, seen) {
     since_s: Math.max(0, (seen.now_ms - since_ms) / 1000),
     who: whoOf(summary, seen.page), next: nextOf(summary, seen.now_ms), timer, keys: keysOf(summary, seen),
     order: [...stepOf(summary, seen), -(worst ? RANK[worst.priority] : 0), raised_s],
-    cause: worst?.id ?? '', raised_s, isUnassigned,
+    cause: worst?.id ?? '', raised_s, isUnassigned, isUnowned: Boolean(summary.unowned),
     sound: isUnassigned && worst?.state === 'UNACKED' ? worst.sound : 'none',
   };
 }

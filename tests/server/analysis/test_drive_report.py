@@ -206,6 +206,7 @@ def test_a_time_without_a_record_is_never_said_to_be_without_alarms(tmp_path: Pa
         write_report_csv(recording, tmp_path / "report.csv", name="drive")
     text = words_of(tmp_path / "page.html")
     assert "Alarms, time to acknowledge none in what was recorded" in text
+    assert "Missing: part 2 see data lost" in text, "no chain that is intact stands alone"
     assert "No record from 22:13:30 to 22:14:08: whether there were alarms is not known." in text
     assert "No record from 22:13:30 to 22:14:08: Part 2 of the drive of s1 is not in this report" in text
     (one,) = json.loads((tmp_path / "report.json").read_text())["no_record"]
