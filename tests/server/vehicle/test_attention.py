@@ -228,9 +228,15 @@ async def test_a_summary_stays_within_its_bound_whoever_is_there() -> None:
     await car.obeyed(pages[0], "control", do="take")
     await car.obeyed(pages[0], "take_item")
     await car.obeyed(pages[0], "offer_item", to=pages[1]["page"])
+    car.faults.add(Priority.WARNING)
+    car.tick(0.5)
+    person = {"name": "A" + widest[:29], "role": "operator"}
+    await car.obeyed(pages[0] | {"person": person}, "acknowledge", alarm="test_warning", occurrence=1)
+    car.say(pages[1] | {"duties": {person["name"]: WALL_MS}})
     car.say_what = '"' * 10_000
     car.tick(0.5)
     frame = car.bus.newest(ALL, "ocelot")
+    assert car.summary["unowned"]["by"] == f"{person['name']} ({widest})"
     assert frame is not None
     assert car.summary["worst"]["text"] == '"' * 100
     assert 1 < len(car.summary["people"]) < MOST_PEOPLE
