@@ -53,7 +53,7 @@ def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str
         "alarms": None if alarms is None else alarms[:MOST_ROWS],
         "no_record": no_record[:MOST_NO_RECORD],
         "no_record_left": max(0, len(no_record) - MOST_NO_RECORD),
-        "none": "none in what was recorded" if no_record else "none",
+        "none": "none in what was recorded" if _is_partial(found) else "none",
         "alarms_left": 0 if alarms is None else max(0, len(alarms) - MOST_ROWS),
         "interventions": sheet_things.interventions(found["interventions"]),
         "marks": sheet_things.marks(found["marks"], media),
@@ -74,6 +74,12 @@ def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str
             found["figures"]["distance_by"]
         ],
     }
+
+
+def _is_partial(found: Mapping[str, Any]) -> bool:
+    """Whether there may have been more than the files say."""
+    is_broken = any(one["is_broken"] for one in found["chain"])
+    return bool(found["no_record"] or found["damage"] or is_broken)
 
 
 def _both(draw: Any, facts: DriveFacts, *sizes: tuple[int, int]) -> list[Markup] | None:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from monitor.drive_trends import BLIND_S
 from server.recording.chain_neighbours import named, next_behind, read_first_metadata
 from server.recording.drive.parts import DrivePart
 from server.recording.folder import first_part, known_beside, part_number
 from server.recording.read.read import Recording
+from server.recording.read.source import is_likely
 
 MOST_NAMED = 20
 
@@ -49,7 +49,10 @@ class Beside:
 
 def unrecorded_of(recording: Recording, parts: Sequence[DrivePart]) -> list[Unrecorded]:
     """All of a recording, in their order; `parts`: its files of ours."""
-    found = [*missing(parts, beside(recording, parts)), *_damaged(recording)]
+    cut = _cut(recording)
+    ends_s = {one.from_s for one in cut}
+    others = [one for one in missing(parts, beside(recording, parts)) if one.parts or one.from_s not in ends_s]
+    found = [*others, *cut, *_damaged(recording)]
     return sorted(found, key=lambda one: (one.from_s is not None, one.from_s or 0.0))
 
 
@@ -127,11 +130,32 @@ def _why(numbers: Sequence[int], first: str) -> str:
 
 def _damaged(recording: Recording) -> Iterator[Unrecorded]:
     """What of the files cannot be read."""
+    origin_ns = round(recording.start_s * 1e9)
     for file in recording.files:
-        for start_ns, end_ns in file.damage.lost:
-            from_s, to_s = (ns / 1e9 - recording.start_s for ns in (start_ns, end_ns))
-            yield Unrecorded(from_s=from_s, to_s=to_s, why=f"{_name(file.path)} is damaged there.")
+        why = f"{file.path.name} is damaged there."
+        for span in file.damage.lost:
+            if is_likely(span, origin_ns, file.end_ns):
+                from_s, to_s = (ns / 1e9 - recording.start_s for ns in span)
+                yield Unrecorded(from_s=from_s, to_s=to_s, why=why)
+            else:
+                yield Unrecorded(from_s=None, to_s=None, why=f"{file.path.name} is damaged.")
 
 
-def _name(path: Path) -> str:
-    return path.name
+def _cut(recording: Recording) -> list[Unrecorded]:
+    """What was in the ends that files lack. What the log said there is in no later part."""
+    filled = [file for file in recording.files if any(channel.count for channel in file.channels)]
+    found = []
+    for file in filled:
+        if not file.damage.is_cut:
+            continue
+        later_ns = min(
+            (one.start_ns for one in filled if one.start_ns >= file.end_ns and one is not file), default=None
+        )
+        found.append(
+            Unrecorded(
+                from_s=file.end_ns / 1e9 - recording.start_s,
+                to_s=None if later_ns is None else later_ns / 1e9 - recording.start_s,
+                why=f"{file.path.name} was never closed, and what followed in it is missing.",
+            )
+        )
+    return found

@@ -206,3 +206,12 @@ def test_what_is_damaged_within_a_part_is_a_time_without_a_record(tmp_path: Path
         file.damage.lost.append((BEGIN_S * NS + 10 * NS, BEGIN_S * NS + 20 * NS))
         (one,) = unrecorded_of(recording, parts_of(recording))
     assert one.sentence(lambda at_s: f"{at_s:.0f}") == "No record from 10 to 20: s1.mcap is damaged there."
+
+
+def test_what_a_damaged_index_says_of_the_time_is_not_believed(tmp_path: Path) -> None:
+    path = recorded(tmp_path, [], name="s1.mcap", length_s=60.0)
+    with open_recording([path]) as recording:
+        (file,) = recording.files
+        file.damage.lost.append((0, 1))
+        (one,) = unrecorded_of(recording, parts_of(recording))
+    assert one.sentence(str) == "No record at a time that is not known: s1.mcap is damaged."
