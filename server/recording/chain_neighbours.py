@@ -13,7 +13,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Metadata
 
-from server.recording.folder import DAMAGED, FINISHED, WRITING, first_part, id_of, part_id, part_number
+from server.recording.folder import DAMAGED, FINISHED, WRITING, first_part, id_of, is_id, part_id, part_number
 from server.recording.mcap.chain import CHAIN_OPCODE, RECORD_BYTES, Head, parsed, read_head
 from server.recording.mcap.chunks import HEAD_BYTES, MAGIC
 from server.recording.own import METADATA
@@ -36,7 +36,7 @@ def as_metadata(before: Head | None) -> dict[str, str]:
 def named(metadata: Mapping[str, str]) -> Head | None:
     """The recording that a recording's metadata names as the one before it; None: none, or not readable."""
     id, number, digest = (metadata.get(key, "") for key in ("previous", "previous_record", "previous_head"))
-    if not id or not number.isdecimal() or len(number) > 18:
+    if not is_id(id) or not number.isdecimal() or len(number) > 18:
         return None
     return Head(id=id, number=int(number), digest=digest)
 
@@ -137,10 +137,17 @@ def _missing(path: Path, before: Head, beside: Beside) -> Missing:
         id=before.id,
         records=before.number,
         others=tuple(others),
-        is_damaged=path.absolute().with_name(before.id + DAMAGED).exists(),
+        is_damaged=_is_there(path.absolute().with_name(before.id + DAMAGED)),
         from_ns=newest.at_ns if newest is not None else 0,
         to_ns=int(begun[:15]) * 1_000_000 if begun.isdecimal() else 0,
     )
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:
+        return False
 
 
 def destroyed(path: Path, beside: Beside) -> Neighbours:

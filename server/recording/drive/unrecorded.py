@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from monitor.drive_trends import BLIND_S
 from server.recording.chain_neighbours import named, next_behind, read_first_metadata
-from server.recording.drive.parts import DrivePart
+from server.recording.drive.parts import MOST_NUMBER, DrivePart
 from server.recording.folder import first_part, known_beside, part_number
 from server.recording.read.read import Recording
 from server.recording.read.source import is_likely
@@ -108,10 +108,11 @@ def _runs(
     """Missing numbers that follow each other, with the part before and the part behind them."""
     there = {part.number: part for part in own if part.number is not None}
     firsts = {first_part(part.id) for part in own}
-    known = {part_number(id) for id in beside.known if first_part(id) in firsts}
+    known = {number for id in beside.known if first_part(id) in firsts and (number := part_number(id)) < MOST_NUMBER}
+    newest = max({*there, *known}, default=0)
     run: list[int] = []
-    for number in range(1, max({*there, *known}, default=0) + 2):
-        if number not in there and number <= max({*there, *known}):
+    for number in range(1, newest + 2):
+        if number not in there and number <= newest:
             run.append(number)
         elif run:
             yield tuple(run), there.get(run[0] - 1), there.get(number)

@@ -242,6 +242,21 @@ def test_parts_that_nothing_names_are_named_too(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    "previous", ["../car_1", "car_1/x", "car_" + "9" * 5000, "x" * 300, "car_0_p99999999999", "a\0b", ""]
+)
+def test_a_damaged_name_of_the_one_before_stops_no_verification(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], previous: str
+) -> None:
+    path, other = tmp_path / "car_1.mcap", tmp_path / "car_2.mcap"
+    closed(path, [[1], [2]], previous=previous, previous_record="7", previous_head="ab" * 32)
+    closed(other, [[3]])
+    assert main(["verify", str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(": ")[0] for line in lines] == [str(path), str(other)]
+    assert len(max(lines, key=len)) < 2000
+
+
 def test_a_cut_tail_says_since_when(tmp_path: Path) -> None:
     path = tmp_path / "car_1.mcap"
     raw = closed(path, [[100]] * 6)

@@ -182,6 +182,11 @@ def test_the_last_part_is_named_by_what_is_beside_it() -> None:
     assert said(own, Beside(known=known, next_s={"a": 75.0, "b": 90.0})) == ["No record from 30 to 75: Part 3"]
 
 
+def test_a_number_that_no_part_has_is_not_counted_up_to() -> None:
+    own = [part("a", 1, 0, 10)]
+    assert said(own, Beside(known=frozenset({"a_p99999999"}))) == []
+
+
 def test_a_lost_link_is_no_time_without_a_record_and_a_stopped_server_is_one() -> None:
     assert said([part("a", 1, 0, 10), part("a", 2, 60, 70)]) == []
     (one,) = missing([part("a", 1, 0, 10), part("b", 1, 60, 70)])
