@@ -72,19 +72,29 @@ class Missing:
 
     @property
     def sentence(self) -> str:
-        what = "cannot be read" if self.is_damaged else "is not here"
-        return f"The recording before it, {self.id} ({self.records} records), {what}.{self.rest}"
+        one = f"the recording before it, {self.id} ({self.records} records)"
+        if self.is_damaged:
+            return f"T{one[1:]}, cannot be read.{self.rest}"
+        return f"Not in this folder: {', '.join([one, *self._listed])}{self._time}."
 
     @property
     def rest(self) -> str:
-        """Which others are missing, and the time of which there is no record; begins with a space."""
+        """When what nothing can be read of was recorded, and which others are not there; begins with a space."""
+        others = f" Not in this folder: {', '.join(self._listed)}." if self._listed else ""
+        return f"{others}{f' R{self._time[3:-1]}.' if self._time else ''}"
+
+    @property
+    def _listed(self) -> list[str]:
+        left = len(self.others) - MOST_NAMED
+        return [*self.others[:MOST_NAMED], *([f"and {left} more"] if left > 0 else [])]
+
+    @property
+    def _time(self) -> str:
+        """Within which all of them were recorded; begins with a space."""
         since, until = clock(self.from_ns), clock(self.to_ns)
-        time = " ".join(filter(None, (since and f"from {since}", until and f"{'to' if since else 'until'} {until}")))
-        no_record = f" No record {time} UTC." if time else ""
-        listed = ", ".join(self.others[:MOST_NAMED])
-        more = f" and {len(self.others) - MOST_NAMED} more" if len(self.others) > MOST_NAMED else ""
-        others = f" Nor {'are' if len(self.others) > 1 else 'is'} {listed}{more}." if self.others else ""
-        return f"{others}{no_record}"
+        if since and until:
+            return f" (recorded between {since} and {until} UTC)"
+        return f" (recorded {f'after {since}' if since else f'before {until}'} UTC)" if since or until else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -58,7 +58,7 @@ def report_json(
         "parts": [_part(part, facts) for part in facts.parts],
         "gaps": [_gap(gap, facts) for gap in facts.gaps[:MOST_ROWS]],
         "no_record": [_unrecorded(one, facts) for one in unrecorded],
-        "parts_missing": [_unrecorded(one, facts)["said"] for one in unrecorded if one.parts],
+        "parts_missing": [_unrecorded(one, facts)["sentence"] for one in unrecorded if one.parts],
         "chain": [{"recording": id_of(one.path), **one.as_json()} for one in verified],
         "figures": figures_of(facts),
         "load": None if load is None or log is None else _load(load),
@@ -76,7 +76,7 @@ def report_json(
 
 
 def _unrecorded(one: Unrecorded, facts: DriveFacts) -> dict[str, Any]:
-    """A time of which no record exists; null: it is not known since when, or until when."""
+    """A time of which this report has no record; null: it is not known since when, or until when."""
 
     def at_ms(at_s: float) -> int:
         return facts.start_ms + round(at_s * 1000)
@@ -86,7 +86,8 @@ def _unrecorded(one: Unrecorded, facts: DriveFacts) -> dict[str, Any]:
         "to_ms": None if one.to_s is None else at_ms(one.to_s),
         "time": one.time(lambda at_s: day_time(at_ms(at_s))),
         "parts": list(one.parts),
-        "said": one.sentence(lambda at_s: day_time(at_ms(at_s))),
+        "what": one.what,
+        "sentence": one.sentence(lambda at_s: day_time(at_ms(at_s))),
     }
 
 

@@ -34,7 +34,7 @@ def sheet(environment: Environment, template: str, facts: DriveFacts, found: Map
 
 def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str, Any]:
     alarms, stretches = _alarms(found["alarms"]), link_along(facts)
-    no_record = [one["time"] for one in found["no_record"]]
+    no_record = [f"{one['what']} {one['time']}" for one in found["no_record"]]
     return {
         "about": _about(found),
         **{name: found[name] for name in ("title", "weather", "remarks", "tags")},
@@ -280,7 +280,7 @@ def _blind_head(found: Mapping[str, Any]) -> str:
 
 def _lost(found: Mapping[str, Any]) -> list[str]:
     """What else is missing, in lines."""
-    lines = [*(one["said"] for one in found["no_record"][:MOST_NO_RECORD]), *found["damage"][:20]]
+    lines = [*(one["sentence"] for one in found["no_record"][:MOST_NO_RECORD]), *found["damage"][:20]]
     lines += [f"{one['recording']}: {one['sentence']}" for one in found["chain"] if one["is_broken"]][:20]
     for name, what in (("left_out", "not recorded"), ("not_received", "not received")):
         if found[name]:

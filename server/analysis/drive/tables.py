@@ -128,7 +128,7 @@ def _things(found: Mapping[str, Any]) -> Iterator[list[Any]]:
             }
             yield _row(section, start + one["from_s"] * 1000, start + one["to_s"] * 1000, what=what, **about)
     for one in found["no_record"]:
-        yield _row("no record", one["from_ms"], one["to_ms"], what=one["said"])
+        yield _row(one["what"].lower(), one["from_ms"], one["to_ms"], what=one["sentence"])
     for name in ("parts_missing", "damage", "left_out", "not_received"):
         for line in found[name]:
             yield _row("missing", what=name, value=line)

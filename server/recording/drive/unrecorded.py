@@ -1,4 +1,4 @@
-"""Times of a drive of which no record exists: a part is missing, is damaged, or the server did not run.
+"""Times of a drive of which its report has no record: a part is missing, is damaged, or the server did not run.
 
 A time between two parts that follow each other in one session is none of them: the recorder keeps what the log says
 meanwhile, and the next part has it. Times are seconds since the beginning of the drive.
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from monitor.drive_trends import BLIND_S
 from server.recording.chain_neighbours import named, next_behind, read_first_metadata
 from server.recording.drive.parts import MOST_NUMBER, DrivePart
-from server.recording.folder import first_part, known_beside, part_number
+from server.recording.folder import first_part, id_of, known_beside, part_id, part_number, readable_beside
 from server.recording.read.read import Recording
 from server.recording.read.source import is_likely
 
@@ -27,6 +27,11 @@ class Unrecorded:
     to_s: float | None
     why: str  # as a sentence
     parts: tuple[int, ...] = ()  # numbers of the missing parts
+    is_elsewhere: bool = False  # the files of all of them are there, and are not among those of the report
+
+    @property
+    def what(self) -> str:
+        return "Not in this report" if self.is_elsewhere else "No record here"
 
     def time(self, clock: Callable[[float], str]) -> str:
         """Its time in words; `clock`: a moment as a time of day."""
@@ -36,14 +41,15 @@ class Unrecorded:
         return f"{since} to {clock(self.to_s)}" if since else f"until {clock(self.to_s)}"
 
     def sentence(self, clock: Callable[[float], str]) -> str:
-        return f"No record {self.time(clock)}: {self.why}"
+        return f"{self.what} {self.time(clock)}: {self.why}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Beside:
     """What tells of parts that are not among those of a drive."""
 
-    known: frozenset[str] = frozenset()  # names of recordings in the same folders
+    known: frozenset[str] = frozenset()  # names of recordings in the same folders, or named by one of them
+    files: frozenset[str] = frozenset()  # those of them whose files are there, and are not known to be unreadable
     next_s: Mapping[str, float] | None = None  # of a session, by its first part: when the recording behind it began
 
 
@@ -59,6 +65,7 @@ def unrecorded_of(recording: Recording, parts: Sequence[DrivePart]) -> list[Unre
 def beside(recording: Recording, parts: Sequence[DrivePart]) -> Beside:
     """What the folders of a recording tell. A part that is gone for good is named by the recording behind it."""
     folders = {path.parent for path in recording.paths}
+    files = {id for folder in folders for id in readable_beside(folder)} - {id_of(path) for path in recording.paths}
     known = {id for folder in folders for id in known_beside(folder)}
     next_s: dict[str, float] = {}
     for first in dict.fromkeys(first_part(part.id) for part in parts):
@@ -71,7 +78,7 @@ def beside(recording: Recording, parts: Sequence[DrivePart]) -> Beside:
                 known.add(before.id)
             if (begun := metadata.get("started_ms", "")).isdecimal():
                 next_s[first] = int(begun[:15]) / 1000 - recording.start_s
-    return Beside(known=frozenset(known), next_s=next_s)
+    return Beside(known=frozenset(known), files=frozenset(files), next_s=next_s)
 
 
 def missing(parts: Sequence[DrivePart], beside: Beside = Beside()) -> list[Unrecorded]:
@@ -79,6 +86,7 @@ def missing(parts: Sequence[DrivePart], beside: Beside = Beside()) -> list[Unrec
     parts = sorted((part for part in parts if "clip_of" not in part.metadata), key=lambda part: part.from_s)
     sessions = list(dict.fromkeys(part.session for part in parts))
     found: list[Unrecorded] = []
+    is_open = False  # the last part of the session before is missing
     for place, session in enumerate(sessions):
         own = [part for part in parts if part.session == session]
         before = [part for part in parts if part.session in sessions[:place]]
@@ -88,17 +96,20 @@ def missing(parts: Sequence[DrivePart], beside: Beside = Beside()) -> list[Unrec
         runs = list(_runs(own, beside)) if session else []
         for numbers, earlier, later in runs:
             next_s = (beside.next_s or {}).get(first_part(first.id)) if not behind else behind[0].from_s
+            elsewhere = [n for n in numbers if part_id(first_part(first.id), n) in beside.files]
             found.append(
                 Unrecorded(
                     from_s=earlier.to_s if earlier is not None else until_s,
                     to_s=later.from_s if later is not None else next_s,
-                    why=_why(numbers, first.id),
+                    why=_why(numbers, elsewhere, first.id),
                     parts=numbers,
+                    is_elsewhere=len(elsewhere) == len(numbers),
                 )
             )
-        is_said = any(earlier is None for _, earlier, _ in runs)
-        if until_s is not None and not is_said and first.from_s - until_s > BLIND_S:
-            found.append(Unrecorded(from_s=until_s, to_s=first.from_s, why="the server did not record meanwhile."))
+        is_named = any(earlier is None for _, earlier, _ in runs) or is_open
+        if until_s is not None and not is_named and first.from_s - until_s > BLIND_S:
+            found.append(Unrecorded(from_s=until_s, to_s=first.from_s, why="nothing was recorded between them."))
+        is_open = any(later is None for *_, later in runs)
     return found
 
 
@@ -119,14 +130,17 @@ def _runs(
             run = []
 
 
-def _why(numbers: Sequence[int], first: str) -> str:
+def _why(numbers: Sequence[int], elsewhere: Sequence[int], first: str) -> str:
+    why = f"{_parts(numbers)} of the drive of {first} {'are' if len(numbers) > 1 else 'is'} not in this report"
+    if not elsewhere:
+        return f"{why}: not readable, deleted, or not among its files."
+    which = "" if len(elsewhere) == len(numbers) else f" of {_parts(elsewhere).lower()}"
+    return f"{why}: the file{which} is being recorded, in the trash, or beside the others."
+
+
+def _parts(numbers: Sequence[int]) -> str:
     more = f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else ""
-    which = ", ".join(map(str, numbers[:MOST_NAMED])) + more
-    return (
-        f"{'Parts' if len(numbers) > 1 else 'Part'} {which} of the drive of {first} "
-        f"{'are' if len(numbers) > 1 else 'is'} not in this report: "
-        "not finished, not readable, deleted, or not among its files."
-    )
+    return f"{'Parts' if len(numbers) > 1 else 'Part'} {', '.join(map(str, numbers[:MOST_NAMED]))}{more}"
 
 
 def _damaged(recording: Recording) -> Iterator[Unrecorded]:

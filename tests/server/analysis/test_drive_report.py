@@ -192,7 +192,8 @@ def test_the_last_part_is_named_while_its_file_is_there(tmp_path: Path, where: s
         write_report_json(recording, tmp_path / "report.json", name="drive")
         outcome = write_forms(recording, tmp_path / "forms.zip")
     (said,) = json.loads((tmp_path / "report.json").read_text())["parts_missing"]
-    assert said.startswith("No record from 22:16:50 on: Part 3 of the drive of s1 is not in this report")
+    what = "No record here" if where.endswith(".damaged") else "Not in this report"
+    assert said.startswith(f"{what} from 22:16:50 on: Part 3 of the drive of s1 is not in this report")
     assert said in outcome.notices
 
 
@@ -207,12 +208,12 @@ def test_a_time_without_a_record_is_never_said_to_be_without_alarms(tmp_path: Pa
     text = words_of(tmp_path / "page.html")
     assert "Alarms, time to acknowledge none in what was recorded" in text
     assert "Missing: part 2 see data lost" in text, "no chain that is intact stands alone"
-    assert "No record from 22:13:30 to 22:14:08: whether there were alarms is not known." in text
-    assert "No record from 22:13:30 to 22:14:08: Part 2 of the drive of s1 is not in this report" in text
+    assert "No record here from 22:13:30 to 22:14:08: whether there were alarms is not known." in text
+    assert "No record here from 22:13:30 to 22:14:08: Part 2 of the drive of s1 is not in this report" in text
     (one,) = json.loads((tmp_path / "report.json").read_text())["no_record"]
     assert (one["from_ms"] - BEGIN_MS, one["to_ms"] - BEGIN_MS, one["parts"]) == (10_000, 48_000, [2])
     rows = list(csv.reader(io.StringIO((tmp_path / "report.csv").read_text(encoding="utf-8"), newline="")))
-    (row,) = (row for row in rows if row[0] == "no record")
+    (row,) = (row for row in rows if row[0] == "no record here")
     assert row[1:3] == ["2023-11-14T22:13:30.000000Z", "2023-11-14T22:14:08.000000Z"]
     (tmp_path / "alone").mkdir()
     alone = recorded(tmp_path / "alone", [], name="s1.mcap", **own)

@@ -220,15 +220,16 @@ def test_a_recording_that_is_destroyed_is_named_with_its_time(
         third.unlink()
     code = main(["verify", str(tmp_path)])
     lines = dict(line.split(": ", 1) for line in capsys.readouterr().out.splitlines())
-    no_record = "No record from 2023-11-14 22:13:20.020 to 2023-11-14 22:16:20.000 UTC."
+    time = "ecorded between 2023-11-14 22:13:20.020 and 2023-11-14 22:16:20.000 UTC"
     if how == "zeroed":
         assert lines[str(third)].endswith(
-            f"car_4 names it as the recording before it ({records} records): it is destroyed. {no_record}"
+            f"car_4 names it as the recording before it ({records} records): it is destroyed. R{time}."
         )
         assert code == 1
     else:
-        what = "cannot be read" if how == "damaged" else "is not here"
-        assert lines[str(paths[3])].endswith(f"The recording before it, car_3 ({records} records), {what}. {no_record}")
+        gone = f"Not in this folder: the recording before it, car_3 ({records} records) (r{time})."
+        damaged = f"The recording before it, car_3 ({records} records), cannot be read. R{time}."
+        assert lines[str(paths[3])].endswith(damaged if how == "damaged" else gone)
         assert code == 0, "what is there is as it was recorded"
 
 
@@ -237,8 +238,8 @@ def test_parts_that_nothing_names_are_named_too(tmp_path: Path) -> None:
     closed(first, [[1], [2]])
     closed(last, [[3]], previous="car_1_p3", previous_record="7", previous_head="ab" * 32)
     assert verification(last).sentence.endswith(
-        "The recording before it, car_1_p3 (7 records), is not here. Nor is car_1_p2. "
-        "No record from 2023-11-14 22:13:20.020 UTC."
+        "Not in this folder: the recording before it, car_1_p3 (7 records), car_1_p2 "
+        "(recorded after 2023-11-14 22:13:20.020 UTC)."
     )
 
 

@@ -166,11 +166,11 @@ def test_a_part_that_is_not_there_is_named_with_its_time() -> None:
     assert said([part("a", 2, clip_of="x"), part("", 5)]) == []
     later = [part("a", 1, 0, 10), part("a", 3, 30, 40), part("a", 6, 70, 80), part("b", 4, 100, 110)]
     assert said(later) == [
-        "No record from 10 to 30: Part 2",
-        "No record from 40 to 70: Parts 4, 5",
-        "No record from 80 to 100: Parts 1, 2, 3",
+        "No record here from 10 to 30: Part 2",
+        "No record here from 40 to 70: Parts 4, 5",
+        "No record here from 80 to 100: Parts 1, 2, 3",
     ]
-    assert said([part("a", 3, 30, 40)]) == ["No record until 30: Parts 1, 2"]
+    assert said([part("a", 3, 30, 40)]) == ["No record here until 30: Parts 1, 2"]
     (whole,) = missing([part("a", 2, 30, 40)])
     assert "Part 1 of the drive of a_p2 is not in this report" in whole.sentence(str)
 
@@ -178,8 +178,24 @@ def test_a_part_that_is_not_there_is_named_with_its_time() -> None:
 def test_the_last_part_is_named_by_what_is_beside_it() -> None:
     own = [part("a", 1, 0, 10), part("a", 2, 20, 30)]
     known = frozenset({"a", "a_p2", "a_p3", "b_p9"})
-    assert said(own, Beside(known=known)) == ["No record from 30 on: Part 3"]
-    assert said(own, Beside(known=known, next_s={"a": 75.0, "b": 90.0})) == ["No record from 30 to 75: Part 3"]
+    assert said(own, Beside(known=known)) == ["No record here from 30 on: Part 3"]
+    assert said(own, Beside(known=known, next_s={"a": 75.0, "b": 90.0})) == ["No record here from 30 to 75: Part 3"]
+    both = [*own, part("b", 1, 60, 70)]
+    assert said(both, Beside(known=known - {"b_p9"})) == ["No record here from 30 to 60: Part 3"], "one reason for it"
+
+
+def test_what_is_there_and_not_in_the_report_is_not_called_without_a_record() -> None:
+    own = [part("a", 1, 0, 10), part("a", 4, 40, 50)]
+    files = frozenset({"a", "a_p2", "a_p3", "a_p4", "a_p5"})
+    assert said(own, Beside(known=files, files=files)) == [
+        "Not in this report from 10 to 40: Parts 2, 3",
+        "Not in this report from 50 on: Part 5",
+    ]
+    (one,) = missing(own, Beside(files=frozenset({"a_p2"})))
+    assert one.sentence(str) == (
+        "No record here from 10 to 40: Parts 2, 3 of the drive of a are not in this report: "
+        "the file of part 2 is being recorded, in the trash, or beside the others."
+    )
 
 
 def test_a_number_that_no_part_has_is_not_counted_up_to() -> None:
@@ -190,7 +206,7 @@ def test_a_number_that_no_part_has_is_not_counted_up_to() -> None:
 def test_a_lost_link_is_no_time_without_a_record_and_a_stopped_server_is_one() -> None:
     assert said([part("a", 1, 0, 10), part("a", 2, 60, 70)]) == []
     (one,) = missing([part("a", 1, 0, 10), part("b", 1, 60, 70)])
-    assert one.sentence(lambda at_s: f"{at_s:g}") == "No record from 10 to 60: the server did not record meanwhile."
+    assert one.sentence(lambda at_s: f"{at_s:g}") == "No record here from 10 to 60: nothing was recorded between them."
 
 
 def test_a_last_part_that_is_gone_for_good_is_named_by_the_next_drive(tmp_path: Path) -> None:
@@ -210,7 +226,7 @@ def test_what_is_damaged_within_a_part_is_a_time_without_a_record(tmp_path: Path
         (file,) = recording.files
         file.damage.lost.append((BEGIN_S * NS + 10 * NS, BEGIN_S * NS + 20 * NS))
         (one,) = unrecorded_of(recording, parts_of(recording))
-    assert one.sentence(lambda at_s: f"{at_s:.0f}") == "No record from 10 to 20: s1.mcap is damaged there."
+    assert one.sentence(lambda at_s: f"{at_s:.0f}") == "No record here from 10 to 20: s1.mcap is damaged there."
 
 
 def test_what_a_damaged_index_says_of_the_time_is_not_believed(tmp_path: Path) -> None:
@@ -219,4 +235,4 @@ def test_what_a_damaged_index_says_of_the_time_is_not_believed(tmp_path: Path) -
         (file,) = recording.files
         file.damage.lost.append((0, 1))
         (one,) = unrecorded_of(recording, parts_of(recording))
-    assert one.sentence(str) == "No record at a time that is not known: s1.mcap is damaged."
+    assert one.sentence(str) == "No record here at a time that is not known: s1.mcap is damaged."
