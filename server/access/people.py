@@ -50,13 +50,14 @@ class People:
     # -- who is on duty ----------------------------------------------------------------------------------------------
 
     def sent(self, device: str | None) -> dict[str, Any]:
-        """What goes with every request of a device to a car: who is on duty there, and which supervisors are."""
+        """What goes with every request of a device to a car: who is on duty there, and who is or was anywhere."""
         found = None if device is None else self.board.on_duty(device)
         duties = self.board.duties()
         names = [self.board.people[one.person or ""].name for one in duties if one.role == "supervisor"]
         return {
             "person": None if found is None else {"name": found.name, "role": found.role, "device": device},
             "supervisors": names[:MOST_LISTED],
+            "duties": self.board.stated(self._wall_ms()),
         }
 
     def duty_of(self, device: str | None, device_name: str) -> Duty:
@@ -137,7 +138,7 @@ class People:
         if ago_s and entry is not None and entry.since_ms > self._wall_ms() - ago_s * 1000:
             return
         if self.board.sign_off(device, self._wall_ms(), why):
-            await self._keep(DUTY_FILE)
+            await self._keep(PEOPLE_FILE, DUTY_FILE)
 
     async def dismiss(self, device: str) -> None:
         """The note of how a duty ended was read. Raises OSError."""

@@ -87,7 +87,7 @@ def _people(board: DutyBoard) -> dict[str, Any]:
         "changed_ms": board.hours_changed_ms,
         "people": [
             {"id": one.id, "name": one.name, "role": one.role, "changed_ms": one.changed_ms}
-            | ({} if one.last_ms is None else {"last_ms": one.last_ms})
+            | {name: at_ms for name in ("last_ms", "off_ms") if (at_ms := getattr(one, name)) is not None}
             for one in board.people.values()
         ],
         "removed": board.removed,
@@ -122,12 +122,13 @@ def _take_duties(board: DutyBoard, found: Mapping[str, Any]) -> None:
 
 def person_of(id: str, row: Mapping[str, Any]) -> Person:
     """Raises Refused, ValueError, TypeError, KeyError where it is none."""
-    last_ms = row.get("last_ms")
+    last_ms, off_ms = row.get("last_ms"), row.get("off_ms")
     return Person(
         id=entry_id(id),
         name=person_name(row["name"]),
         role=role_of(row.get("role", "operator")),
         last_ms=None if last_ms is None else time_ms(last_ms),
+        off_ms=None if off_ms is None else time_ms(off_ms),
         changed_ms=time_ms(row.get("changed_ms", 0)),
     )
 

@@ -41,7 +41,7 @@ TOO_OLD = "This order was signed too long ago, and was not carried out. Give it 
 REPLAYED = "This order was carried out before: it was sent a second time, and refused."
 TOO_MANY = "Too many orders came at once: wait some seconds."
 FULL = "Too many devices have given orders to this car: no new one is taken."
-_SENDER = frozenset({"by", "who", "page", "person", "supervisors", "replaying", "console", "signed"})
+_SENDER = frozenset({"by", "who", "page", "person", "supervisors", "duties", "replaying", "console", "signed"})
 
 
 class Challenges:
@@ -155,6 +155,7 @@ class SignedOrders:
             "page": text.page,
             "person": _person(message, text),
             "supervisors": message.get("supervisors"),  # as the node says; it gives nobody a right
+            "duties": message.get("duties"),
             "console": False,
             "replaying": message.get("replaying"),
         }

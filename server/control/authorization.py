@@ -23,6 +23,7 @@ from server.protocol.operator_state import OperatorsState
 MAX_FENCE = 2**53
 MOST_SUPERVISORS = 3  # who are named
 KNOWN_S = 10.0  # the pages state every second who is on duty as supervisor
+MOST_DUTIES = 200  # names of people that are known to be off duty
 MOST_NOTED = 64  # pages of which is known who is on duty there
 
 
@@ -39,17 +40,19 @@ class Caller:
     device: str = display_name.NAMELESS
     person: OnDuty | None = None  # who is on duty at the device that sends
     supervisors: tuple[str, ...] | None = None  # who is on duty as such, anywhere; None: not known
+    duties: Mapping[Any, Any] | None = None  # name → when their duty ended, None: on duty; not checked so far
 
     @classmethod
     def of(cls, message: Mapping[str, Any]) -> Caller:
         page, fence = message.get("page"), message.get("fence")
         device = display_name.clean(message.get("by")) or display_name.NAMELESS
-        person = on_duty(message.get("person"))
+        person, duties = on_duty(message.get("person")), message.get("duties")
         return cls(
             name=device if person is None else display_name.with_person(person.name, device),
             device=device,
             person=person,
             supervisors=_supervisors(message.get("supervisors")),
+            duties=duties if isinstance(duties, Mapping) else None,
             who=str(message.get("who") or ""),
             page=page if isinstance(page, str) else None,
             fence=fence if type(fence) is int and 0 <= fence <= MAX_FENCE else None,
@@ -93,6 +96,8 @@ class Authorization:
         self._reach = AlarmReach()
         self._on_duty: dict[tuple[str, str], OnDuty | None] = {}  # by page, as logged last
         self._supervisors: tuple[tuple[str, ...], float] | None = None  # and when it was stated
+        self._duties: Mapping[Any, Any] = {}  # as stated last
+        self._off_ms: dict[str, int] = {}  # by name, when their duty ended; who was removed since stays
 
     def tick(self, now_s: float) -> bool:
         """Time passes; whether control changed by it."""
@@ -175,15 +180,28 @@ class Authorization:
         """Store the status of a page that shows another car: it may hear alarms, and has no part in control."""
         if (operator := caller.operator) is None:
             return
-        self._hear_supervisors(caller, now_s)
+        self._hear_duties(caller, now_s)
         if word.leaves:
             self._reach.leave_elsewhere(operator)
         else:
             self._reach.hear_elsewhere(operator, _present(word, caller), now_s)
 
-    def _hear_supervisors(self, caller: Caller, now_s: float) -> None:
+    def _hear_duties(self, caller: Caller, now_s: float) -> None:
         if caller.supervisors is not None:
             self._supervisors = caller.supervisors, now_s
+        if caller.duties is None or caller.duties == self._duties:
+            return
+        self._duties = caller.duties
+        for stated, off_ms in list(caller.duties.items())[:MOST_DUTIES]:
+            name = display_name.clean(stated) or ""
+            self._off_ms.pop(name, None)
+            if type(off_ms) is int:
+                self._off_ms[name] = off_ms
+        self._off_ms = dict(list(self._off_ms.items())[-MOST_DUTIES:])
+
+    def off_duty_ms(self, signed: str | None) -> int | None:
+        """When the duty of who acted under this name ended; None: it goes on, or it is not known to be a person."""
+        return self._off_ms.get(display_name.person_of(signed) or "") if signed else None
 
     def supervisors(self, now_s: float) -> tuple[str, ...] | None:
         """Who is on duty as supervisor; None: no page states it now."""
@@ -192,7 +210,7 @@ class Authorization:
 
     def _note_duty(self, operator: Operator, caller: Caller, now_s: float) -> None:
         """Log who comes on duty, and who goes, at a page of this car."""
-        self._hear_supervisors(caller, now_s)
+        self._hear_duties(caller, now_s)
         key, now = (operator.who, operator.page), caller.person
         before = self._on_duty.pop(key, None)
         self._on_duty = dict([*self._on_duty.items(), (key, now)][-MOST_NOTED:])

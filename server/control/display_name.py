@@ -25,6 +25,13 @@ def with_person(person: str, device: str) -> str:
     return f"{person} ({device})"
 
 
+def person_of(signed: str) -> str | None:
+    """The person in a name made by `with_person`; None: it is of a device or a program. No person's name has a
+    bracket, but the name of a device may: compare what is found with names of people."""
+    person, bracket, _ = signed.partition(" (")
+    return person if bracket and signed.endswith(")") else None
+
+
 def of_program(user_agent: str | None) -> str:
     """How a program that gives no name of its own is called: "api · curl"."""
     product = clean((user_agent or "").split("/", 1)[0].split(" ", 1)[0])

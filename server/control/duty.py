@@ -22,6 +22,7 @@ ENDS_AFTER_H = 12.0
 ENDS_WITHIN_H = (1.0, 24.0)
 NOTE_LASTS_MS = 86_400_000  # that a duty ended is shown for a day
 MOST_DUTIES = 100
+OFF_STATED_MS = 7 * 86_400_000  # cars are told so long that a duty ended
 HOUR_MS = 3_600_000
 
 
@@ -40,12 +41,13 @@ class OnDuty:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Person:
-    """One of the list. `role` and `last_ms` are of the last time."""
+    """One of the list. `role` and `last_ms`, when it began, are of the last duty."""
 
     id: str
     name: str
     role: DutyRole = "operator"
     last_ms: int | None = None
+    off_ms: int | None = None  # when their last duty ended
     changed_ms: int = 0
 
 
@@ -152,6 +154,8 @@ class DutyBoard:
         elif elsewhere is None and len(self.duties()) >= MOST_DUTIES:
             raise Refused(f"At most {MOST_DUTIES} people are on duty at a time.")
         same = elsewhere is not None and elsewhere.device == device and elsewhere.role == chosen
+        if (was := self.entries.get(device)) is not None and was.person != person:
+            self._end(was, None, now_ms)
         entry = DutyEntry(
             device=device,
             device_name=device_name,
@@ -161,7 +165,7 @@ class DutyBoard:
             changed_ms=now_ms,
         )
         self.entries[device] = entry
-        self.people[person] = replace(found, role=chosen, last_ms=now_ms, changed_ms=now_ms)
+        self.people[person] = replace(self.people[person], role=chosen, last_ms=now_ms, changed_ms=now_ms)
         return entry
 
     def sign_off(self, device: str, now_ms: int, why: str | None = None) -> bool:
@@ -191,12 +195,23 @@ class DutyBoard:
         self.entries = {key: one for key, one in self.entries.items() if one.person is not None or key in kept}
         return due
 
+    def stated(self, now_ms: int) -> dict[str, int | None]:
+        """By name: who is on duty (None), and when the duty of others ended lately."""
+        on = {one.person for one in self.duties()}
+        return {
+            one.name: None if one.id in on else one.off_ms
+            for one in self.people.values()
+            if one.id in on or (one.off_ms is not None and now_ms - one.off_ms < OFF_STATED_MS)
+        }
+
     def next_ms(self) -> int | None:
         """When the next duty ends by itself; None: nobody is on duty."""
         since = [one.since_ms for one in self.duties()]
         return round(min(since) + self.ends_after_h * HOUR_MS) if since else None
 
     def _end(self, entry: DutyEntry, why: str | None, now_ms: int) -> None:
+        if (person := self.people.get(entry.person or "")) is not None:
+            self.people[person.id] = replace(person, off_ms=now_ms, changed_ms=now_ms)
         self.entries[entry.device] = DutyEntry(
             device=entry.device, device_name=entry.device_name, changed_ms=now_ms, ended=why
         )

@@ -30,6 +30,7 @@ class Line:
     priority: Priority | None = None  # of an alarm
     since_ms: int | None = None  # time of day
     until_ms: int | None = None
+    off_duty_ms: int | None = None  # of an acknowledged alarm: when the duty of its owner ended
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -71,6 +71,9 @@ class StandingAlarm(TypedDict):
     ]
     advice: str
     acknowledged_by: str | None
+    off_duty_ms: NotRequired[
+        Annotated[int | None, doc("when the duty of who acknowledged it ended; null: it goes on, or nobody signed on")]
+    ]
     shelved_until_ms: int | None
     shelved_by: str | None
     silenced_until_ms: Annotated[int | None, doc("no sound until then; null: it sounds while it is unacknowledged")]

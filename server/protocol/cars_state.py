@@ -31,6 +31,14 @@ class CarAlarm(TypedDict):
     text: NotRequired[Annotated[str, doc("value against limit, in words")]]
 
 
+class Unowned(TypedDict):
+    """Alarms that were acknowledged by people whose duty has ended since."""
+
+    count: int
+    by: Annotated[str, doc("whose duty ended first")]
+    since_ms: Annotated[int, doc("when it ended")]
+
+
 class CarLink(TypedDict):
     """What the chain of a car is made of, as in LinkState and SessionState."""
 
@@ -111,6 +119,7 @@ class CarSummary(TypedDict):
     link: CarLink
     worst: Annotated[CarAlarm | None, doc("unacknowledged before acknowledged, then by priority, then the newest")]
     waiting: Annotated[int, doc("alarms that nobody has acknowledged")]
+    unowned: NotRequired[Annotated[Unowned | None, doc("acknowledged alarms without an owner on duty; null: none")]]
     speed: CarSpeed
     holder: Annotated[str | None, doc("name of who is in control; null: nobody")]
     page: Annotated[str | None, doc("the page that is")]

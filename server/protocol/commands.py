@@ -21,7 +21,7 @@ from server.protocol.drive_commands import (
     PlannedStopCommand,
     SlowingCommand,
 )
-from server.protocol.handover_commands import HandoverCommand, ItemCommand
+from server.protocol.handover_commands import HandoverCommand, ItemCommand, TakeAlarm
 
 MAX_COMMAND_BYTES = 16 * 1024
 
@@ -258,6 +258,7 @@ LoggedCommand = (
     | TakeControl
     | ItemCommand
     | HandoverCommand
+    | TakeAlarm
     | MarkCommand
     | DepartureCommand
     | SlowingCommand

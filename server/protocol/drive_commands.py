@@ -101,6 +101,7 @@ class EndPlannedStop(OfPlannedStop):
     """Ends the planned stop."""
 
     needs: ClassVar[Needs] = "operator"  # alarms sound again by it
+    from_fleet: ClassVar[bool] = True
     http: ClassVar[str] = "End the planned stop"
     has_body: ClassVar[bool] = False
     kind: Literal["end_planned_stop"]

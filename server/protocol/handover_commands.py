@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from server.protocol.command_base import Needs, OfCar, PageName, Prompt
+from server.protocol.command_base import Name, Needs, Number, OfCar, PageName, Prompt
 from server.protocol.doc import doc
 
 LineKey = Annotated[str, Field(min_length=1, max_length=200)]
@@ -53,6 +53,17 @@ class EndOffer(OfHandover):
 
 
 HandoverCommand = OfferControl | ReadBack | AcceptControl | EndOffer
+
+
+class TakeAlarm(OfCar):
+    """Makes who sends it the owner of an acknowledged alarm; refused unless the duty of its owner has ended."""
+
+    needs: ClassVar[Needs] = "operator"
+    http: ClassVar[str] = "Become the owner of an acknowledged alarm whose owner is off duty"
+    path: ClassVar[str] = "/api/alarms/{alarm}/take"
+    kind: Literal["take_alarm"]
+    alarm: Name
+    occurrence: Annotated[Number, doc("which occurrence was read; an older one is refused")]
 
 
 class OfItem(OfCar):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from monitor import values
-from monitor.alarm import Alarm, Transition
+from monitor.alarm import Alarm, AlarmState, Transition
 from monitor.alarm_spec import Sound
 from monitor.check import Finding, Quantity, Verdict
 from monitor.load import AlarmLoad
@@ -198,9 +198,16 @@ def tile(tile: Tile) -> TileState:
     }
 
 
-def alarm(alarm: Alarm, now_s: float, wall_ms: int, silent_at_stop: Collection[str] | None = None) -> StandingAlarm:
+def alarm(
+    alarm: Alarm,
+    now_s: float,
+    wall_ms: int,
+    silent_at_stop: Collection[str] | None = None,
+    off_duty_ms: Callable[[str | None], int | None] = lambda _: None,
+) -> StandingAlarm:
     """A standing alarm. Its times are turned from the monitor's clock into time of day by their age.
     `silent_at_stop`: in a planned stop, the ids of alarms without a sound; None: there is none.
+    `off_duty_ms`: when the duty of who acted under a name ended.
     """
     spec = alarm.spec
     finding = alarm.finding or alarm.trip
@@ -231,6 +238,7 @@ def alarm(alarm: Alarm, now_s: float, wall_ms: int, silent_at_stop: Collection[s
         "actions": list(alarm.actions),
         "advice": spec.advice,
         "acknowledged_by": alarm.acknowledged_by if alarm.acknowledged else None,
+        "off_duty_ms": off_duty_ms(alarm.acknowledged_by) if alarm.state is AlarmState.ACKED else None,
         "shelved_until_ms": round(wall_ms + (until_s - now_s) * 1000) if until_s is not None else None,
         "shelved_by": alarm.shelved_by,
         "silenced_until_ms": round(wall_ms + (quiet_s - now_s) * 1000) if quiet_s is not None else None,

@@ -13,12 +13,15 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Metadata
 
-from server.recording.folder import FINISHED, WRITING, id_of
+from server.recording.folder import DAMAGED, FINISHED, WRITING, first_part, id_of, is_id, part_id, part_number
 from server.recording.mcap.chain import CHAIN_OPCODE, RECORD_BYTES, Head, parsed, read_head
 from server.recording.mcap.chunks import HEAD_BYTES, MAGIC
 from server.recording.own import METADATA
+from server.recording.verify import clock
 
 MOST_WITHOUT = 20  # newer recordings that have no chain, before the search for one that has it is given up
+MOST_NAMED = 20  # missing parts, in a sentence
+MOST_PARTS = 10_000
 MOST_NEIGHBOURS = 5_000  # files of a folder that are compared
 _LONGEST_TEXT = 4 << 20  # bytes of a metadata record
 
@@ -33,7 +36,7 @@ def as_metadata(before: Head | None) -> dict[str, str]:
 def named(metadata: Mapping[str, str]) -> Head | None:
     """The recording that a recording's metadata names as the one before it; None: none, or not readable."""
     id, number, digest = (metadata.get(key, "") for key in ("previous", "previous_record", "previous_head"))
-    if not id or not number.isdecimal() or len(number) > 18:
+    if not is_id(id) or not number.isdecimal() or len(number) > 18:
         return None
     return Head(id=id, number=int(number), digest=digest)
 
@@ -56,11 +59,50 @@ def newest_head(path: Path) -> Head | None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Missing:
+    """A recording that is not there, and parts before it that are not there either."""
+
+    id: str
+    records: int  # of its chain, as the one behind it names them
+    others: tuple[str, ...] = ()
+    from_ns: int = 0  # the end of the newest one before them; 0: not known
+    to_ns: int = 0  # the beginning of the one behind them; 0: not known
+
+    is_damaged: bool = False  # its file is there, and nothing of it can be read
+
+    @property
+    def sentence(self) -> str:
+        one = f"the recording before it, {self.id} ({self.records} records)"
+        if self.is_damaged:
+            return f"T{one[1:]}, cannot be read.{self.rest}"
+        return f"Not in this folder: {', '.join([one, *self._listed])}{self._time}."
+
+    @property
+    def rest(self) -> str:
+        """When what nothing can be read of was recorded, and which others are not there; begins with a space."""
+        others = f" Not in this folder: {', '.join(self._listed)}." if self._listed else ""
+        return f"{others}{f' R{self._time[3:-1]}.' if self._time else ''}"
+
+    @property
+    def _listed(self) -> list[str]:
+        left = len(self.others) - MOST_NAMED
+        return [*self.others[:MOST_NAMED], *([f"and {left} more"] if left > 0 else [])]
+
+    @property
+    def _time(self) -> str:
+        """Within which all of them were recorded; begins with a space."""
+        since, until = clock(self.from_ns), clock(self.to_ns)
+        if since and until:
+            return f" (recorded between {since} and {until} UTC)"
+        return f" (recorded {f'after {since}' if since else f'before {until}'} UTC)" if since or until else ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Neighbours:
     """What the recordings beside a file say of it. Sentences; empty: nothing to object, or nothing to compare."""
 
     problems: tuple[str, ...] = ()
-    missing: str | None = None  # the recording before it, where it is not there
+    missing: Missing | None = None  # the recording before it, where it is not there
 
 
 class Beside:
@@ -81,7 +123,7 @@ def compare(path: Path, beside: Beside) -> Neighbours:
     if before is not None and before.id != own:
         place = beside.files.get(before.id)
         if place is None:
-            missing = before.id
+            missing = _missing(path, before, beside)
         elif _digest(place, before.number) != before.digest:
             problems.append(
                 f"{before.id}, which it names as the recording before it, is not as it was when this one began."
@@ -90,6 +132,51 @@ def compare(path: Path, beside: Beside) -> Neighbours:
         if id != own and _digest(path, head.number) != head.digest:
             problems.append(f"It is not as it was when {id} began, which names it as the recording before it.")
     return Neighbours(problems=tuple(problems), missing=missing)
+
+
+def _missing(path: Path, before: Head, beside: Beside) -> Missing:
+    """What is known of the recording before a file that is not there."""
+    older = sorted((id for id in beside.files if _order(id) < _order(before.id)), key=_order)
+    heads = (read_head(beside.files[id], id) for id in reversed(older[-MOST_WITHOUT:]))
+    newest = next((head for head in heads if head is not None), None)
+    first = first_part(before.id)
+    there = {part_number(id) for id in older if first_part(id) == first}
+    others = [part_id(first, n) for n in range(1, min(part_number(before.id), MOST_PARTS)) if n not in there]
+    begun = read_first_metadata(path).get("started_ms", "")
+    return Missing(
+        id=before.id,
+        records=before.number,
+        others=tuple(others),
+        is_damaged=_is_there(path.absolute().with_name(before.id + DAMAGED)),
+        from_ns=newest.at_ns if newest is not None else 0,
+        to_ns=int(begun[:15]) * 1_000_000 if begun.isdecimal() else 0,
+    )
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
+def destroyed(path: Path, beside: Beside) -> Neighbours:
+    """What those that name a file say of it, where nothing of it can be read."""
+    naming = [(id, head) for id, head in beside.naming.get(id_of(path), ()) if id != id_of(path)]
+    return Neighbours(
+        problems=tuple(
+            f"{id} names it as the recording before it ({head.number} records): it is destroyed."
+            f"{_missing(beside.files[id], head, beside).rest}"
+            for id, head in naming
+        )
+    )
+
+
+def next_behind(folder: Path, first: str) -> Path | None:
+    """The first recording in a folder that began behind the session whose first part this is; None: there is none."""
+    behind = {id_of(each): each for each in _siblings(folder)}
+    later = [id for id in behind if _order(id) > _order(first) and first_part(id) != first]
+    return behind[min(later, key=_order)] if later else None
 
 
 def read_first_metadata(path: Path) -> dict[str, str]:

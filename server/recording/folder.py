@@ -114,11 +114,20 @@ def part_number(id: str) -> int:
 
 def known_beside(folder: Path) -> set[str]:
     """The names of all recordings of a vehicle's folder: finished, being written, unreadable, or in the trash."""
+    return _named_beside(folder, (FINISHED, WRITING, DAMAGED))
+
+
+def readable_beside(folder: Path) -> set[str]:
+    """As `known_beside`, without what is known to be unreadable."""
+    return _named_beside(folder, (FINISHED, WRITING))
+
+
+def _named_beside(folder: Path, endings: tuple[str, ...]) -> set[str]:
     folder = folder.absolute()
     found = list(folder.glob("*.mcap*"))
     with contextlib.suppress(OSError):
         found += (folder.parent / _TRASH).glob(f"*/{glob.escape(folder.name)}/*{FINISHED}")
-    return {id_of(path) for path in found if path.name.endswith((FINISHED, WRITING, DAMAGED))}
+    return {id_of(path) for path in found if path.name.endswith(endings)}
 
 
 def id_of(path: Path) -> str:

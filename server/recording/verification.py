@@ -15,7 +15,7 @@ from typing import Any
 
 import orjson
 
-from server.recording.chain_neighbours import Beside, Neighbours, compare
+from server.recording.chain_neighbours import Beside, Neighbours, compare, destroyed
 from server.recording.folder import FINISHED, WRITING
 from server.recording.read.read import Recording
 from server.recording.verify import OnProgress, Verified, verify
@@ -44,8 +44,7 @@ class Verification:
     @property
     def sentence(self) -> str:
         """All that is known, in sentences."""
-        gone = self.beside.missing
-        missing = f"The recording before it, {gone}, is not here." if gone is not None else ""
+        missing = self.beside.missing.sentence if self.beside.missing is not None else ""
         return " ".join(filter(None, (self.file.sentence, *self.beside.problems, missing)))
 
     def as_json(self) -> dict[str, Any]:
@@ -74,7 +73,9 @@ def verification(path: Path, beside: Beside | None = None, on_progress: OnProgre
 
 def compared(path: Path, found: Verified, beside: Beside) -> Verification:
     """A file that was verified by itself, compared with the recordings beside it."""
-    if found.state in ("no chain", "unreadable"):
+    if found.state == "unreadable":
+        return Verification(path=path, file=found, beside=destroyed(path, beside))
+    if found.state == "no chain":
         return Verification(path=path, file=found)
     return Verification(path=path, file=found, beside=compare(path, beside))
 

@@ -243,7 +243,8 @@ class _Run:
         rest = f"; {unread} bytes behind it are not covered" if unread else ""
         sentence = (
             f"Ends at record {self._last.number} (unfinished){rest}. "
-            "What was recorded after it is missing, or the file is still being written."
+            f"What was recorded after {f'{at} UTC' if (at := clock(self._last.at_ns)) else 'it'} is missing, "
+            "or the file is still being written."
         )
         return self._found("unfinished", sentence, self._last.digest.hex())
 
@@ -314,7 +315,7 @@ def _is_record(opcode: int) -> bool:
 
 
 def _times(broken: Break) -> str:
-    from_, to = _clock(broken.from_ns), _clock(broken.to_ns)
+    from_, to = clock(broken.from_ns), clock(broken.to_ns)
     if from_ and to:
         return f" ({from_} to {to.rpartition(' ')[2]} UTC)"
     if from_:
@@ -322,7 +323,8 @@ def _times(broken: Break) -> str:
     return f" (until {to} UTC)" if to else ""
 
 
-def _clock(time_ns: int) -> str:
+def clock(time_ns: int) -> str:
+    """A time of day in UTC, with milliseconds; empty: not known."""
     if not time_ns:
         return ""
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import assert_never
 
-from monitor.alarm import Alarm
+from monitor.alarm import Alarm, AlarmState
 from monitor.runner import Refused
 from server.control.authorization import Authorization, Caller
 from server.control.handover import Handover, Line, NotReadBack, version_of
@@ -117,6 +117,16 @@ class CarHandover:
         self._judgement.report(self._judgement.monitor.hand_over(is_read_back, by.name, now_s))
         return offer.by
 
+    def take_alarm(self, command: handover_commands.TakeAlarm, by: str, now_s: float) -> None:
+        """Make `by` the owner of an acknowledged alarm whose owner is off duty. Raises Refused."""
+        monitor = self._judgement.monitor
+        alarm = monitor.alarms.get(command.alarm)
+        if alarm is None or alarm.state is not AlarmState.ACKED or alarm.occurrence != command.occurrence:
+            raise Refused("This alarm is not an acknowledged one any more: look at the list again.")
+        if self._authorization.off_duty_ms(alarm.acknowledged_by) is None:
+            raise Refused(f"{alarm.spec.title}: {alarm.acknowledged_by} has acknowledged it and is not off duty.")
+        self._judgement.report(monitor.take_over(command.alarm, by, now_s, is_read_back=True))
+
     def refusal(self, why: NotReadBack, now_s: float, wall_ms: int) -> Answer:
         """The answer to a read-back that does not fit, with what stands now."""
         return {"ok": False, "reason": why.reason, "handover": self.as_json(now_s, wall_ms)}
@@ -124,7 +134,8 @@ class CarHandover:
     def lines(self, now_s: float, wall_ms: int) -> list[Line]:
         """What stands now."""
         judgement, slow_down = self._judgement, self._slow_down.frame()
-        standing = [serialize.alarm(alarm, now_s, wall_ms) for alarm in judgement.monitor.standing()]
+        off_duty_ms = self._authorization.off_duty_ms
+        standing = [serialize.alarm(one, now_s, wall_ms, None, off_duty_ms) for one in judgement.monitor.standing()]
         compared = phone.as_json(judgement.snapshot().phone, now_s)
         is_riding = compared is not None and not compared["handheld"]
         return [
@@ -162,6 +173,7 @@ class CarHandover:
                     "priority": line.priority,
                     "since_ms": line.since_ms,
                     "until_ms": line.until_ms,
+                    "off_duty_ms": line.off_duty_ms,
                     "read": line.key in offer.read,
                 }
                 for line in lines

@@ -8,12 +8,12 @@ from collections.abc import Callable, Collection, Iterable
 
 import orjson
 
-from monitor.alarm import Alarm
+from monitor.alarm import Alarm, AlarmState
 from monitor.alarm_spec import Sound
 from monitor.state import Snapshot
 from server.bus.bus import ALL, SessionBus
 from server.protocol import serialize
-from server.protocol.cars_state import CarAlarm, CarPlace, CarSpeed, CarSummary
+from server.protocol.cars_state import CarAlarm, CarPlace, CarSpeed, CarSummary, Unowned
 from server.protocol.state import ServerState
 from server.vehicle import facts
 from server.vehicle.session_parts import SessionParts
@@ -99,6 +99,7 @@ class SummaryPublisher:
             "planned_stop": None if found.planned_stop is None else found.planned_stop.reason,
             "worst": worst(standing, now_s, wall_ms, silent_at(found.planned_stop, parts.judgement.monitor)),
             "waiting": sum(alarm.state in _ASKING for alarm in standing),
+            "unowned": unowned(standing, parts.authorization.off_duty_ms),
             "speed": _speed(snapshot, now_s),
             "holder": control["holder"],
             "page": control.get("page"),
@@ -148,6 +149,19 @@ def worst(
         "sound": Sound.NONE if first["silenced_until_ms"] else first["sound"],
         "text": (first["text"] or first["trip_text"])[:TEXT_LETTERS],
     }
+
+
+def unowned(standing: Iterable[Alarm], off_duty_ms: Callable[[str | None], int | None]) -> Unowned | None:
+    """Of the acknowledged alarms those whose owners are off duty; None: there is none."""
+    found = [
+        (since_ms, alarm.acknowledged_by or "")
+        for alarm in standing
+        if alarm.state is AlarmState.ACKED and (since_ms := off_duty_ms(alarm.acknowledged_by)) is not None
+    ]
+    if not found:
+        return None
+    since_ms, by = min(found)
+    return {"count": len(found), "by": by, "since_ms": since_ms}
 
 
 def _speed(snapshot: Snapshot, now_s: float) -> CarSpeed:

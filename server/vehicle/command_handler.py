@@ -213,6 +213,8 @@ class CommandHandler:
             case commands.Acknowledge() | commands.Silence() | commands.Shelve() | commands.Unshelve():
                 judgement = parts.judgement
                 judgement.report(respond(judgement.monitor, command, now_s, by))
+            case handover_commands.TakeAlarm():
+                parts.handover.take_alarm(command, by, now_s)
             case commands.TakeControl():
                 parts.authorization.obey(command, caller, now_s)
                 self._actions.attention_changed()  # the queue shows who asks for control

@@ -112,6 +112,7 @@ def frame_facts(
         trends=judgement.trends.piece(now_s, at_most=TRENDS_A_FRAME),
         track_number=judgement.track_number,
         operators=operators,
+        off_duty_ms=parts.authorization.off_duty_ms,
         decelerate=parts.slow_down.frame(),
         mode=parts.driving.frame(now_s, wall_ms),
         marks=parts.marks.count,

@@ -50,6 +50,7 @@ def alarm_lines(standing: Sequence[StandingAlarm]) -> list[Line]:
             text=f"{alarm['text'] or alarm['trip_text']} {_answered(alarm)}".strip(),
             priority=alarm["priority"],
             since_ms=alarm["raised_ms"],
+            off_duty_ms=alarm.get("off_duty_ms"),
         )
         for alarm in active[:MOST_ALARMS]
     ]

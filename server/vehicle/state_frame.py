@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -93,6 +93,7 @@ class Facts:
     decelerate: SlowDownState
     mode: ModeState
     operators: OperatorsState
+    off_duty_ms: Callable[[str | None], int | None] = lambda _: None  # of a recording it is not known
     marks: int = 0  # of this drive
     questions: Sequence[Question] = ()
     of_unknown_age: Collection[str] = ()  # topics whose only message may have been kept for us
@@ -109,7 +110,9 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> RecordedS
         "nearest": _nearest(snapshot, monitor),
         "checks": [serialize.tile(tile) for tile in monitor.tiles()],
         "alarms": [
-            serialize.alarm(alarm, facts.now_s, facts.wall_ms, silent_at(facts.planned_stop, monitor))
+            serialize.alarm(
+                alarm, facts.now_s, facts.wall_ms, silent_at(facts.planned_stop, monitor), facts.off_duty_ms
+            )
             for alarm in monitor.standing()
         ],
         "suppressed": [
@@ -322,11 +325,8 @@ def _old_sample(facts: Facts, reading: Reading[Any], tally: Tally, source: Sourc
 def _unknown_part(value: Any) -> str | None:
     """What a proper message leaves open: the real car's cmd_vel has a NaN angle in every message."""
     if isinstance(value, values.MotionCommand):
-        missing = [
-            name
-            for name, known in (("linear.x", value.speed_mps), ("angular.z", value.tyre_angle_rad))
-            if known is None
-        ]
+        parts = (("linear.x", value.speed_mps), ("angular.z", value.tyre_angle_rad))
+        missing = [name for name, known in parts if known is None]
         return f"{' and '.join(missing)} is null: unknown" if missing else None
     return None
 

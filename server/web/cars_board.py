@@ -153,4 +153,12 @@ def _alarms_of(summary: dict[str, Any]) -> object:
     key = worst and (worst["id"], worst["occurrence"], worst["state"], worst["active"])
     person = item and [one and one["page"] for one in (item["assigned"], item["offered"])]
     asked = [one["page"] for one in summary.get("requests", ())]
-    return key, summary["waiting"], summary["phase"], person, item and item["escalated_ms"] is None, asked
+    return (
+        key,
+        summary["waiting"],
+        summary.get("unowned"),
+        summary["phase"],
+        person,
+        item and item["escalated_ms"] is None,
+        asked,
+    )

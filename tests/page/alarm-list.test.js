@@ -1,5 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { standingWords } from '../../static/js/alarms/standing.js';
 import { countWords, latelyWords, noneWords, pagesOf, rowsOf, silentWords, together } from '../../static/js/alarms/alarms-layout.js';
 
 /** @param {string} id @param {any} [more] @returns {any} */
@@ -27,6 +28,19 @@ test('whatever is unacknowledged can be acknowledged, also once it has returned;
   assert.deepEqual(keys({ state: 'ACKED' }), ['shelve']);
   assert.deepEqual(keys({ state: 'SHELVED' }), ['unshelve']);
   assert.deepEqual(shown([alarm('a')], [], false)[0]?.keys, []);
+});
+
+test('an acknowledged alarm whose owner is off duty says so, can be taken over, and is not called acknowledged alone', () => {
+  const off = { state: 'ACKED', acknowledged_by: 'A. K. (Pixel)', off_duty_ms: new Date(2026, 10, 19, 14, 2, 30).getTime(), actions: ['shelve'], for_s: 90 };
+  const rows = shown([alarm('a', off)]);
+  assert.match(rows[0]?.state ?? '', /^acknowledged by A\. K\. \(Pixel\), off duty since 14:02 · active for/);
+  assert.match(standingWords(alarm('a', off)), /acknowledged by A\. K\. \(Pixel\), off duty since 14:02/);
+  assert.deepEqual(rows[0]?.keys, ['shelve', 'take_alarm']);
+  assert.equal(countWords(rows), '1 without an owner on duty');
+  assert.deepEqual(shown([alarm('new', { state: 'ACKED', raised_ms: 9 }), alarm('left', off), alarm('waits')]).map(({ id }) => id), ['waits', 'left', 'new']);
+  const owned = shown([alarm('a', { ...off, off_duty_ms: null })]);
+  assert.deepEqual([owned[0]?.keys, countWords(owned)], [['shelve'], 'all acknowledged']);
+  assert.deepEqual(shown([alarm('a', off)], [], false)[0]?.keys, []);
 });
 
 test('one tap answers together what waits on this page, stands, is not critical, and was in sight for a second', () => {

@@ -452,6 +452,7 @@ class Canned:
         self.heard: list[Json] = []
         self.refuses: dict[str, str] = {}  # why, by the kind of command
         self.role = "operator"
+        self.duty: Json | None = None  # who is on duty at the page's device
         self.found: list[Json] = [
             {"name": "CATVehicle", "address": "ws://192.168.4.1:9090"},
             {"name": "Simulated car", "address": "ws://127.0.0.1:9091"},
@@ -497,6 +498,8 @@ class Canned:
                     await socket.send_json({"kind": "offer", "seq": message["seq"], "of": ["scan"]})
                 if message.get("kind") == "hello":
                     self._page = message.get("page")
+                    if self.duty is not None:
+                        await socket.send_json(self.duty)
                     if self.log and not is_fleet:
                         await socket.send_json({"kind": "events", "events": self.log[::-1], "last": self.log[0]["n"]})
                 if "id" in message:

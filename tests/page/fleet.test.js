@@ -53,6 +53,18 @@ test('a car that is off on purpose is in no count and sounds nothing, and says w
   assert.deepEqual([row?.text, row?.kind, row?.isLost, row?.isAsking], ['Off on purpose', '', false, false]);
 });
 
+test('what somebody acknowledged who is off duty is asked for like what nobody has', () => {
+  const unowned = { count: 1, by: 'A. K. (Pixel)', since_ms: NOW - 60_000 };
+  const acked = (/** @type {any} */ more) => summary({ worst: worst({ state: 'ACKED', priority: 'warning' }), attention: item({ escalates_ms: null }), ...more });
+  const of = seen({ a: acked({}), b: acked({ unowned }) });
+  const [first] = itemsOf(of);
+  assert.equal(first?.name, 'b');
+  assert.match(first?.detail ?? '', /^12\.6 m\/s, limit 11\.0 m\/s; acknowledged by A\. K\. \(Pixel\), off duty since \d\d:\d\d$/);
+  const rows = Object.fromEntries(carRows(of, ['b', 'a'], false).map(({ name, text }) => [name, text]));
+  assert.match(rows['b'] ?? '', /^owner off duty · /);
+  assert.doesNotMatch(rows['a'] ?? '', /off duty/);
+});
+
 test('the timer fills over 30 s by the clock of the car, and stays full once it went on', () => {
   const [one] = itemsOf(seen({ a: needy() }));
   assert.ok(Math.abs((one?.timer?.share ?? 0) - 7 / 30) < 0.01);

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { heldWords } from '../../static/js/shell/connect-layout.js';
-import { asked, dayWords, eventWords, joined, lowest, tookWords } from '../../static/js/alarms/log-layout.js';
+import { asked, dayWords, eventWords, joined, lowest, standingRows, tookWords } from '../../static/js/alarms/log-layout.js';
 import { dialogWords, loadWords, snackWords, standingWords } from '../../static/js/alarms/standing.js';
 
 const ALARM = /** @type {any} */ ({ active: true, text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
@@ -121,4 +121,19 @@ test('what the log had lost says from where it is', () => {
   const brought = { brought_from: 'car_20261128T080000Z' };
   assert.equal(eventWords(event(1, { by: 'Ben', ...brought })).text, '12.6 m/s · by Ben · brought back from car_20261128T080000Z');
   assert.equal(eventWords(event(2, { alarm: null, change: 'connected', text: 'Connected', ...brought })).text, 'brought back from car_20261128T080000Z');
+});
+
+test('what nobody was alerted of bears a mark, in the list of what stands and in what happened', () => {
+  const shelved = /** @type {any} */ ({ id: 'gps', occurrence: 1, title: 'GPS drift', priority: 'critical', state: 'SHELVED', active: true, raised_ms: 0, text: '6 m', trip_text: '', actions: [], shelved_until_ms: 0, shelved_by: 'Ann' });
+  const suppressed = /** @type {any} */ ({ id: 'fix', title: 'GPS fix lost', priority: 'critical', by: ['Car silent'], raised_ms: null });
+  const rows = standingRows([{ ...shelved, state: 'UNACKED' }, shelved], [suppressed]);
+  assert.deepEqual(rows.map(({ icon, colour, kind }) => [icon, colour, kind]), [['crit', 'c-crit', 'unacknowledged'], ['clock', '', 'shelved'], ['bell-off', '', 'suppressed']]);
+  assert.match(rows[1]?.text ?? '', /shelved by Ann until/);
+  assert.equal(rows[2]?.text, 'suppressed · cause: Car silent');
+  const wordsOf = (/** @type {any} */ more) => eventWords(/** @type {any} */ ({ alarm: 'gps', change: 'raised', title: 'GPS drift', text: '6 m', by: null, priority: 'warning', ...more })).text;
+  assert.equal(wordsOf({ state: 'SHELVED' }), '6 m · while shelved');
+  assert.equal(wordsOf({ state: 'SHELVED', change: 'shelved' }), '6 m');
+  assert.equal(wordsOf({ state: 'SUPPRESSED', suppressed_by: ['car_silent'] }), '6 m · suppressed by another alarm');
+  assert.equal(wordsOf({ state: 'SUPPRESSED', suppressed_by: ['paused', 'car_silent'] }), '6 m · suppressed: monitoring is paused');
+  assert.equal(wordsOf({ state: 'UNACKED' }), '6 m');
 });

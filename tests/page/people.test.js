@@ -5,9 +5,9 @@ import { test } from 'node:test';
 
 import { chipOf } from '../../static/js/control/control-layout.js';
 import { dutyWords, initialsOf, partOf } from '../../static/js/control/duty-layout.js';
-import { endWords, lineWords, markOf } from '../../static/js/control/handover-layout.js';
+import { endWords, leftLines, lineWords, markOf } from '../../static/js/control/handover-layout.js';
 import { lastWords } from '../../static/js/control/people-layout.js';
-import { requestItem, supervisorWords } from '../../static/js/shell/fleet-requests.js';
+import { requestItem, supervisorWords, unownedWords } from '../../static/js/shell/fleet-requests.js';
 
 const AT = new Date(2026, 10, 19, 13, 58).getTime();
 const me = { person: 'a', name: 'A. K.', role: 'operator', title: 'operator', device: 'Pixel', since_ms: AT };
@@ -46,7 +46,23 @@ test('a hand-over concerns two pages, and opens once all is read', () => {
   const line = (/** @type {any} */ more) => /** @type {any} */ ({ key: 'k', kind: 'alarm', title: 'Speed', text: '12 m/s', priority: null, since_ms: null, until_ms: null, read: false, ...more });
   assert.equal(lineWords(line({ since_ms: AT })), '12 m/s · since 13:58:00');
   assert.equal(lineWords(line({ until_ms: AT, text: '' })), 'back at 13:58:00');
+  assert.equal(lineWords(line({ since_ms: AT, off_duty_ms: AT + 60_000 })), '12 m/s, off duty since 13:59 · since 13:58:00');
   assert.deepEqual([line({ priority: 'critical' }), line({ priority: 'warning' }), line({ kind: 'shelved', priority: 'critical' })].map(markOf), ['crit', 'warn', 'bell-off']);
+});
+
+test('who signs on is shown what people who are off duty left acknowledged, and not what is theirs', () => {
+  const alarm = (/** @type {string} */ id, /** @type {any} */ more) => /** @type {any} */ ({ id, occurrence: 2, title: id, state: 'ACKED', active: true, verdict: 'fault', text: '12 m/s', priority: 'warning', raised_ms: AT, acknowledged_by: 'M. R. (Desk)', off_duty_ms: AT, ...more });
+  const alarms = [alarm('left', {}), alarm('owned', { off_duty_ms: null }), alarm('mine', { acknowledged_by: 'A. K. (Desk)' }), alarm('again', { state: 'UNACKED' }), alarm('taken', { off_duty_ms: null, acknowledged_by: 'A. K. (Pixel)' })];
+  const lines = leftLines(alarms, /** @type {any} */ (me), new Set(['taken 2']));
+  assert.deepEqual(lines.map(({ key, read }) => [key, read]), [['left 2', false], ['taken 2', true]]);
+  assert.equal(lines[0]?.text, '12 m/s. Acknowledged by M. R. (Desk).');
+});
+
+test('the queue says whose alarms are left without an owner on duty', () => {
+  const of = (/** @type {any} */ unowned) => unownedWords(/** @type {any} */ ({ unowned }));
+  assert.equal(of({ count: 1, by: 'A. K. (Pixel)', since_ms: AT }), 'acknowledged by A. K. (Pixel), off duty since 13:58');
+  assert.equal(of({ count: 3, by: 'A. K. (Pixel)', since_ms: AT }), '3 alarms acknowledged by A. K. (Pixel), off duty since 13:58');
+  assert.deepEqual([of(null), of(undefined)], ['', '']);
 });
 
 test('an item goes on to who is on duty, or says that nobody is', () => {

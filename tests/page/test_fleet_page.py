@@ -338,3 +338,41 @@ async def test_a_hundred_cars_scroll_evenly(phone: Phone, canned: Canned, record
     print(f"frames of {median:.1f} ms, 95 % below {most:.1f} ms, longest {gaps[-1]:.1f} ms")
     assert median < 17.5
     assert most < 17.5 + 1000 * phone.stutter_s + 17
+
+
+@pytest.mark.gate
+async def test_a_planned_stop_is_ended_in_the_row_of_its_car(phone: Phone, canned: Canned) -> None:
+    cars = fleet.quiet()
+    caracal = next(one for one in cars if one["name"] == "Caracal")["summary"]
+    caracal["planned_stop"] = "charging"
+    canned.refuses["end_planned_stop"] = "The session is busy."
+    page = await opened(phone, canned, cars)
+    row = page.locator('tr[data-car="Caracal"]')
+    keys = page.locator("[data-act=end-stop]:visible")
+    for size in (DESK, {"width": 820, "height": 1180}, {"width": 360, "height": 740}):
+        await page.set_viewport_size(size)  # type: ignore[arg-type]
+        await expect(keys).to_have_count(1)
+        await expect(row).to_contain_text("planned stop")
+        assert await page.evaluate(UNFIT) == []
+    await no_barrier(page, "a planned stop in a row")
+    key = row.get_by_role("button", name="End the planned stop: Caracal")
+    box = await key.bounding_box()
+    assert box is not None
+    assert box["height"] >= 56, "a finger finds it"
+    await key.click()
+    await expect(page.locator(".snack.note")).to_contain_text("Caracal: The session is busy.")
+    assert sent(canned, "end_planned_stop") == [{"kind": "end_planned_stop", "vehicle": "Caracal"}]
+    assert "/fleet" in page.url, "the key opens no car"
+    caracal["planned_stop"] = None
+    await expect(keys).to_have_count(0)
+
+
+@pytest.mark.gate
+async def test_a_viewer_ends_no_planned_stop(phone: Phone, canned: Canned) -> None:
+    canned.role = "viewer"
+    cars = fleet.quiet()
+    cars[0]["summary"]["planned_stop"] = "charging"
+    page = await opened(phone, canned, cars)
+    await page.locator("[data-act=end-stop]:visible").click()
+    await expect(page.locator(".snack.note")).to_contain_text("A viewer can only watch")
+    assert sent(canned, "end_planned_stop") == []

@@ -12,13 +12,15 @@ from datetime import UTC, datetime
 from typing import Any
 
 from server.analysis.alarm_load import Load
+from server.analysis.drive.axis import day_time
 from server.recording.catalog.annotations import Annotations
 from server.recording.drive import people
 from server.recording.drive.facts import DriveFacts, DriveLog, figures_of
 from server.recording.drive.link_way import LinkStretch, link_along
-from server.recording.drive.parts import DrivePart, Span, missing_parts
+from server.recording.drive.parts import DrivePart, Span
+from server.recording.drive.unrecorded import Unrecorded, unrecorded_of
 from server.recording.drive.unseen import UnseenTime, blind_times, late_times
-from server.recording.folder import id_of, known_beside
+from server.recording.folder import id_of
 from server.recording.read.read import Recording
 from server.recording.verification import Verification
 from server.version import catgraph_version
@@ -38,6 +40,7 @@ def report_json(
     """The whole report. Times are ms since 1970 and ISO 8601, lengths m and s, speeds m/s."""
     log, first = facts.log, recording.metadata
     every = [part.metadata for part in facts.parts] or [first]
+    unrecorded = unrecorded_of(recording, facts.parts)[:MOST_ROWS]
     return {
         "catgraph": catgraph_version(),
         "name": name,
@@ -54,7 +57,8 @@ def report_json(
         "tags": list(annotations.tags),
         "parts": [_part(part, facts) for part in facts.parts],
         "gaps": [_gap(gap, facts) for gap in facts.gaps[:MOST_ROWS]],
-        "parts_missing": missing_parts(facts.parts, _known_beside(recording)),
+        "no_record": [_unrecorded(one, facts) for one in unrecorded],
+        "parts_missing": [_unrecorded(one, facts)["sentence"] for one in unrecorded if one.parts],
         "chain": [{"recording": id_of(one.path), **one.as_json()} for one in verified],
         "figures": figures_of(facts),
         "load": None if load is None or log is None else _load(load),
@@ -71,8 +75,20 @@ def report_json(
     }
 
 
-def _known_beside(recording: Recording) -> set[str]:
-    return {id for folder in {path.parent for path in recording.paths} for id in known_beside(folder)}
+def _unrecorded(one: Unrecorded, facts: DriveFacts) -> dict[str, Any]:
+    """A time of which this report has no record; null: it is not known since when, or until when."""
+
+    def at_ms(at_s: float) -> int:
+        return facts.start_ms + round(at_s * 1000)
+
+    return {
+        "from_ms": None if one.from_s is None else at_ms(one.from_s),
+        "to_ms": None if one.to_s is None else at_ms(one.to_s),
+        "time": one.time(lambda at_s: day_time(at_ms(at_s))),
+        "parts": list(one.parts),
+        "what": one.what,
+        "sentence": one.sentence(lambda at_s: day_time(at_ms(at_s))),
+    }
 
 
 def _part(part: DrivePart, facts: DriveFacts) -> dict[str, Any]:

@@ -16,10 +16,12 @@ from server.analysis.drive import drawings, link_drawing, sheet_things
 from server.analysis.drive.axis import day_time
 from server.analysis.drive.media import Media
 from server.analysis.drive.sheet_things import MOST_ROWS
+from server.recording.drive.alarms import marks_of
 from server.recording.drive.facts import DriveFacts
 from server.recording.drive.link_way import LinkStretch, link_along
 from server.version import catgraph_version
 
+MOST_NO_RECORD = 20  # times without a record that are shown
 MOST_CHAINS = 3  # at the top of the report; each part has its own in the list of parts
 _MODES = {"autonomous": "Autonomous", "manual": "Manual", "unknown": "Not known"}
 _RESULTS = {"failed": "critical", "not_applicable": "na", "open": "unknown", "done": "ok"}
@@ -32,12 +34,13 @@ def sheet(environment: Environment, template: str, facts: DriveFacts, found: Map
 
 def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str, Any]:
     alarms, stretches = _alarms(found["alarms"]), link_along(facts)
+    no_record = [f"{one['what']} {one['time']}" for one in found["no_record"]]
     return {
         "about": _about(found),
         **{name: found[name] for name in ("title", "weather", "remarks", "tags")},
-        "chain": _chain(found["chain"]),
+        "chain": [*_chain(found["chain"]), *_parts_missing(found)],
         "parts": sheet_things.parts(found),
-        "chain_is_bad": any(one["is_broken"] for one in found["chain"]),
+        "chain_is_bad": bool(found["parts_missing"]) or any(one["is_broken"] for one in found["chain"]),
         "figures": _figures(found),
         "people": None if found["people"] is None else _people(found["people"]),
         "departure": _departure(found["departure"]),
@@ -48,6 +51,9 @@ def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str
         "speed": _both(drawings.speed_plot, facts, (700, 210), (340, 230), (510, 220)),
         "has_limit": bool(facts.limits),
         "alarms": None if alarms is None else alarms[:MOST_ROWS],
+        "no_record": no_record[:MOST_NO_RECORD],
+        "no_record_left": max(0, len(no_record) - MOST_NO_RECORD),
+        "none": "none in what was recorded" if _is_partial(found) else "none",
         "alarms_left": 0 if alarms is None else max(0, len(alarms) - MOST_ROWS),
         "interventions": sheet_things.interventions(found["interventions"]),
         "marks": sheet_things.marks(found["marks"], media),
@@ -68,6 +74,12 @@ def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str
             found["figures"]["distance_by"]
         ],
     }
+
+
+def _is_partial(found: Mapping[str, Any]) -> bool:
+    """Whether there may have been more than the files say."""
+    is_broken = any(one["is_broken"] for one in found["chain"])
+    return bool(found["no_record"] or found["damage"] or is_broken)
 
 
 def _both(draw: Any, facts: DriveFacts, *sizes: tuple[int, int]) -> list[Markup] | None:
@@ -92,6 +104,13 @@ def _chain(chain: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
     broken = [(f"{one['recording']}: {_state(one)}", _head(one)) for one in chain if one["is_broken"]]
     intact = sum(one["state"] == "intact" and not one["is_broken"] for one in chain)
     return [(f"{intact} of {len(chain)} parts intact", "heads below"), *broken[:MOST_CHAINS]]
+
+
+def _parts_missing(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Beside chains that are intact: what is not there has none."""
+    numbers = [str(number) for one in found["no_record"] for number in one["parts"]]
+    which = ", ".join(numbers[:MOST_CHAINS]) + (" …" if len(numbers) > MOST_CHAINS else "")
+    return [(f"Missing: part{'s' if len(numbers) > 1 else ''} {which}", "see data lost")] if numbers else []
 
 
 def _state(one: Mapping[str, Any]) -> str:
@@ -216,7 +235,7 @@ def _alarms(alarms: Sequence[Mapping[str, Any]] | None) -> list[tuple[str, str, 
             day_time(one["raised_ms"]),
             one["priority"],
             one["title"],
-            " · ".join(filter(None, ("planned stop" if one["planned_stop"] else "", one["text"]))),
+            " · ".join(filter(None, (marks_of(one), one["text"]))),
             "not acknowledged" if one["to_acknowledge_s"] is None else f"{one['to_acknowledge_s']:.1f} s",
         )
         for one in alarms
@@ -261,7 +280,8 @@ def _blind_head(found: Mapping[str, Any]) -> str:
 
 def _lost(found: Mapping[str, Any]) -> list[str]:
     """What else is missing, in lines."""
-    lines = [*found["parts_missing"][:20], *found["damage"][:20]]
+    lines = [*(one["sentence"] for one in found["no_record"][:MOST_NO_RECORD]), *found["damage"][:20]]
+    lines += [f"{one['recording']}: {one['sentence']}" for one in found["chain"] if one["is_broken"]][:20]
     for name, what in (("left_out", "not recorded"), ("not_received", "not received")):
         if found[name]:
             shown = ", ".join(found[name][:5])

@@ -11,6 +11,7 @@ import orjson
 from monitor.unseen import unseen_words
 from server.analysis.drive.drive_report import DriveReport
 from server.analysis.drive.form import as_csv
+from server.recording.drive.alarms import marks_of
 from server.recording.export.export_format import Outcome
 from server.recording.export.formats.csv_zip import when
 from server.recording.read.read import Recording
@@ -91,7 +92,7 @@ def _things(found: Mapping[str, Any]) -> Iterator[list[Any]]:
         yield _row("mode span", one["from_ms"], one["to_ms"], what=one["mode"])
     for one in found["alarms"] or ():
         about = {"what": one["title"], "value": one["to_acknowledge_s"], "unit": "s to acknowledge"}
-        details = " · ".join(filter(None, (one["text"], "planned stop" if one["planned_stop"] else "")))
+        details = " · ".join(filter(None, (one["text"], marks_of(one))))
         yield _row("alarm", one["raised_ms"], one["cleared_ms"], by=one["acknowledged_by"], details=details, **about)
     for one in found["interventions"] or ():
         details = ": ".join(filter(None, (one["category"], one["what"])))
@@ -126,6 +127,8 @@ def _things(found: Mapping[str, Any]) -> Iterator[list[Any]]:
                 "details": unseen_words(one["unseen_m"]),
             }
             yield _row(section, start + one["from_s"] * 1000, start + one["to_s"] * 1000, what=what, **about)
+    for one in found["no_record"]:
+        yield _row(one["what"].lower(), one["from_ms"], one["to_ms"], what=one["sentence"])
     for name in ("parts_missing", "damage", "left_out", "not_received"):
         for line in found[name]:
             yield _row("missing", what=name, value=line)

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
+from typing import Any
 
+from monitor.alarm import AlarmState
 from server.judge.logged_transition import spec_of
 from server.recording.drive.components import component_of
 from server.recording.drive.drive_events import Event, text_of
 
 MOST_ALARMS = 5000
+MARKS = {"planned_stop": "planned stop", "shelved": "shelved", "suppressed": "suppressed by another alarm"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,6 +32,8 @@ class AlarmInDrive:
     acknowledged_by: str = ""
     cleared_ms: int | None = None
     planned_stop: bool = False  # it was raised in a planned stop
+    shelved: bool = False  # somebody had it hidden for a time
+    suppressed: bool = False  # another alarm explained it for a time
 
     @property
     def to_acknowledge_s(self) -> float | None:
@@ -47,9 +52,10 @@ def alarms_of(events: Sequence[Event]) -> list[AlarmInDrive]:
         if change == "raised" and len(found) < MOST_ALARMS:
             standing[alarm] = len(found)
             found.append(_raised(alarm, event))
-        elif (place := standing.get(alarm)) is None:
+        if (place := standing.get(alarm)) is None:
             continue
-        elif change == "acknowledged" and found[place].acknowledged_ms is None:
+        found[place] = _hidden(found[place], event.get("state"))
+        if change == "acknowledged" and found[place].acknowledged_ms is None:
             by = text_of(event, "person", 60) or text_of(event, "by", 120)
             found[place] = replace(found[place], acknowledged_ms=event["at_ms"], acknowledged_by=by)
         elif change == "cleared" and found[place].cleared_ms is None:
@@ -57,6 +63,11 @@ def alarms_of(events: Sequence[Event]) -> list[AlarmInDrive]:
             if event.get("state") != "RTN_UNACKED":
                 standing.pop(alarm)
     return found
+
+
+def marks_of(alarm: Mapping[str, Any]) -> str:
+    """What an alarm of a report bears beside its text; empty: nothing."""
+    return " · ".join(words for name, words in MARKS.items() if alarm[name])
 
 
 def percentile(values: Sequence[float], share: float) -> float | None:
@@ -71,6 +82,13 @@ def percentile(values: Sequence[float], share: float) -> float | None:
 def by_component(alarms: Sequence[AlarmInDrive]) -> dict[str, int]:
     """How many alarms of each component, most first."""
     return dict(Counter(alarm.component for alarm in alarms).most_common(40))
+
+
+def _hidden(alarm: AlarmInDrive, state: object) -> AlarmInDrive:
+    """With the mark of the state in which an event left it."""
+    if state == AlarmState.SHELVED:
+        return replace(alarm, shelved=True)
+    return replace(alarm, suppressed=True) if state == AlarmState.SUPPRESSED else alarm
 
 
 def _raised(alarm: str, event: Event) -> AlarmInDrive:

@@ -5,11 +5,11 @@ Times are seconds since the beginning of the drive.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from monitor.drive_trends import BLIND_S
-from server.recording.folder import first_part, id_of, part_number
+from server.recording.folder import id_of
 from server.recording.read.read import Recording
 
 Span = tuple[float, float]
@@ -80,23 +80,3 @@ def outside(span: Span, gaps: Iterable[Span]) -> list[Span]:
             found.append((from_s, gap_from_s))
         from_s = gap_to_s
     return [*found, (from_s, end_s)] if from_s < end_s else found
-
-
-def missing_parts(parts: Sequence[DrivePart], known: Collection[str] = ()) -> list[str]:
-    """Which parts of its sessions are not among them, a sentence each session. `known`: recordings beside them."""
-    found = []
-    parts = [part for part in parts if "clip_of" not in part.metadata]
-    for session in dict.fromkeys(part.session for part in parts if part.session):
-        numbers = {part.number for part in parts if part.session == session and part.number is not None}
-        firsts = {first_part(part.id) for part in parts if part.session == session}
-        beside = {part_number(id) for id in known if first_part(id) in firsts}
-        missing = sorted((set(range(1, max(numbers, default=0))) | beside) - numbers)
-        if missing:
-            named = ", ".join(map(str, missing[:20])) + (f" and {len(missing) - 20} more" if len(missing) > 20 else "")
-            first = next(part.id for part in parts if part.session == session)
-            found.append(
-                f"{'Parts' if len(missing) > 1 else 'Part'} {named} of the drive of {first} "
-                f"{'are' if len(missing) > 1 else 'is'} not in this report: "
-                "not finished, not readable, deleted, or not among its files."
-            )
-    return found

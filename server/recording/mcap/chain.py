@@ -117,6 +117,7 @@ class Head:
     id: str  # of the recording
     number: int
     digest: str  # hex
+    at_ns: int = 0  # of the newest message before it; 0: not known
 
 
 def read_head(path: Path, id: str) -> Head | None:
@@ -126,7 +127,7 @@ def read_head(path: Path, id: str) -> Head | None:
             record = _seal(file) or _last_record(file)
     except OSError:
         return None
-    return None if record is None else Head(id=id, number=record.number, digest=record.digest.hex())
+    return None if record is None else Head(id=id, number=record.number, digest=record.digest.hex(), at_ns=record.at_ns)
 
 
 def _seal(file: IO[bytes]) -> ChainRecord | None:

@@ -88,13 +88,18 @@ class Damage:
 
     def _when(self, origin_ns: int, end_ns: int) -> str:
         """When the lost parts were recorded; nothing where the times that they declare are damaged too."""
-        first_ns, last_ns = min(first for first, _ in self.lost), max(last for _, last in self.lost)
-        slack_ns = max(end_ns - origin_ns, LEAST_SLACK_NS)
-        is_likely = origin_ns - slack_ns <= first_ns <= last_ns <= end_ns + slack_ns
-        is_dated = FIRST_NS <= first_ns <= last_ns < LAST_NS or not FIRST_NS <= origin_ns < LAST_NS
-        if not is_likely or not is_dated:
+        span = min(first for first, _ in self.lost), max(last for _, last in self.lost)
+        if not is_likely(span, origin_ns, end_ns):
             return ""
-        return f", between {(first_ns - origin_ns) / 1e9:.1f} s and {(last_ns - origin_ns) / 1e9:.1f} s,"
+        return f", between {(span[0] - origin_ns) / 1e9:.1f} s and {(span[1] - origin_ns) / 1e9:.1f} s,"
+
+
+def is_likely(span: tuple[int, int], origin_ns: int, end_ns: int) -> bool:
+    """Whether a part of a file that covers this time may have been recorded then."""
+    first_ns, last_ns = span
+    slack_ns = max(end_ns - origin_ns, LEAST_SLACK_NS)
+    is_near = origin_ns - slack_ns <= first_ns <= last_ns <= end_ns + slack_ns
+    return is_near and (FIRST_NS <= first_ns <= last_ns < LAST_NS or not FIRST_NS <= origin_ns < LAST_NS)
 
 
 class FileSource(Protocol):

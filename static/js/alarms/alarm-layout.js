@@ -29,11 +29,12 @@ export { titleOf };
 const PLACE = /** @type {Record<Alarm['state'], number>} */ ({ UNACKED: 0, RTN_UNACKED: 1, ACKED: 2, NORMAL: 2, SHELVED: 3 });
 
 /**
- * The one order of strip, list, dialog, snackbar and log: unacknowledged first, then by danger, then the newest.
+ * The one order of strip, list, dialog, snackbar and log: unacknowledged first, then by danger, then the newest. Of the
+ * acknowledged ones those come first whose owner is off duty.
  * @param {Alarm[]} alarms
  */
 export function byUrgency(alarms) {
-  const place = (/** @type {Alarm} */ { state }) => PLACE[state] ?? PLACE.ACKED;
+  const place = (/** @type {Alarm} */ { state, off_duty_ms }) => (PLACE[state] ?? PLACE.ACKED) - (off_duty_ms ? 0.5 : 0);
   return [...alarms].sort((a, b) => place(a) - place(b) || RANK[b.priority] - RANK[a.priority] || b.raised_ms - a.raised_ms);
 }
 

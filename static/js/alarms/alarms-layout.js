@@ -1,7 +1,7 @@
 // The list of alarms as words: which row stands where, how its state reads, what its keys are, what fits a page of it. Pure functions, no DOM.
 
 import { byUrgency } from './alarm-layout.js';
-import { markWords, snackWords } from './standing.js';
+import { markWords, ownerWords, snackWords } from './standing.js';
 import { ageWords, fixed, timeOfDay } from '../core/format.js';
 import { ICONS } from '../core/priority.js';
 
@@ -9,7 +9,7 @@ import { ICONS } from '../core/priority.js';
  * @typedef {import('../core/protocol-types.js').StandingAlarm} Alarm
  * @typedef {import('../core/protocol-types.js').SuppressedAlarm} Suppressed
  * @typedef {'unacknowledged' | 'returned' | 'acknowledged' | 'shelved' | 'suppressed'} Kind
- * @typedef {'silence' | 'acknowledge' | 'shelve' | 'unshelve'} Key
+ * @typedef {'silence' | 'acknowledge' | 'shelve' | 'unshelve' | 'take_alarm'} Key
  * @typedef {{key: string, id: string, kind: Kind, icon: string, priority: string, title: string, words: string, at: string, state: string, silent: string, keys: Key[], alarm: Alarm | null}} Row
  */
 
@@ -51,7 +51,7 @@ export function keysOf(alarm) {
   const kind = kindOf(alarm);
   if (kind === 'shelved') return ['unshelve'];
   if (kind === 'returned') return ['acknowledge'];
-  if (kind === 'acknowledged') return alarm.actions.includes('shelve') ? ['shelve'] : [];
+  if (kind === 'acknowledged') return [...(alarm.actions.includes('shelve') ? /** @type {Key[]} */ (['shelve']) : []), ...(alarm.off_duty_ms ? /** @type {Key[]} */ (['take_alarm']) : [])];
   return alarm.sound === 'none' || alarm.silenced_until_ms ? ['acknowledge'] : ['silence', 'acknowledge'];
 }
 
@@ -80,7 +80,7 @@ export function comparedWords(measured, limit) {
 /** @param {Suppressed} one @returns {Row} */
 function suppressedRow({ id, title, priority, by, raised_ms }) {
   return {
-    key: `${id} suppressed`, id, kind: 'suppressed', icon: 'unknown', priority, title, words: `cause: ${by.join(', ')}`, at: raised_ms === null ? '' : timeOfDay(raised_ms),
+    key: `${id} suppressed`, id, kind: 'suppressed', icon: 'bell-off', priority, title, words: `cause: ${by.join(', ')}`, at: raised_ms === null ? '' : timeOfDay(raised_ms),
     state: 'suppressed', silent: '', keys: [], alarm: null,
   };
 }
@@ -90,7 +90,7 @@ export function stateWords(alarm) {
   const by = (/** @type {string | null | undefined} */ who) => (who ? ` by ${who}` : '');
   if (alarm.state === 'SHELVED') return `shelved until ${timeOfDay(alarm.shelved_until_ms)}${by(alarm.shelved_by)}`;
   if (alarm.state === 'RTN_UNACKED') return 'returned unacknowledged';
-  return alarm.state === 'ACKED' ? `acknowledged${by(alarm.acknowledged_by)}` : 'unacknowledged';
+  return alarm.state === 'ACKED' ? ownerWords(alarm) : 'unacknowledged';
 }
 
 /** Its state in a list: of one that is acknowledged for how long it has been active, and whether the car stands on purpose. @param {Alarm} alarm */
@@ -104,10 +104,11 @@ export function silentWords({ silenced_until_ms, silenced_by }) {
   return silenced_until_ms ? `silent until ${timeOfDay(silenced_until_ms)}${silenced_by ? ` by ${silenced_by}` : ''}` : '';
 }
 
-/** "3 unacknowledged"; what is shelved or suppressed is not called acknowledged. @param {Row[]} rows */
+/** "3 unacknowledged"; what is shelved, suppressed, or of somebody who is off duty is not called acknowledged. @param {Row[]} rows */
 export function countWords(rows) {
+  const unowned = rows.filter(({ alarm }) => alarm?.off_duty_ms).length;
   const waiting = rows.filter(({ kind }) => kind === 'unacknowledged' || kind === 'returned').length;
-  return waiting ? `${waiting} unacknowledged` : rows.length === 0 ? '' : rows.some(({ kind }) => kind !== 'acknowledged') ? 'none to acknowledge' : 'all acknowledged';
+  return waiting ? `${waiting} unacknowledged` : unowned ? `${unowned} without an owner on duty` : rows.length === 0 ? '' : rows.some(({ kind }) => kind !== 'acknowledged') ? 'none to acknowledge' : 'all acknowledged';
 }
 
 /**

@@ -16,7 +16,7 @@ import { speedUnit, speedWords } from '../core/units.js';
  * @typedef {{element: HTMLElement, words: HTMLElement, state: HTMLElement, meant: Meant, place: number}} Drawn
  */
 
-const LABELS = { silence: 'Silence', acknowledge: 'Acknowledge', shelve: 'Shelve', unshelve: 'Unshelve' };
+const LABELS = { silence: 'Silence', acknowledge: 'Acknowledge', shelve: 'Shelve', unshelve: 'Unshelve', take_alarm: 'Take over' };
 
 /**
  * @param {HTMLElement} root
@@ -196,7 +196,7 @@ class AlarmList {
     return { element, words, state, meant, place: -1 };
   }
 
-  /** @param {'acknowledge' | 'silence' | 'unshelve'} kind @param {Alarm} alarm */
+  /** @param {'acknowledge' | 'silence' | 'unshelve' | 'take_alarm'} kind @param {Alarm} alarm */
   async #command(kind, alarm) {
     setWords(this.parts.says, '');
     const answer = await this.store.ask(kind, { alarm: alarm.id, ...(kind === 'unshelve' ? {} : { occurrence: alarm.occurrence }) });

@@ -20,7 +20,7 @@ import { styled } from '../core/style-sheet.js';
 import { settingsOf } from '../settings/settings-model.js';
 import { SettingsRow } from '../settings/settings-row.js';
 
-const LABELS = { silence: 'Silence', acknowledge: 'Acknowledge', shelve: 'Shelve', unshelve: 'Unshelve' };
+const LABELS = { silence: 'Silence', acknowledge: 'Acknowledge', shelve: 'Shelve', unshelve: 'Unshelve', take_alarm: 'Take over' };
 const MARKS = { ok: 'ok', fault: 'warn', unknown: 'unknown' };
 
 /**

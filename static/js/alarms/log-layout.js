@@ -1,5 +1,7 @@
 // The alarm log as words: how an event reads, what a filter leaves, which day it was. Pure functions, no DOM.
 
+import { rowsOf } from './alarms-layout.js';
+import { standingWords } from './standing.js';
 import { gapWords } from '../core/event-log.js';
 import { age } from '../core/format.js';
 import { unseenWords } from '../core/unseen.js';
@@ -45,8 +47,28 @@ function wordsOf(event) {
   const [mark, kind] = isRise ? MARKS[event.priority ?? 'advisory'] : ['ok', ''];
   return {
     icon: mark ?? 'info', kind: kind ?? '', title: `${event.title ?? event.alarm} ${change}`.trim(),
-    text: [event.text, event.planned_stop ? 'planned stop' : '', event.by ? `by ${event.by}` : ''].filter(Boolean).join(' · '),
+    text: [event.text, hiddenWords(event), event.planned_stop ? 'planned stop' : '', event.by ? `by ${event.by}` : ''].filter(Boolean).join(' · '),
   };
+}
+
+/** Whether nobody was alerted of it because it was shelved, or explained by others. @param {AlarmEvent} event */
+function hiddenWords({ state, change, suppressed_by }) {
+  if (state === 'SHELVED') return change === 'shelved' ? '' : 'while shelved';
+  if (state !== 'SUPPRESSED') return '';
+  return suppressed_by?.includes('paused') ? 'suppressed: monitoring is paused' : 'suppressed by another alarm';
+}
+
+/**
+ * What stands, in the words of the log: who has seen it, then what is suppressed; what is hidden bears its own icon.
+ * @param {import('../core/protocol-types.js').StandingAlarm[]} alarms
+ * @param {import('../core/protocol-types.js').SuppressedAlarm[]} suppressed
+ * @returns {{icon: string, colour: string, title: string, text: string, at: string, kind: string}[]}
+ */
+export function standingRows(alarms, suppressed) {
+  return rowsOf(alarms, suppressed, false).map(({ kind, icon, priority, title, state, alarm, at, words: cause }) => ({
+    icon, colour: kind === 'shelved' || kind === 'suppressed' ? '' : MARKS[/** @type {keyof typeof MARKS} */ (priority)]?.[1] ?? '',
+    title, text: alarm ? standingWords(alarm) : `${state} · ${cause}`, at, kind,
+  }));
 }
 
 /**

@@ -1,10 +1,9 @@
 // The alarm log: what stands and who has seen it, then what happened, newest first, with the times in which this page was blind.
 
-import { MARKS, KINDS, dayWords, eventWords, gapLine, joined, lowest, tookWords } from './log-layout.js';
+import { MARKS, KINDS, dayWords, eventWords, gapLine, joined, lowest, standingRows, tookWords } from './log-layout.js';
 import { html, icon, listen, setAttribute, setText, setWords, show, words } from '../core/dom.js';
-import { byUrgency } from './alarm-layout.js';
 import { OlderEvents, queryOf } from './older-events.js';
-import { loadWords, standingWords } from './standing.js';
+import { loadWords } from './standing.js';
 import { timeOfDay } from '../core/format.js';
 
 /** @typedef {import('../core/event-log.js').Row} Row */
@@ -74,7 +73,7 @@ class AlarmLog {
     const why = frame?.replay ? 'These are the events of the live car. Those of the recording are in the list of its alarms.' : frame?.log_trouble ?? '';
     setWords(trouble, why);
     show(trouble, why !== '');
-    const lines = byUrgency(alarms).map((alarm) => [alarm.title, standingWords(alarm), timeOfDay(alarm.raised_ms), alarm.priority]);
+    const lines = standingRows(alarms, frame?.suppressed ?? []);
     const key = JSON.stringify(lines);
     if (key !== this.#standing) {
       now.replaceChildren(...lines.map(standingRow));
@@ -130,10 +129,9 @@ function build(root) {
   return { inTen, standing, shelved, number, list, now, load, trouble, kinds, find, csv, json, older, note };
 }
 
-/** @param {string[]} line title, words, time of day, priority */
-function standingRow([title = '', text = '', at = '', priority = '']) {
-  const [mark, kind] = MARKS[/** @type {keyof typeof MARKS} */ (priority)] ?? ['info', ''];
-  return html('li', {}, icon(mark ?? 'info', kind ?? ''), html('span', { class: 't' }, ...words(title)), html('span', { class: 'n h' }, at),
+/** @param {ReturnType<typeof standingRows>[number]} row */
+function standingRow({ icon: mark, colour, title, text, at, kind }) {
+  return html('li', { 'data-kind': kind }, icon(mark, colour), html('span', { class: 't' }, ...words(title)), html('span', { class: 'n h' }, at),
     html('span', { class: 'm' }, ...words(text)));
 }
 

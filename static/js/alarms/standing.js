@@ -61,11 +61,16 @@ function bare(sentence) {
   return sentence.replace(/[.!?]$/, '');
 }
 
+/** Who has acknowledged it, and since when they are off duty. @param {Pick<import('../core/protocol-types.js').StandingAlarm, 'acknowledged_by' | 'off_duty_ms'>} alarm */
+export function ownerWords({ acknowledged_by, off_duty_ms }) {
+  return `acknowledged${acknowledged_by ? ` by ${acknowledged_by}` : ''}${off_duty_ms ? `, off duty since ${timeOfDay(off_duty_ms).slice(0, 5)}` : ''}`;
+}
+
 /** @param {import('../core/protocol-types.js').StandingAlarm} alarm */
 function said(alarm) {
   const by = (/** @type {string | null | undefined} */ who) => (who ? ` by ${who}` : '');
   if (alarm.state === 'SHELVED') return `shelved${by(alarm.shelved_by)} until ${timeOfDay(alarm.shelved_until_ms)}`;
-  if (alarm.state === 'ACKED') return `acknowledged${by(alarm.acknowledged_by)}`;
+  if (alarm.state === 'ACKED') return ownerWords(alarm);
   return alarm.state === 'RTN_UNACKED' ? 'returned unacknowledged' : 'unacknowledged';
 }
 

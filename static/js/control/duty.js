@@ -55,16 +55,17 @@ function isSlowing(store) {
   return state === 'ordered' || state === 'holding' || document.querySelector('.slide[data-moves]') !== null;
 }
 
+/** Whether a sheet may open by itself. @param {Store} store */
+function mayAsk(store) {
+  return store.frame !== null && !isSlowing(store) && !document.querySelector('dialog[open]') && !document.documentElement.hasAttribute('data-replay');
+}
+
 /** Asks once in this tab, and never over another sheet: whoever does not want to sign on closes it. @param {Store} store @param {Say} say */
 function asker(store, say) {
   let isAskedHere = false; // or it cannot be, or it is being opened
 
-  function mayAsk() {
-    return store.frame !== null && !isSlowing(store) && !document.querySelector('dialog[open]') && !document.documentElement.hasAttribute('data-replay');
-  }
-
   return async () => {
-    if (isAskedHere || !mayAsk()) return;
+    if (isAskedHere || !mayAsk(store)) return;
     isAskedHere = true;
     try {
       if (sessionStorage.getItem(ASKED)) return;
@@ -72,9 +73,25 @@ function asker(store, say) {
     } catch {
       return; // it cannot be remembered that it was asked
     }
-    const isOpen = await openDuty(store, say, mayAsk);
+    const isOpen = await openDuty(store, say, () => mayAsk(store));
     if (isOpen) sessionStorage.setItem(ASKED, '1');
     isAskedHere = isOpen !== false;
+  };
+}
+
+/** Whoever signs on is shown once what people who are off duty left acknowledged; later it stands in the list of alarms. @param {Store} store @param {Say} say */
+function leftBehind(store, say) {
+  let asked_ms = 0; // since when they are on duty who were shown it
+
+  return () => {
+    const { frame, duty } = store;
+    if (!frame || !duty?.me || duty.me.since_ms === asked_ms || store.isSilent || !mayAsk(store)) return;
+    asked_ms = duty.me.since_ms;
+    if (!frame.alarms.some(({ off_duty_ms }) => off_duty_ms)) return;
+    import('./left-sheet.js').then(({ LeftSheet }) => {
+      if (!mustWait() && mayAsk(store)) new LeftSheet(store);
+      else asked_ms = 0;
+    }).catch(() => say('The alarms that were left behind could not be loaded. They are in the list of alarms.', 'Not opened'));
   };
 }
 
@@ -116,12 +133,14 @@ export function mount(store, say) {
   const showEnded = dutyEndedNotice(store, say);
   const askOnce = asker(store, say);
   const drawHandover = handoverNotice(store, say);
+  const showLeft = leftBehind(store, say);
 
   function draw() {
     const { duty } = store;
     setText(words, dutyWords(duty));
     if (!duty || store.isViewer) return;
     showEnded();
+    showLeft();
     if (!duty.me && duty.people && !duty.ended) void askOnce();
   }
 

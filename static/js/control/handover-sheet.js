@@ -136,7 +136,7 @@ export class HandoverSheet {
 }
 
 /** One line, with its tick. */
-class LineRow {
+export class LineRow {
   mark = icon('info');
   title = html('b', { class: 't' });
   text = html('span', { class: 'm' });

@@ -17,7 +17,7 @@ const NAMES = {
   acknowledge: 'Acknowledge', silence: 'Silence', shelve: 'Shelve', unshelve: 'Unshelve', set: 'Change settings', import: 'Import settings',
   ride: 'Choose the phone in the car', control: 'Change control', arm: 'Arm', disarm: 'Disarm', slow_down: 'Slow down', release: 'Release', veto: 'Veto',
   take_item: 'Take it', release_item: 'Release', offer_item: 'Hand over', answer_item: 'Answer', withdraw_item: 'Withdraw',
-  offer_control: 'Hand over', read_back: 'Confirm', accept_control: 'Take control', end_offer: 'End the hand-over',
+  offer_control: 'Hand over', read_back: 'Confirm', take_alarm: 'Take over', end_planned_stop: 'End stop', accept_control: 'Take control', end_offer: 'End the hand-over',
 };
 
 /** Whether a sentence is on a command of which it is not known. @param {string} sentence */

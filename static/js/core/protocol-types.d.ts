@@ -194,6 +194,8 @@ export interface CarSummary {
   worst: CarAlarm | null;
   /** alarms that nobody has acknowledged */
   waiting: number;
+  /** acknowledged alarms without an owner on duty; null: none */
+  unowned?: Unowned | null;
   speed: CarSpeed;
   /** name of who is in control; null: nobody */
   holder: string | null;
@@ -837,6 +839,8 @@ export interface HandoverLine {
   /** of an alarm */
   priority: Priority | null;
   since_ms: number | null;
+  /** of an acknowledged alarm: when the duty of its owner ended; null: it goes on */
+  off_duty_ms?: number | null;
   /** of what is shelved */
   until_ms: number | null;
   /** who takes over has confirmed it */
@@ -1442,7 +1446,7 @@ export interface PageHello {
   page?: string;
 }
 
-export type PageMessage = PageHello | Take | Have | Watch | OpenReplay | OpenBeside | CloseBeside | LeaveReplay | SeekReplay | PlayReplay | PauseReplay | SetReplayRate | SeekReplayAlarm | ConnectCommand | RetryCommand | DisconnectCommand | PauseCommand | ResumeCommand | RecordCommand | AcknowledgeCommand | SilenceCommand | ShelveCommand | UnshelveCommand | SetCommand | ImportCommand | PositionCommand | RideCommand | TakeControlCommand | TakeItemCommand | ReleaseItemCommand | OfferItemCommand | AnswerItemCommand | WithdrawItemCommand | OfferControlCommand | ReadBackCommand | AcceptControlCommand | EndOfferCommand | PlaceMarkCommand | RemoveMarkCommand | BeginDepartureCommand | SetDepartureItemCommand | SignDepartureCommand | ReopenDepartureCommand | SetDepartureListCommand | ArmCommand | DisarmCommand | DecelerateCommand | ReleaseCommand | VetoCommand | DescribeInterventionCommand | BeginPlannedStopCommand | EndPlannedStopCommand | PresentWordCommand | AskOutcomeCommand;
+export type PageMessage = PageHello | Take | Have | Watch | OpenReplay | OpenBeside | CloseBeside | LeaveReplay | SeekReplay | PlayReplay | PauseReplay | SetReplayRate | SeekReplayAlarm | ConnectCommand | RetryCommand | DisconnectCommand | PauseCommand | ResumeCommand | RecordCommand | AcknowledgeCommand | SilenceCommand | ShelveCommand | UnshelveCommand | SetCommand | ImportCommand | PositionCommand | RideCommand | TakeControlCommand | TakeItemCommand | ReleaseItemCommand | OfferItemCommand | AnswerItemCommand | WithdrawItemCommand | OfferControlCommand | ReadBackCommand | AcceptControlCommand | EndOfferCommand | TakeAlarmCommand | PlaceMarkCommand | RemoveMarkCommand | BeginDepartureCommand | SetDepartureItemCommand | SignDepartureCommand | ReopenDepartureCommand | SetDepartureListCommand | ArmCommand | DisarmCommand | DecelerateCommand | ReleaseCommand | VetoCommand | DescribeInterventionCommand | BeginPlannedStopCommand | EndPlannedStopCommand | PresentWordCommand | AskOutcomeCommand;
 
 /** An operator's page that announces the alarms of this car. */
 export interface PagePerson {
@@ -2446,6 +2450,8 @@ export interface StandingAlarm {
   actions: Array<Action>;
   advice: string;
   acknowledged_by: string | null;
+  /** when the duty of who acknowledged it ended; null: it goes on, or nobody signed on */
+  off_duty_ms?: number | null;
   shelved_until_ms: number | null;
   shelved_by: string | null;
   /** no sound until then; null: it sounds while it is unacknowledged */
@@ -2593,6 +2599,17 @@ export interface Take {
   got?: number;
 }
 
+/** Makes who sends it the owner of an acknowledged alarm; refused unless the duty of its owner has ended. */
+export interface TakeAlarmCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "take_alarm";
+  alarm: string;
+  /** which occurrence was read; an older one is refused */
+  occurrence: number;
+}
+
 /** Takes, gives or requests control; server/control/lease.py says who may do what. */
 export interface TakeControlCommand {
   id?: string | null;
@@ -2733,6 +2750,15 @@ export interface Trends {
 export interface UnitChoice {
   name: string;
   label: string;
+}
+
+/** Alarms that were acknowledged by people whose duty has ended since. */
+export interface Unowned {
+  count: number;
+  /** whose duty ended first */
+  by: string;
+  /** when it ended */
+  since_ms: number;
 }
 
 /** Of web nodes, twice a second while nothing comes from the vehicle's session; over with the next state. */

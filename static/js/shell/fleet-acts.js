@@ -82,6 +82,16 @@ export class FleetActs {
     this.onChange();
   }
 
+  /** A planned stop ends as by the key on the car's own page: its alarms sound again. @param {string} vehicle @param {HTMLElement} key */
+  async endStop(vehicle, key) {
+    if (this.store.isViewer) return this.say(WHY, 'A viewer can only watch');
+    setAttribute(key, 'data-busy', true);
+    const answer = await this.store.ask('end_planned_stop', { vehicle });
+    setAttribute(key, 'data-busy', null);
+    if (!answer.ok) this.say(`${vehicle}: ${answer.reason ?? 'The server did not say why.'}`, 'Not ended');
+    return undefined;
+  }
+
   /** @param {string} name */
   open(name) {
     location.assign(addressOf(name));

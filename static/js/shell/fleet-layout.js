@@ -3,7 +3,7 @@
 import { titleOf } from '../alarms/alarm-title.js';
 import { counted, duration, timeOfDay } from '../core/format.js';
 import { ICONS, RANK } from '../core/priority.js';
-import { requestItem, supervisorWords } from './fleet-requests.js';
+import { requestItem, supervisorWords, unownedWords } from './fleet-requests.js';
 import { speedWords } from '../core/units.js';
 
 /**
@@ -35,6 +35,7 @@ import { speedWords } from '../core/units.js';
  * @property {string} cause cars with one cause are one item in a flood
  * @property {number} raised_s for so long
  * @property {boolean} isUnassigned
+ * @property {boolean} [isUnowned] who has acknowledged an alarm of it is off duty
  * @property {boolean} [isOff] a person said that it is off on purpose: it is in no count
  * @property {import('../core/protocol-types.js').Sound} sound of an alarm that nobody has, or of a car that fell silent
  *
@@ -123,11 +124,11 @@ function itemOf(name, summary, seen) {
   const said = isCut ? lastWords(summary.speed.value_mps, summary.link.car_age_s ?? summary.link.bridge_age_s, seen) : worst?.text ?? '';
   return {
     key: name, cars: [name], name, icon: isCut ? 'link-off' : worst ? ICONS[worst.priority] : 'info', kind: worst ? KIND[worst.priority] : 'warn',
-    isFilled: Boolean(worst?.active && isAsking), title: worst ? titleOf(worst) : 'Needs a person', detail: `${said}${more}`.replace(/^, /, ''),
+    isFilled: Boolean(worst?.active && isAsking), title: worst ? titleOf(worst) : 'Needs a person', detail: [`${said}${more}`.replace(/^, /, ''), unownedWords(summary)].filter(Boolean).join('; '),
     since_s: Math.max(0, (seen.now_ms - since_ms) / 1000),
     who: whoOf(summary, seen.page), next: nextOf(summary, seen.now_ms), timer, keys: keysOf(summary, seen),
     order: [...stepOf(summary, seen), -(worst ? RANK[worst.priority] : 0), raised_s],
-    cause: worst?.id ?? '', raised_s, isUnassigned,
+    cause: worst?.id ?? '', raised_s, isUnassigned, isUnowned: Boolean(summary.unowned),
     sound: isUnassigned && worst?.state === 'UNACKED' ? worst.sound : 'none',
   };
 }
@@ -215,11 +216,11 @@ function whoOf({ attention, worst }, page) {
 }
 
 /** Escalated first, then by the time left; a question to this page before what nobody has, then what somebody has. @param {CarSummary} summary @param {Seen} seen @returns {[number, number]} */
-function stepOf({ attention, worst }, seen) {
+function stepOf({ attention, worst, unowned }, seen) {
   if (attention && attention.escalated_ms !== null) return [0, attention.escalated_ms - seen.now_ms];
   if (attention && attention.escalates_ms !== null) return [1, attention.escalates_ms - seen.now_ms];
   if (attention?.offered?.page === seen.page) return [3, 0];
-  return [attention?.assigned || worst?.state === 'ACKED' ? 5 : 4, 0];
+  return [attention?.assigned || (worst?.state === 'ACKED' && !unowned) ? 5 : 4, 0];
 }
 
 /** @param {Act} act @param {boolean} [isMain] @param {string} [label] @returns {Key} */

@@ -76,7 +76,7 @@ export class Queue {
   /** Pages are measured anew where an item came, went or has other keys. @param {Item[]} items */
   #lay(items) {
     const isPaged = this.isPaged();
-    const key = `${isPaged} ${this.list.clientHeight} ${items.map((item) => `${item.key} ${item.keys.length} ${item.timer !== null} ${item.detail !== ''}`).join('|')}`;
+    const key = `${isPaged} ${this.list.clientHeight} ${items.map((item) => `${item.key} ${item.keys.length} ${item.timer !== null} ${item.detail !== ''} ${item.isUnowned === true}`).join('|')}`;
     if (key !== this.#laid) {
       this.#laid = key;
       if (isPaged) this.pager.lay();
@@ -137,6 +137,7 @@ class ItemView {
     setAttribute(element, 'data-filled', item.isFilled);
     setAttribute(element, 'data-who', item.who.is);
     setAttribute(element, 'data-up', item.timer?.isUp);
+    setAttribute(element, 'data-unowned', item.isUnowned);
     setIcon(this.mark, item.icon);
     setText(this.name, item.name);
     setText(this.since, item.since_s === null ? '–' : duration(item.since_s));

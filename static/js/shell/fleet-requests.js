@@ -1,6 +1,6 @@
 // Who is called next for an item, and who asks for control of a car that another has: pure functions for the attention queue.
 
-import { counted, duration } from '../core/format.js';
+import { counted, duration, timeOfDay } from '../core/format.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').AttentionItem} AttentionItem
@@ -18,6 +18,11 @@ export function supervisorWords({ escalated_ms, escalates_ms, supervisors }, now
   if (escalates_ms === null) return '';
   const left = duration(Math.ceil(Math.max(0, escalates_ms - now_ms) / 1000));
   return names === '' ? `Supervisor in ${left}: none on duty` : `${names ?? 'Supervisor'} in ${left}`;
+}
+
+/** What people who are off duty by now left acknowledged. @param {CarSummary} summary @returns {string} '' where nothing is left so */
+export function unownedWords({ unowned }) {
+  return unowned ? `${unowned.count > 1 ? `${unowned.count} alarms ` : ''}acknowledged by ${unowned.by}, off duty since ${timeOfDay(unowned.since_ms).slice(0, 5)}` : '';
 }
 
 /**

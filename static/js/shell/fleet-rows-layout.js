@@ -28,6 +28,7 @@ import { age, counted, fixed, timeOfDay } from '../core/format.js';
  * @property {{ink: Freshness, text: string}} energy
  * @property {string} age in seconds; a dash where it is not connected
  * @property {boolean} isQuiet nothing asks for a person
+ * @property {boolean} isStopped it is in a planned stop, which can be ended here
  *
  * @typedef {{kind: 'crit' | 'warn' | '', icon: string, text: string, end: string, more: string, isFilled: boolean}} Line more: left out where there is no room
  */
@@ -63,18 +64,19 @@ export function carRows(seen, needing, isSilent) {
     const value_mps = row.speed.value_mps ?? kept?.speed.value_mps ?? null;
     const percent = (lost ? kept : car.summary)?.energy_percent ?? null;
     const text = isSilent ? 'not known now' : isNew ? 'No data yet' : isOff ? 'Off on purpose' : lost ? 'No data' : row.worst ? row.text.replace(/, ([\d:.,]+ s|acknowledged)(?=$| \+)/, '') : row.icon === 'ok' ? '–' : row.text.replace(/:.*/, '');
+    const before = !lost && car.summary?.unowned ? 'owner off duty' : '';
     const stop = !lost && car.summary?.planned_stop ? 'planned stop' : '';
     const was = kept ? kept.holder : '';
     return {
       key: row.name, name: row.name, cars: [row.name],
       icon: isSilent || isNew ? 'unknown' : row.worst && isCut ? 'link-off' : row.icon,
-      kind: isSilent || isNew ? '' : row.kind, isAsking: !isSilent && !isNew && row.kind !== '' && row.needs, isLost: lost && !isOff, text: stop ? [text, stop].filter((part) => part !== '–').join(' · ') : text,
+      kind: isSilent || isNew ? '' : row.kind, isAsking: !isSilent && !isNew && row.kind !== '' && row.needs, isLost: lost && !isOff, text: before || stop ? [before, text, stop].filter((part) => part && part !== '–').join(' · ') : text,
       chain: lost ? NO_CHAIN : row.chain ?? NO_CHAIN, speed: { ink: value_mps === null ? 'never' : ink, value_mps },
       mode: modeOf(lost ? 'stale' : ink, row.speed.value_mps),
       operator: lost ? `${was ?? 'No one'}?` : row.operator,
       recording: lost ? 'not known' : row.recording, isRecording: !lost && /^\d/.test(row.recording),
       energy: { ink: /** @type {Freshness} */ (percent !== null && (lost || isCut) ? 'stale' : 'fresh'), text: fixed(percent, 0) },
-      age: lost ? age(ageOf(car, seen.lag_s)) : row.age.replace(' s', ''), isQuiet: !places.has(row.name),
+      age: lost ? age(ageOf(car, seen.lag_s)) : row.age.replace(' s', ''), isQuiet: !places.has(row.name), isStopped: !lost && Boolean(car.summary?.planned_stop),
     };
   });
   if (isSilent) return rows.sort((a, b) => natural(a.name, b.name));
@@ -113,7 +115,7 @@ export function foldedRows(rows, folded, unfolded) {
       ...row, key: item.key, name: item.name, cars: item.cars, text: `${item.title.replace(/: cars.*/, '')}: ${item.detail}`,
       speed: { ink: 'fresh', value_mps: null }, energy: { ink: 'fresh', text: '–' }, mode: one(all.map(({ mode }) => mode)) ?? 'unknown',
       operator: one(all.map(({ operator }) => operator)) ?? counted(holders, 'person', 'people'), isRecording: all.every(({ isRecording }) => isRecording),
-      recording: '', chain: one(all.map(({ chain }) => chain.cut)) === undefined ? NO_CHAIN : row.chain,
+      recording: '', isStopped: false, chain: one(all.map(({ chain }) => chain.cut)) === undefined ? NO_CHAIN : row.chain,
     });
     if (unfolded.has(item.key)) shown.push(...all);
   }

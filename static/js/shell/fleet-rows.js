@@ -4,6 +4,7 @@ import { drawChain } from './chain.js';
 import { arrange } from './fleet-queue.js';
 import { field, html, icon, listen, setAttribute, setIcon, setText, setWords, show, svg } from '../core/dom.js';
 import { write } from '../core/ink.js';
+import { Meant } from '../core/meant.js';
 import { speedUnit, speedWords } from '../core/units.js';
 
 /**
@@ -23,9 +24,10 @@ export class Rows {
   #rows = [];
   #aPage = 16;
 
-  /** @param {HTMLElement} root @param {(row: Row) => void} press */
-  constructor(root, press) {
+  /** @param {HTMLElement} root @param {(row: Row) => void} press @param {(name: string, key: HTMLElement) => void} endStop */
+  constructor(root, press, endStop) {
     this.press = press;
+    this.endStop = endStop;
     this.body = field(root, 'body');
     this.unit = field(root, 'speed-unit');
     this.pager = field(root, 'rows-pager');
@@ -45,10 +47,10 @@ export class Rows {
     const from = this.#page * aPage;
     const shown = rows.slice(from, from + aPage);
     setText(this.unit, speedUnit());
-    const views = shown.map((row) => {
-      const view = this.#views.get(row.key) ?? new RowView(() => this.press(view.row));
+    const views = shown.map((row, i) => {
+      const view = this.#views.get(row.key) ?? new RowView(() => this.press(view.row), this.endStop);
       this.#views.set(row.key, view);
-      view.draw(row);
+      view.draw(row, i);
       return view.element;
     });
     arrange(this.body, views);
@@ -72,7 +74,8 @@ class RowView {
   mark = icon('ok');
   markWords = html('span', { class: 'unseen' });
   link = html('a');
-  text = html('td', { class: 'al' });
+  text = html('span');
+  end = html('button', { type: 'button', class: 'key', 'data-act': 'end-stop', hidden: true });
   chain = svg('svg', { class: 'chain', viewBox: '0 0 84 24', role: 'img' });
   speed = html('span', { class: 'n' });
   mode = html('td', { class: 'mo' });
@@ -83,12 +86,19 @@ class RowView {
   age = html('span', { class: 'n' });
   /** @type {Row} */
   row = /** @type {any} */ (null);
+  #index = -1;
+  #meant = new Meant();
 
-  /** @param {() => void} press */
-  constructor(press) {
+  /** @param {() => void} press @param {(name: string, key: HTMLElement) => void} endStop */
+  constructor(press, endStop) {
     const cell = (/** @type {string} */ name, /** @type {(Node | string)[]} */ ...inside) => html('td', { class: name }, ...inside);
-    this.element = html('tr', {}, cell('mk', this.mark, this.markWords), html('th', { class: 'nm', scope: 'row' }, this.link), this.text, cell('ch', this.chain),
+    this.element = html('tr', {}, cell('mk', this.mark, this.markWords), html('th', { class: 'nm', scope: 'row' }, this.link), cell('al', html('div', {}, this.text, this.end)), cell('ch', this.chain),
       cell('sp', this.speed), this.mode, this.operator, cell('rc', this.rec, this.recWords), cell('en', this.energy), cell('ag', this.age));
+    this.#meant.element = this.end;
+    this.end.addEventListener('click', (event) => {
+      event.stopPropagation();
+      if ((event.detail === 0 || this.#meant.by(event)) && !this.end.hasAttribute('data-busy')) endStop(this.row.name, this.end);
+    });
     this.element.addEventListener('click', (event) => {
       const isPlain = !(event.metaKey || event.ctrlKey || event.shiftKey || event.button);
       if (event.target === this.link && (!isPlain || this.row.cars.length === 1)) return; // the browser follows it
@@ -97,9 +107,14 @@ class RowView {
     });
   }
 
-  /** @param {Row} row */
-  draw(row) {
+  /** @param {Row} row @param {number} index */
+  draw(row, index) {
     this.row = row;
+    if (this.#index !== index || this.end.hidden === row.isStopped) this.#meant.moved();
+    this.#index = index;
+    show(this.end, row.isStopped);
+    setText(this.end, row.isStopped ? 'End stop' : '');
+    setAttribute(this.end, 'aria-label', `End the planned stop: ${row.name}`);
     const { element, link } = this;
     setAttribute(element, 'data-car', row.key);
     setAttribute(element, 'data-kind', row.kind || null);

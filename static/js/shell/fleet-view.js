@@ -47,7 +47,7 @@ export class FleetView {
     this.none = one('none');
     this.log = { root: one('log'), list: one('events') };
     this.queue = new Queue(root, (act, item, key) => void acts.do(act, item, key), () => this.#wide.matches);
-    this.rows = new Rows(root, (row) => (row.cars.length === 1 ? acts.open(row.name) : acts.unfold(row.key)));
+    this.rows = new Rows(root, (row) => (row.cars.length === 1 ? acts.open(row.name) : acts.unfold(row.key)), (name, key) => void acts.endStop(name, key));
     this.places = new Places(root);
     this.map = new FleetMap(root, (name) => acts.open(name));
     this.lost = new LostPanel(root, (name, key) => void acts.turn('off', name, key));

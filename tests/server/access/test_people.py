@@ -121,6 +121,12 @@ async def test_pages_of_this_machine_are_told_apart_and_told_at_once(tmp_path: P
     async with serving(config) as base, http_client(base_url=base) as client:  # a restart
         found = (await client.get("/api/people", headers={"x-catgraph-page": "page-one"})).json()
         assert found["me"]["name"] == name
+        assert (await client.delete("/api/duty", headers=own)).is_success
+    kept = tomllib.loads((tmp_path / "people/people.toml").read_text())["people"]
+    (off_ms,) = (one["off_ms"] for one in kept if one["name"] == name)
+    async with serving(config) as base, http_client(base_url=base) as client:  # and again
+        found = (await client.get("/api/people", headers=own)).json()
+        assert People(tmp_path, wall_ms=lambda: off_ms).sent(None)["duties"] == {name: off_ms}
         assert len(found["people"]) == len(HOSTILE)
 
 

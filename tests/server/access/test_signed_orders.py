@@ -84,6 +84,7 @@ async def test_who_signed_it_gave_it_whatever_the_node_says() -> None:
         "page": PAGE,
         "person": None,
         "supervisors": None,
+        "duties": None,
         "console": False,
         "replaying": None,
     }
@@ -99,10 +100,15 @@ async def test_who_is_on_duty_is_who_was_signed_and_not_who_the_node_or_the_comm
     message = agent.signed()
     challenge = agent.orders.challenge()
     message["signed"] = ANN.sign(said, vehicle="ocelot", by="Ann", challenge=challenge, page=PAGE, person=named)
-    stated = {"person": {"name": "M. R.", "role": "supervisor", "device": "d1"}, "supervisors": ["J. D."]}
+    stated = {
+        "person": {"name": "M. R.", "role": "supervisor", "device": "d1"},
+        "supervisors": ["J. D."],
+        "duties": {"J. D.": None},
+    }
     found = await agent.orders.admit("ocelot", message | stated)
     assert found["person"] == {"name": "A. K.", "role": "operator", "device": "d1"}
     assert found["supervisors"] == ["J. D."]
+    assert found["duties"] == {"J. D.": None}, "as the node says; it gives nobody a right"
     message = agent.signed() | stated  # signed where nobody is on duty
     assert (await agent.orders.admit("ocelot", message))["person"] is None
 

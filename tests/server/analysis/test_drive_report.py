@@ -10,7 +10,7 @@ import re
 import zipfile
 from dataclasses import asdict
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import pytest
 
@@ -98,6 +98,7 @@ def test_a_planned_stop_is_in_it_with_its_times_its_reason_and_who(tmp_path: Pat
     own = [
         logged(10.0, "planned_stop", reason="workshop", by=EVIL),
         logged(12.0, "raised", "gps_drift", text="0.4 m", state="UNACKED", planned_stop="workshop"),
+        logged(13.0, "shelved", "gps_drift", state="SHELVED"),
         logged(70.0, "planned_stop_ended", reason="workshop", text="The planned stop ended.", by="M. R. (Tablet)"),
         logged(100.0, "planned_stop", reason="parked", by="M. R. (Tablet)"),
     ]
@@ -111,10 +112,11 @@ def test_a_planned_stop_is_in_it_with_its_times_its_reason_and_who(tmp_path: Pat
     for said in (
         f"22:13:30 In the workshop, by {EVIL} {ended} 60.0 s",
         "22:15:00 Parked, by M. R. (Tablet) it was in force to the end 20.0 s",
-        "planned stop · 0.4 m",
+        "planned stop · shelved · 0.4 m",
     ):
         assert " ".join(said.split()) in words, said
     rows = list(csv.reader(io.StringIO((tmp_path / "report.csv").read_text(encoding="utf-8"), newline="")))
+    assert [row[7] for row in rows if row[0] == "alarm"] == ["0.4 m · planned stop · shelved"]
     stops = [row for row in rows if row[0] == "planned stop"]
     assert [row[3:] for row in stops] == [
         ["in the workshop", "", "", EVIL, ended],
@@ -190,8 +192,63 @@ def test_the_last_part_is_named_while_its_file_is_there(tmp_path: Path, where: s
         write_report_json(recording, tmp_path / "report.json", name="drive")
         outcome = write_forms(recording, tmp_path / "forms.zip")
     (said,) = json.loads((tmp_path / "report.json").read_text())["parts_missing"]
-    assert said.startswith("Part 3 of the drive of s1 is not in this report")
+    what = "No record here" if where.endswith(".damaged") else "Not in this report"
+    assert said.startswith(f"{what} from 22:16:50 on: Part 3 of the drive of s1 is not in this report")
     assert said in outcome.notices
+
+
+def test_a_time_without_a_record_is_never_said_to_be_without_alarms(tmp_path: Path) -> None:
+    own: dict[str, Any] = {"length_s": 10.0, "session": "s1"}
+    first = recorded(tmp_path, [], name="s1.mcap", **own)
+    third = recorded(tmp_path, [], name="s1_p3.mcap", from_s=48.0, part="3", **own)
+    with open_recording([first, third]) as recording:
+        write_drive_page(recording, tmp_path / "page.html", name="drive")
+        write_report_json(recording, tmp_path / "report.json", name="drive")
+        write_report_csv(recording, tmp_path / "report.csv", name="drive")
+    text = words_of(tmp_path / "page.html")
+    assert "Alarms, time to acknowledge none in what was recorded" in text
+    assert "Missing: part 2 see data lost" in text, "no chain that is intact stands alone"
+    assert "No record here from 22:13:30 to 22:14:08: whether there were alarms is not known." in text
+    assert "No record here from 22:13:30 to 22:14:08: Part 2 of the drive of s1 is not in this report" in text
+    (one,) = json.loads((tmp_path / "report.json").read_text())["no_record"]
+    assert (one["from_ms"] - BEGIN_MS, one["to_ms"] - BEGIN_MS, one["parts"]) == (10_000, 48_000, [2])
+    rows = list(csv.reader(io.StringIO((tmp_path / "report.csv").read_text(encoding="utf-8"), newline="")))
+    (row,) = (row for row in rows if row[0] == "no record here")
+    assert row[1:3] == ["2023-11-14T22:13:30.000000Z", "2023-11-14T22:14:08.000000Z"]
+    (tmp_path / "alone").mkdir()
+    alone = recorded(tmp_path / "alone", [], name="s1.mcap", **own)
+    with open_recording([alone]) as recording:
+        write_drive_page(recording, tmp_path / "whole.html", name="drive")
+    text = words_of(tmp_path / "whole.html")
+    assert "Alarms, time to acknowledge none" in text
+    assert "No record" not in text
+
+
+@pytest.mark.parametrize("has_next", [False, True])
+def test_a_part_without_its_end_is_a_time_without_a_record(tmp_path: Path, has_next: bool) -> None:
+    first = recorded(tmp_path, [], name="s1.mcap", length_s=60.0, session="s1")
+    raw = first.read_bytes()
+    first.write_bytes(raw[: len(raw) * 2 // 3])
+    paths = [first]
+    if has_next:
+        paths.append(recorded(tmp_path, [], name="s1_p2.mcap", from_s=90.0, length_s=10.0, session="s1", part="2"))
+    with open_recording(paths) as recording:
+        write_drive_page(recording, tmp_path / "page.html", name="drive")
+        write_report_json(recording, tmp_path / "report.json", name="drive")
+        cut_ms = round(recording.files[0].end_ns / 1e6)
+    text = words_of(tmp_path / "page.html")
+    assert "Alarms, time to acknowledge none in what was recorded" in text
+    (one,) = json.loads((tmp_path / "report.json").read_text())["no_record"]
+    assert BEGIN_MS + 10_000 < one["from_ms"] < BEGIN_MS + 50_000
+    assert one["from_ms"] == pytest.approx(cut_ms, abs=1)
+    assert one["to_ms"] == (BEGIN_MS + 90_000 if has_next else None)
+
+
+def test_where_a_file_lacks_more_than_a_time_nothing_is_said_to_be_none(tmp_path: Path) -> None:
+    whole: dict[str, Any] = {"no_record": [], "damage": [], "chain": [{"is_broken": False}]}
+    assert not sheet._is_partial(whole)
+    for name, value in (("no_record", [{}]), ("damage", ["s1_p2.mcap is missing"]), ("chain", [{"is_broken": True}])):
+        assert sheet._is_partial(whole | {name: value}), name
 
 
 def words_of(path: Path) -> str:

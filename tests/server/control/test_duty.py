@@ -8,7 +8,16 @@ import pytest
 
 from monitor.runner import Refused
 from server.control.authorization import Caller
-from server.control.duty import HOUR_MS, LONGEST_NAME, MOST_PEOPLE, NOTE_LASTS_MS, DutyBoard, OnDuty, person_name
+from server.control.duty import (
+    HOUR_MS,
+    LONGEST_NAME,
+    MOST_PEOPLE,
+    NOTE_LASTS_MS,
+    OFF_STATED_MS,
+    DutyBoard,
+    OnDuty,
+    person_name,
+)
 
 
 @pytest.fixture
@@ -140,3 +149,19 @@ def test_an_order_is_signed_by_the_person_at_the_device(person: Any, name: str) 
     caller = Caller.of({"by": "Desk", "person": person})
     assert (caller.name, caller.device) == (name, "Desk")
     assert (caller.person is not None) == (name != "Desk")
+
+
+def test_cars_are_told_who_is_on_duty_and_when_the_duty_of_others_ended(board: DutyBoard) -> None:
+    assert board.stated(500) == {}
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    board.sign_on("desk", "Desk", "mr", None, 2000)
+    assert board.stated(2000) == {"A. K.": None, "M. R.": None}
+    board.sign_off("phone", 3000)
+    assert board.stated(3000) == {"A. K.": 3000, "M. R.": None}
+    board.sign_on("desk", "Desk", "ak", None, 4000)  # instead of who was on duty there
+    assert board.stated(4000) == {"A. K.": None, "M. R.": 4000}
+    board.sign_on("phone", "Pixel 7", "ak", None, 5000, moves=True)
+    assert board.stated(5000) == {"A. K.": None, "M. R.": 4000}
+    board.advance(5000 + 12 * HOUR_MS)
+    assert board.stated(5000 + 12 * HOUR_MS) == {"A. K.": 5000 + 12 * HOUR_MS, "M. R.": 4000}
+    assert board.stated(4000 + OFF_STATED_MS) == {"A. K.": 5000 + 12 * HOUR_MS}

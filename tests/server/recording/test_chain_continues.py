@@ -156,7 +156,9 @@ def test_a_recording_that_was_made_anew_is_not_the_one_that_the_next_one_names(t
     assert main(["verify", str(first)]) == 1
     assert main(["verify", str(second)]) == 1
     first.unlink()
-    assert compare(second, Beside(second.parent)).missing == "car_1"
+    gone = compare(second, Beside(second.parent)).missing
+    assert gone is not None
+    assert gone.id == "car_1"
     assert main(["verify", str(second)]) == 0, "it was deleted, or is kept elsewhere"
 
 

@@ -19,6 +19,7 @@ from mcap.writer import Writer
 from server.cli.main import main
 from server.recording.mcap.chain import DATA_END_BYTES, RECORD_BYTES, ChainWriter, parsed, read_head
 from server.recording.read.read import open_recording
+from server.recording.verification import verification
 from server.recording.verify import verify
 from tests.server.recording.chained import change, closed, drive, recovered
 
@@ -199,6 +200,69 @@ def test_a_record_holds_what_was_put_into_it() -> None:
 
 
 # -- the command -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("how", ["gone", "zeroed", "damaged"])
+def test_a_recording_that_is_destroyed_is_named_with_its_time(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], how: str
+) -> None:
+    begun = ("22:13:20", "22:14:00", "22:15:00", "22:16:00")
+    paths = [
+        drive(tmp_path, n, started_ms=str(AT_NS // 10**6 + 60_000 * (n - 1))) for n, _ in enumerate(begun, start=1)
+    ]
+    third = paths[2]
+    records = verify(third).records
+    if how == "zeroed":
+        third.write_bytes(bytes(third.stat().st_size))
+    elif how == "damaged":
+        third.rename(third.with_name("car_3.mcap.damaged"))
+    else:
+        third.unlink()
+    code = main(["verify", str(tmp_path)])
+    lines = dict(line.split(": ", 1) for line in capsys.readouterr().out.splitlines())
+    time = "ecorded between 2023-11-14 22:13:20.020 and 2023-11-14 22:16:20.000 UTC"
+    if how == "zeroed":
+        assert lines[str(third)].endswith(
+            f"car_4 names it as the recording before it ({records} records): it is destroyed. R{time}."
+        )
+        assert code == 1
+    else:
+        gone = f"Not in this folder: the recording before it, car_3 ({records} records) (r{time})."
+        damaged = f"The recording before it, car_3 ({records} records), cannot be read. R{time}."
+        assert lines[str(paths[3])].endswith(damaged if how == "damaged" else gone)
+        assert code == 0, "what is there is as it was recorded"
+
+
+def test_parts_that_nothing_names_are_named_too(tmp_path: Path) -> None:
+    first, last = tmp_path / "car_1.mcap", tmp_path / "car_1_p4.mcap"
+    closed(first, [[1], [2]])
+    closed(last, [[3]], previous="car_1_p3", previous_record="7", previous_head="ab" * 32)
+    assert verification(last).sentence.endswith(
+        "Not in this folder: the recording before it, car_1_p3 (7 records), car_1_p2 "
+        "(recorded after 2023-11-14 22:13:20.020 UTC)."
+    )
+
+
+@pytest.mark.parametrize(
+    "previous", ["../car_1", "car_1/x", "car_" + "9" * 5000, "x" * 300, "car_0_p99999999999", "a\0b", ""]
+)
+def test_a_damaged_name_of_the_one_before_stops_no_verification(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], previous: str
+) -> None:
+    path, other = tmp_path / "car_1.mcap", tmp_path / "car_2.mcap"
+    closed(path, [[1], [2]], previous=previous, previous_record="7", previous_head="ab" * 32)
+    closed(other, [[3]])
+    assert main(["verify", str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(": ")[0] for line in lines] == [str(path), str(other)]
+    assert len(max(lines, key=len)) < 2000
+
+
+def test_a_cut_tail_says_since_when(tmp_path: Path) -> None:
+    path = tmp_path / "car_1.mcap"
+    raw = closed(path, [[100]] * 6)
+    path.write_bytes(raw[: len(raw) * 2 // 3])
+    assert re.search(r"after 2023-11-14 22:13:20\.0\d0 UTC is missing", verify(path).sentence)
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

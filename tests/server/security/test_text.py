@@ -108,7 +108,7 @@ def test_the_kinds_of_a_page_are_a_table() -> None:
         "veto",
     } | {"answer_item", "offer_item", "release_item", "take_item", "withdraw_item"} | {
         "accept_control", "end_offer", "offer_control", "outcome", "read_back", "mark", "remove_mark",
-        "describe_intervention", "planned_stop", "end_planned_stop",
+        "describe_intervention", "take_alarm", "planned_stop", "end_planned_stop",
     } | {
         "begin_departure", "reopen_departure", "set_departure_item", "set_departure_list", "sign_departure",
     }  # fmt: skip

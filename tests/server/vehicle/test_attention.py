@@ -209,7 +209,12 @@ async def test_what_is_no_command_changes_nothing(command: dict[str, Any]) -> No
 
 
 def test_items_need_no_control_and_are_commands_of_the_page_of_all_cars() -> None:
-    assert {kind for kind, one in BY_KIND.items() if one.from_fleet} == {*ITEM, "acknowledge", "outcome"}
+    assert {kind for kind, one in BY_KIND.items() if one.from_fleet} == {
+        *ITEM,
+        "acknowledge",
+        "end_planned_stop",
+        "outcome",
+    }
     assert {BY_KIND[kind].needs for kind in ITEM} == {"operator"}
 
 
@@ -223,9 +228,15 @@ async def test_a_summary_stays_within_its_bound_whoever_is_there() -> None:
     await car.obeyed(pages[0], "control", do="take")
     await car.obeyed(pages[0], "take_item")
     await car.obeyed(pages[0], "offer_item", to=pages[1]["page"])
+    car.faults.add(Priority.WARNING)
+    car.tick(0.5)
+    person = {"name": "A" + widest[:29], "role": "operator"}
+    await car.obeyed(pages[0] | {"person": person}, "acknowledge", alarm="test_warning", occurrence=1)
+    car.say(pages[1] | {"duties": {person["name"]: WALL_MS}})
     car.say_what = '"' * 10_000
     car.tick(0.5)
     frame = car.bus.newest(ALL, "ocelot")
+    assert car.summary["unowned"]["by"] == f"{person['name']} ({widest})"
     assert frame is not None
     assert car.summary["worst"]["text"] == '"' * 100
     assert 1 < len(car.summary["people"]) < MOST_PEOPLE

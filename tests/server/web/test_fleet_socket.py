@@ -183,9 +183,28 @@ async def test_what_acts_on_a_car_is_done_on_its_own_page(server: str) -> None:
     async with viewer(server, fleet=True) as one:
         for kind in sorted(BY_KIND.keys() - {"present"}):
             answer = await one.ask(kind=kind, vehicle="car", alarm="speed_limit", occurrence=1, **MORE.get(kind, {}))
-            assert answer["ok"] is False
-            is_refused_here = answer["reason"] == "Open the car's own page for this."
+            assert answer["ok"] is (kind == "end_planned_stop"), "no stop is in force, so it has ended"
+            is_refused_here = answer.get("reason") == "Open the car's own page for this."
             assert is_refused_here is (not BY_KIND[kind].from_fleet), kind
+
+
+async def test_a_planned_stop_is_ended_from_here_and_not_begun(bridge: RosBridge, other: RosBridge) -> None:
+    async with (
+        serving(two(bridge, other)) as base,
+        http_client(base_url=base) as client,
+        viewer(base, fleet=True) as one,
+    ):
+        await one.until(lambda: (named(one, "serval") or {}).get("phase") == "monitoring")
+        begun = await client.post("/api/planned_stop", params={"vehicle": "serval"}, json={"reason": "parked"})
+        assert begun.is_success, begun.text
+        await one.until(lambda: (named(one, "serval") or {})["planned_stop"] == "parked")
+        refused = await one.ask(kind="planned_stop", vehicle="serval", reason="parked")
+        assert refused["reason"] == "Open the car's own page for this."
+        assert (await one.ask(kind="end_planned_stop", vehicle="serval"))["ok"]
+        await one.until(lambda: (named(one, "serval") or {})["planned_stop"] is None)
+        events = (await client.get("/api/events", params={"vehicle": "serval"})).json()["events"]
+        (ended,) = (event for event in events if event["change"] == "planned_stop_ended")
+        assert ended["text"] == "The planned stop ended."
 
 
 async def test_what_the_server_asks_of_a_session_is_refused(server: str) -> None:
@@ -201,7 +220,7 @@ async def test_a_viewer_sees_and_changes_nothing(bridge: RosBridge) -> None:
             await one.until(lambda: cars(one))
             assert one.other[0]["who"]["role"] == "viewer"
             await one.send(SEEN)
-            for kind in (*ITEM, "acknowledge"):
+            for kind in (*ITEM, "acknowledge", "end_planned_stop"):
                 answer = await one.ask(kind=kind, vehicle="car", **MORE.get(kind, {}))
                 assert answer["reason"] == "This device is paired as a viewer and cannot make changes."
             await one.until(lambda: (named(one, "car") or {}).get("people") == [])

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from server.recording.catalog.survey import survey
-from server.recording.drive.alarms import percentile
+from server.recording.drive.alarms import marks_of, percentile
 from server.recording.drive.components import component_of
 from server.recording.drive.departure import check_of
 from server.recording.drive.facts import DriveFacts, DriveLog, figures_of, read_facts
@@ -275,6 +276,27 @@ def test_planned_stops_and_the_alarms_in_them(tmp_path: Path) -> None:
     ]
     assert (log.planned_stops[1].ended, log.planned_stops[1].ended_by) == ("The planned stop ended: the car moves.", "")
     assert [(one.alarm, one.planned_stop) for one in log.alarms] == [("gps_drift", True), ("speed_limit", False)]
+
+
+def test_an_alarm_that_was_shelved_or_suppressed_bears_the_mark(tmp_path: Path) -> None:
+    own = [
+        logged(1.0, "raised", "gps_drift", state="UNACKED"),
+        logged(2.0, "shelved", "gps_drift", state="SHELVED"),
+        logged(3.0, "cleared", "gps_drift", state="SHELVED"),
+        logged(4.0, "raised", "gps_drift", state="SHELVED"),
+        logged(5.0, "raised", "speed_limit", state="UNACKED"),
+        logged(6.0, "suppressed", "speed_limit", state="SUPPRESSED"),
+        logged(7.0, "unsuppressed", "speed_limit", state="UNACKED"),
+        logged(8.0, "raised", "fuel", state="UNACKED"),
+        logged(9.0, "acknowledged", "fuel", state="ACKED"),
+    ]
+    alarms = [asdict(one) for one in log_of(recorded(tmp_path, own)).alarms]
+    assert [(one["alarm"], marks_of(one)) for one in alarms] == [
+        ("gps_drift", "shelved"),
+        ("gps_drift", "shelved"),
+        ("speed_limit", "suppressed by another alarm"),
+        ("fuel", ""),
+    ]
 
 
 def test_a_planned_stop_is_kept_in_what_is_known_before_the_recording(tmp_path: Path) -> None:

@@ -9,8 +9,9 @@ import pytest
 
 from server.recording.drive.facts import DriveFacts, DriveLog, figures_of, read_facts
 from server.recording.drive.modes import ModeSpan
-from server.recording.drive.parts import DrivePart, missing_parts, outside
+from server.recording.drive.parts import DrivePart, outside, parts_of
 from server.recording.drive.people import PersonInDrive, Span, joined_people
+from server.recording.drive.unrecorded import Beside, missing, unrecorded_of
 from server.recording.drive.unseen import blind_times, late_times
 from server.recording.read.read import open_recording
 from tests.server.recording.bags import BEGIN_S
@@ -150,12 +151,88 @@ def test_what_is_in_no_gap(span: Any, gaps: Any, left: Any) -> None:
     assert outside(span, gaps) == left
 
 
-def test_a_part_that_is_not_there_is_named() -> None:
-    def part(session: str, number: int | None, **metadata: str) -> DrivePart:
-        return DrivePart(id=f"{session}_{number}", session=session, number=number, from_s=0, to_s=1, metadata=metadata)
+def part(session: str, number: int | None, from_s: float = 0.0, to_s: float = 1.0, **metadata: str) -> DrivePart:
+    id = f"{session}_p{number}" if (number or 1) > 1 else session
+    return DrivePart(id=id, session=session, number=number, from_s=from_s, to_s=to_s, metadata=metadata)
 
-    assert missing_parts([part("a", 1), part("a", 2), part("b", 1)]) == []
-    assert missing_parts([part("a", 2, clip_of="x"), part("", 5)]) == []
-    (one, other) = missing_parts([part("a", 1), part("a", 3), part("b", 4)])
-    assert one.startswith("Part 2 of the drive of a_1 is not in this report")
-    assert other.startswith("Parts 1, 2, 3 of the drive of b_4 are not in this report")
+
+def said(parts: list[DrivePart], beside: Beside | None = None) -> list[str]:
+    found = missing(parts) if beside is None else missing(parts, beside)
+    return [one.sentence(lambda at_s: f"{at_s:g}").partition(" of the drive")[0] for one in found]
+
+
+def test_a_part_that_is_not_there_is_named_with_its_time() -> None:
+    assert said([part("a", 1), part("a", 2, 5.0, 9.0), part("b", 1, 9.5, 20.0)]) == []
+    assert said([part("a", 2, clip_of="x"), part("", 5)]) == []
+    later = [part("a", 1, 0, 10), part("a", 3, 30, 40), part("a", 6, 70, 80), part("b", 4, 100, 110)]
+    assert said(later) == [
+        "No record here from 10 to 30: Part 2",
+        "No record here from 40 to 70: Parts 4, 5",
+        "No record here from 80 to 100: Parts 1, 2, 3",
+    ]
+    assert said([part("a", 3, 30, 40)]) == ["No record here until 30: Parts 1, 2"]
+    (whole,) = missing([part("a", 2, 30, 40)])
+    assert "Part 1 of the drive of a_p2 is not in this report" in whole.sentence(str)
+
+
+def test_the_last_part_is_named_by_what_is_beside_it() -> None:
+    own = [part("a", 1, 0, 10), part("a", 2, 20, 30)]
+    known = frozenset({"a", "a_p2", "a_p3", "b_p9"})
+    assert said(own, Beside(known=known)) == ["No record here from 30 on: Part 3"]
+    assert said(own, Beside(known=known, next_s={"a": 75.0, "b": 90.0})) == ["No record here from 30 to 75: Part 3"]
+    both = [*own, part("b", 1, 60, 70)]
+    assert said(both, Beside(known=known - {"b_p9"})) == ["No record here from 30 to 60: Part 3"], "one reason for it"
+
+
+def test_what_is_there_and_not_in_the_report_is_not_called_without_a_record() -> None:
+    own = [part("a", 1, 0, 10), part("a", 4, 40, 50)]
+    files = frozenset({"a", "a_p2", "a_p3", "a_p4", "a_p5"})
+    assert said(own, Beside(known=files, files=files)) == [
+        "Not in this report from 10 to 40: Parts 2, 3",
+        "Not in this report from 50 on: Part 5",
+    ]
+    (one,) = missing(own, Beside(files=frozenset({"a_p2"})))
+    assert one.sentence(str) == (
+        "No record here from 10 to 40: Parts 2, 3 of the drive of a are not in this report: "
+        "the file of part 2 is being recorded, in the trash, or beside the others."
+    )
+
+
+def test_a_number_that_no_part_has_is_not_counted_up_to() -> None:
+    own = [part("a", 1, 0, 10)]
+    assert said(own, Beside(known=frozenset({"a_p99999999"}))) == []
+
+
+def test_a_lost_link_is_no_time_without_a_record_and_a_stopped_server_is_one() -> None:
+    assert said([part("a", 1, 0, 10), part("a", 2, 60, 70)]) == []
+    (one,) = missing([part("a", 1, 0, 10), part("b", 1, 60, 70)])
+    assert one.sentence(lambda at_s: f"{at_s:g}") == "No record here from 10 to 60: nothing was recorded between them."
+
+
+def test_a_last_part_that_is_gone_for_good_is_named_by_the_next_drive(tmp_path: Path) -> None:
+    paths = in_two_parts(tmp_path)
+    named = {"previous": "s1_p3", "previous_record": "57", "previous_head": "ab" * 32}
+    begun = {"session": "s2", "started_ms": str(BEGIN_MS + 400_000)}
+    recorded(tmp_path, [], name="s2.mcap", from_s=400.0, length_s=5.0, **begun, **named)
+    with open_recording(paths) as recording:
+        (one,) = unrecorded_of(recording, parts_of(recording))
+    assert (one.parts, one.to_s) == ((3,), 400.0)
+    assert one.from_s == pytest.approx(SECOND[0] + SECOND[1], abs=0.1)
+
+
+def test_what_is_damaged_within_a_part_is_a_time_without_a_record(tmp_path: Path) -> None:
+    path = recorded(tmp_path, [], name="s1.mcap", length_s=60.0)
+    with open_recording([path]) as recording:
+        (file,) = recording.files
+        file.damage.lost.append((BEGIN_S * NS + 10 * NS, BEGIN_S * NS + 20 * NS))
+        (one,) = unrecorded_of(recording, parts_of(recording))
+    assert one.sentence(lambda at_s: f"{at_s:.0f}") == "No record here from 10 to 20: s1.mcap is damaged there."
+
+
+def test_what_a_damaged_index_says_of_the_time_is_not_believed(tmp_path: Path) -> None:
+    path = recorded(tmp_path, [], name="s1.mcap", length_s=60.0)
+    with open_recording([path]) as recording:
+        (file,) = recording.files
+        file.damage.lost.append((0, 1))
+        (one,) = unrecorded_of(recording, parts_of(recording))
+    assert one.sentence(str) == "No record here at a time that is not known: s1.mcap is damaged."

@@ -1,0 +1,118 @@
+"""An acknowledged alarm whose owner is off duty: it says so in list, hand-over and queue, until somebody takes it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from monitor.alarm_spec import Priority
+from monitor.restoring import restore
+from server.protocol.commands import BY_KIND
+from server.vehicle.restore import recall
+from tests.server.vehicle.attended import ANN, BEN, PROGRAM, SEEN, WALL_MS, Attended
+
+AK = {"person": {"name": "A. K.", "role": "operator", "device": "dev-a"}}
+MR = {"person": {"name": "M. R.", "role": "safety_driver"}}
+OFF_MS = WALL_MS + 2000
+BOTH: dict[str, Any] = {"duties": {"A. K.": None, "M. R.": None}}
+LEFT: dict[str, Any] = {"duties": {"A. K.": OFF_MS, "M. R.": None}}
+TAKE = {"alarm": "test_warning", "occurrence": 1}
+
+
+async def acknowledged(by: dict[str, Any] = ANN | AK) -> Attended:
+    """A car with a warning that somebody has acknowledged who is on duty."""
+    car = Attended()
+    car.tick(0.5)
+    car.faults = {Priority.WARNING}
+    car.tick(0.5, heard=(ANN,))
+    for who in (ANN | AK | BOTH, BEN | MR | BOTH):
+        await car.obeyed(SEEN | who, "present")
+    await car.obeyed(by, "acknowledge", **TAKE)
+    return car
+
+
+async def left() -> Attended:
+    """The same after the duty of who acknowledged it ended; no page says that they went."""
+    car = await acknowledged()
+    await car.obeyed(SEEN | BEN | MR | LEFT, "present")
+    car.tick(0.5)
+    return car
+
+
+def listed(car: Attended) -> tuple[Any, ...]:
+    (alarm,) = car.session.frame()["alarms"]
+    return alarm["state"], alarm["acknowledged_by"], alarm["off_duty_ms"]
+
+
+async def test_it_says_since_when_its_owner_is_off_duty() -> None:
+    car = await acknowledged()
+    car.tick(0.5)
+    assert listed(car) == ("ACKED", "A. K. (Ann)", None)
+    assert car.summary["unowned"] is None
+    car = await left()
+    assert listed(car) == ("ACKED", "A. K. (Ann)", OFF_MS)
+    assert car.summary["unowned"] == {"count": 1, "by": "A. K. (Ann)", "since_ms": OFF_MS}
+    await car.obeyed(SEEN | BEN | MR | {"duties": {"M. R.": None}}, "present")  # removed from the list of people
+    assert listed(car)[2] == OFF_MS
+    await car.obeyed(SEEN | ANN | AK | BOTH, "present")  # back on duty: it is theirs
+    assert listed(car)[2] is None
+
+
+async def test_the_page_of_another_car_says_it_too() -> None:
+    car = await acknowledged()
+    car.say(BEN | MR | LEFT)
+    assert listed(car)[2] == OFF_MS
+
+
+@pytest.mark.parametrize(
+    "stated", [{"duties": ["A. K."]}, {"duties": {"A. K.": "x", 7: 8, "B": True}}, {"duties": None}]
+)
+async def test_what_cannot_be_read_changes_nothing(stated: dict[str, Any]) -> None:
+    car = await acknowledged()
+    await car.obeyed(SEEN | BEN | MR | stated, "present")
+    assert listed(car) == ("ACKED", "A. K. (Ann)", None)
+
+
+async def test_it_is_a_line_of_the_hand_over() -> None:
+    car = await left()
+    await car.obeyed(BEN | MR, "control", do="take")
+    await car.obeyed(SEEN | ANN | LEFT, "present")
+    await car.obeyed(BEN | MR, "offer_control", to="page-a")
+    offered: Any = car.session.frame()["control"]["handover"]
+    (line,) = (one for one in offered["lines"] if one["kind"] == "alarm")
+    assert line["text"].endswith("Acknowledged by A. K. (Ann).")
+    assert line["off_duty_ms"] == OFF_MS
+
+
+async def test_who_takes_it_is_its_owner_also_after_a_restart() -> None:
+    car = await left()
+    await car.obeyed(BEN | MR, "take_alarm", **TAKE)
+    assert listed(car) == ("ACKED", "M. R. (Ben)", None)
+    car.tick(0.5)
+    assert car.summary["unowned"] is None
+    (event,) = car.bus.past_events("ocelot", change="handed_over")
+    assert (event["alarm"], event["person"], event["occurrence"], event["announces"]) == (
+        "test_warning",
+        "M. R.",
+        1,
+        False,
+    )
+    past = recall(car.bus, "ocelot", now_s=car.now_s, wall_ms=WALL_MS + round(car.now_s * 1000))
+    assert restore({}, past.transitions)["test_warning"].acknowledged_by == "M. R. (Ben)"
+    why = await car.refused(ANN | AK, "take_alarm", **TAKE)
+    assert why == "Test warning: M. R. (Ben) has acknowledged it and is not off duty."
+
+
+async def test_nobody_takes_what_has_an_owner_or_was_raised_again() -> None:
+    car = await acknowledged()
+    assert "is not off duty" in await car.refused(BEN | MR, "take_alarm", **TAKE)
+    car = await acknowledged(by=PROGRAM)  # a program is never on duty
+    await car.obeyed(SEEN | BEN | MR | LEFT, "present")
+    assert "is not off duty" in await car.refused(BEN | MR, "take_alarm", **TAKE)
+    car = await left()
+    gone = "This alarm is not an acknowledged one any more: look at the list again."
+    assert await car.refused(BEN | MR, "take_alarm", alarm="test_warning", occurrence=2) == gone
+    assert await car.refused(BEN | MR, "take_alarm", alarm="unknown", occurrence=1) == gone
+    assert "meant for serval" in await car.refused(BEN | MR, "take_alarm", vehicle="serval", **TAKE)
+    assert BY_KIND["take_alarm"].needs == "operator"
