@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 
 OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
 AHEAD_EVERY_S = 0.15  # least time between two states that are sent ahead
+THIN_AHEAD = 3  # a page that allows no more has a radio that carries little, or has not measured it yet
 MOST_AHEAD = 12  # to a page that does not answer: its answers may wait 1.8 s for one that was lost
 ECHO_EVERY_S = 0.5  # so often a take is answered at once: by it the page measures the radio and bounds the clock
 
@@ -35,7 +36,7 @@ class PageOffers:
         self._ahead = 0  # so many states may be under way; 0: the page takes them one by one
         self._ahead_s = float("-inf")
         self._sent = 0  # states of this connection
-        self._received = 0  # of these, as the page said
+        self._received = 0  # of these, as the page stated
 
     def taken(self, take: Mapping[str, object]) -> bool:
         """The page takes; whether it took what was offered. One of a former page, without a number, always does."""
@@ -48,6 +49,11 @@ class PageOffers:
             return False
         self.is_open = False
         return True
+
+    @property
+    def is_thin(self) -> bool:
+        """Whether the page's radio carries little, or was not measured yet: a long message would hold up the states."""
+        return 0 < self._ahead <= THIN_AHEAD
 
     @property
     def has_room(self) -> bool:

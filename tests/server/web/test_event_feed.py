@@ -76,14 +76,28 @@ async def test_batches_grow_while_a_page_has_them_quickly_and_a_slow_one_gets_sm
         assert feed.acknowledged()
         assert not feed.acknowledged(), "of one batch once"
     sizes.append(len(feed.after(n)))
-    assert sizes == [100, 200, 400, 400, 400, 100, 200, 100]
+    assert sizes == [10, 100, 200, 400, 400, 100, 200, 100]
 
 
 async def test_the_next_gap_begins_with_a_small_batch_again() -> None:
     feed = EventFeed(cast(PageBus, Long()), "car", time.monotonic, lambda: None)
-    feed.sent(feed.after(0))
-    assert feed.acknowledged()
+    for _ in range(2):
+        feed.sent(feed.after(0))
+        assert feed.acknowledged()
     assert len(feed.after(100)) == 200
     feed.sent([{"n": 101}])  # all that there was
     assert not feed.acknowledged()
     assert len(feed.after(101)) == 100
+
+
+async def test_over_a_thin_radio_each_batch_stays_small() -> None:
+    thin = [True]
+    feed = EventFeed(cast(PageBus, Long()), "car", time.monotonic, lambda: None, lambda: thin[0])
+    sizes = list[int]()
+    for _ in range(4):
+        events = feed.after(0)
+        sizes.append(len(events))
+        feed.sent(events)
+        assert feed.acknowledged()
+        thin[0] = len(sizes) < 3
+    assert sizes == [10, 10, 10, 400]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import json
 import time
+import zlib
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from itertools import pairwise
@@ -31,6 +33,15 @@ pytestmark = pytest.mark.virtual_time
 STATE, SMALL = 800, 120
 
 
+def event(n: int) -> dict[str, Any]:
+    digits = hashlib.sha256(str(n).encode()).hexdigest()
+    return {
+        "alarm": f"signal_slow.{digits[:8]}", "occurrence": n, "change": "raised", "priority": "warning",
+        "title": f"{digits[:8]} slower than expected", "text": f"{digits[8:20]} messages a second, at least 8 expected",
+        "at_ms": 1_790_000_000_000 + int(digits[20:26], 16), "cause": None, "by": None, "reason": None,
+    }  # fmt: skip
+
+
 class SlowPage:
     """Answers what it gets after a round trip, while it answers."""
 
@@ -42,6 +53,9 @@ class SlowPage:
         self.more: Sequence[str] = ()  # what comes besides states
         self.most_under_way = 0
         self.events_s: list[float] = []  # how long each took
+        self.longest_s = 0.0  # that one message was on the air
+        self.scans = 0
+        self.most_event = 0
         self.states: list[tuple[float, int]] = []  # when each came, and its number
         self.offers: list[dict[str, Any]] = []
         self.writer: PageWriter | None = None
@@ -58,17 +72,20 @@ class SlowPage:
             self.most_under_way = max(self.most_under_way, self._sent - self._got)
         elif kind == "offer":
             self.offers.append({**message, "at_s": now_s})
-        self._free_s = max(self._free_s, now_s) + self.byte_s * (STATE if kind == "state" else SMALL)
+        size = {"state": STATE, "events": len(zlib.compress(text.encode()))}.get(kind, SMALL)
+        self.longest_s = max(self.longest_s, self.byte_s * size)
+        self._free_s = max(self._free_s, now_s) + self.byte_s * size
         if kind == "state" and self.ahead:
             self._take_later(0)
         elif kind == "offer" and message["of"]:
             self._take_later(message["seq"])
         elif kind == "events":
+            self.most_event = message["events"][-1]["n"]
             self.events_s.append(self._free_s - now_s)
-            asyncio.get_running_loop().call_later(self._free_s - now_s, self._have)
+            asyncio.get_running_loop().call_later(self._free_s - now_s + self.round_trip_s, self._have)
 
     async def send_bytes(self, _: bytes) -> None:
-        pass
+        self.scans += 1
 
     def _have(self) -> None:
         assert self.writer is not None
@@ -88,14 +105,15 @@ class SlowPage:
 
 
 @asynccontextmanager
-async def watching(page: SlowPage) -> AsyncIterator[LocalBus]:
-    """A car whose state is made twenty times a second."""
+async def watching(page: SlowPage, missed: int = 0) -> AsyncIterator[LocalBus]:
+    """A car whose state is made twenty times a second; `missed`: events that the page has not got."""
 
     async def car(_: Mapping[str, Any]) -> Mapping[str, Any]:
         return {"ok": True}
 
     bus = LocalBus(Journal(None), now=time.monotonic)
     bus.serve("car", car)
+    bus.append("car", [event(n) for n in range(missed)])
 
     async def drive() -> None:
         number = 0
@@ -209,6 +227,21 @@ async def test_over_16_kbit_s_no_more_states_are_under_way_than_the_page_allows_
     assert len(page.states) >= 60
     assert len(page.events_s) >= 25
     assert max(page.events_s) <= (ahead * STATE + 4 * SMALL) * page.byte_s
+
+
+async def test_over_16_kbit_s_200_missed_events_come_in_short_messages_between_the_states_and_no_scan_does() -> None:
+    page = SlowPage(3)
+    page.byte_s, page.more = 8 / 16_000, ("scan",)
+    async with watching(page, missed=200):
+        await asyncio.sleep(40.0)
+        assert page.most_event == 200
+        came_s = [at_s for at_s, _ in page.states]
+        assert max(b - a for a, b in pairwise(came_s)) <= 2.0
+        assert page.longest_s < 1.0, "after that, the page dials another connection"
+        assert page.scans == 0
+        page.ahead = MOST_AHEAD
+        await asyncio.sleep(5.0)
+        assert page.scans > 0, "its radio carries more now"
 
 
 def offers_of(now_s: float = 0.0) -> PageOffers:
