@@ -3,6 +3,8 @@ import { test } from 'node:test';
 import { readMessage } from '../../static/js/core/protocol.js';
 import { PageSocket } from '../../static/js/core/socket.js';
 
+const HELLO = JSON.stringify({ kind: 'hello', boot: 'a', time_ms: 0 });
+
 /** A socket as a browser has it, moved by the test. */
 class Socket {
   /** @type {string[]} */
@@ -151,7 +153,7 @@ function slow() {
   return one;
 }
 
-test('over a slow radio another connection is dialled beside a quiet one, and takes its place with its first message', () => {
+test('over a slow radio another connection is dialled beside a quiet one, and takes its place once the server greets it', () => {
   const { sockets, heard, at, look, pageSocket } = slow();
   look(400, 1300);
   assert.equal(sockets.length, 1);
@@ -164,12 +166,25 @@ test('over a slow radio another connection is dialled beside a quiet one, and ta
   sockets[1]?.onopen();
   pageSocket.send({ kind: 'pause' });
   assert.deepEqual([sockets[0]?.isClosed, sockets[0]?.sent.length], [false, 2], 'the server may still refuse the other one');
-  sockets[1]?.onmessage({ data: 'hello' });
+  sockets[1]?.onmessage({ data: 'duty' });
+  assert.equal(sockets[0]?.isClosed, false, 'it brings no ticket');
+  sockets[1]?.onmessage({ data: HELLO });
   assert.equal(sockets[0]?.isClosed, true);
   pageSocket.send({ kind: 'pause' });
   assert.deepEqual([sockets[0]?.sent.length, sockets[1]?.sent.length], [2, 1], 'over one connection, never over both');
-  assert.deepEqual(heard, ['open', 'closed', 'open', 'hello']);
+  assert.deepEqual(heard, ['open', 'closed', 'open', 'duty', HELLO]);
   assert.equal(sockets[0]?.onmessage, null);
+});
+
+test('what the other connection brought before its greeting is read where the first one is given up meanwhile', () => {
+  const { sockets, heard, look } = slow();
+  look(400, 1500);
+  sockets[1]?.onopen();
+  sockets[1]?.onmessage({ data: 'duty' });
+  look(1600, 3000);
+  assert.equal(sockets[0]?.isClosed, true);
+  sockets[1]?.onmessage({ data: 'unserved' });
+  assert.deepEqual(heard, ['open', 'closed', 'open', 'duty', 'unserved']);
 });
 
 test('a quiet connection that answers before the other one does stays, and one that the server refuses takes no place', () => {
@@ -178,13 +193,15 @@ test('a quiet connection that answers before the other one does stays, and one t
   sockets[1]?.onopen();
   sockets[1]?.onclose(); // as of a device with too many pages
   assert.deepEqual([sockets[0]?.isClosed, sockets[1]?.isClosed, pageSocket.isOpen], [false, true, true]);
-  look(1600, 1700);
+  look(1600, 2500);
+  assert.equal(sockets.length, 2, 'the next one waits for a second');
+  look(2600, 2700);
   assert.equal(sockets.length, 3);
-  at(1800);
-  pageSocket.proof(1800);
+  at(2800);
+  pageSocket.proof(2800);
   assert.equal(sockets[2]?.isClosed, false, 'what it brings may be needed yet');
   sockets[2]?.onopen();
-  sockets[2]?.onmessage({ data: 'hello' });
+  sockets[2]?.onmessage({ data: HELLO });
   assert.deepEqual([sockets[0]?.isClosed, sockets[2]?.isClosed, sockets[2]?.onmessage], [false, true, null]);
   assert.deepEqual([sockets.length, heard], [3, ['open']]);
 });
@@ -205,9 +222,29 @@ test('connections that are not needed become seldom: after 1, 2, 4, 8 and 10 s',
     last_ms = ms;
     pageSocket.proof(quiet_ms = ms);
     sockets.at(-1)?.onopen();
-    sockets.at(-1)?.onmessage({ data: 'hello' });
+    sockets.at(-1)?.onmessage({ data: HELLO });
   }
   assert.deepEqual(gaps.slice(1).map((ms) => Math.floor(ms / 1000)), [1, 2, 4, 8, 10, 10, 10], String(gaps));
+});
+
+test('connections that take each other\'s place within half a minute become seldom too, until there was none for so long', () => {
+  const { sockets, pageSocket, at } = slow();
+  /** @type {number[]} */
+  const gaps = [];
+  let [swapped_ms, came_ms] = [NaN, 0];
+  for (let ms = 400; ms < 120_000; ms += 100) {
+    const count = sockets.length;
+    at(ms);
+    if (ms - came_ms >= 1900 || ms > 50_000 && ms < 85_000) pageSocket.proof(came_ms = ms); // one long message after another
+    pageSocket.look(ms);
+    if (sockets.length === count) continue;
+    sockets.at(-1)?.onopen();
+    sockets.at(-1)?.onmessage({ data: HELLO });
+    assert.equal(sockets.at(-2)?.isClosed, true);
+    gaps.push(Math.round((ms - swapped_ms) / 1000));
+    [swapped_ms, came_ms] = [ms, ms];
+  }
+  assert.deepEqual(gaps.slice(1), [1, 1, 3, 5, 9, 11, 11, 45, 1, 1, 3, 5, 9, 11]);
 });
 
 test('nothing is sent on a connection that was quiet for too long, though the other one is not open yet', () => {
