@@ -898,7 +898,7 @@ export interface Hello {
   /** of a web node: orders are signed, as agents require it */
   signs?: boolean;
   who: Identity;
-  /** for the next socket of this device, until 10 minutes after the end of this one; "": none is needed */
+  /** for the next socket of this device, until 10 minutes after the end of its last one; "": none is needed */
   ticket: string;
 }
 
