@@ -202,7 +202,7 @@ class FleetPage:
             case "take":
                 self._writer.take()
             case "hello":
-                await self._commands.begin(message)
+                self._commands.begin(message)
             case "present":
                 await self._commands.present(message)
             case _:

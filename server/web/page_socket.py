@@ -126,7 +126,7 @@ class Page:
             case "watch":
                 self._writer.watch_scan(message.get("scan") is True)
             case "hello":
-                await self._commands.begin(message)
+                self._commands.begin(message)
                 is_former = "page" in message and "build" not in message  # a page of before the builds were named
                 self._writer.begin(message.get("have_event"), message.get("boot"), is_former=is_former)
             case "present":

@@ -1425,7 +1425,7 @@ export interface OrderSteps {
   slows_ms: number | null;
 }
 
-/** Before everything else but `take`: the server then sends what the page missed, and no event before it (or 1 s after the connection, where none comes). A command that comes before it is refused. */
+/** Before everything else but `take`: the server then sends what the page missed, and no event before it (or 10 s after the connection, where none comes). A command that comes before it is refused, also that of a client which sends no hello; a `present` that comes before it does not count. */
 export interface PageHello {
   kind: "hello";
   /** number of the newest event that the page has */

@@ -40,15 +40,13 @@ export class FleetStore {
   #cars_ms = -Infinity;
   #started_ms = 0;
   #hasGreeted = false;
-  /** The server knows who this page is, on this connection: before, it files a command under nobody. */
-  #isKnown = false;
   #clock = new ServerClock();
   /** @type {Emitter<Topic>} */
   #emitter = new Emitter((error) => this.painter.failed(error));
   painter = new Painter(this.#emitter);
   seal = new Seal(() => ({ who: this.who, duty: this.duty, ...this.self }));
   #requests = new Requests(
-    (message) => this.#isKnown && this.socket.send(message), (answer) => this.#emitter.emit('refused', answer), (message) => this.#sealed(message),
+    (message) => this.sync.hasGreeted && this.socket.send(message), (answer) => this.#emitter.emit('refused', answer), (message) => this.#sealed(message),
     (found) => this.#emitter.emit('became', found),
   );
   #watch = new PageWatch({
@@ -58,6 +56,8 @@ export class FleetStore {
   });
   /** As the ordinary page's store has it. */
   sync = {
+    /** The server knows who this page is, on this connection: before, it files a command under nobody. */
+    hasGreeted: false,
     whenOpen: (/** @type {() => void} */ listener) => {
       if (this.#hasGreeted) listener();
       return this.on('open', listener);
@@ -71,7 +71,7 @@ export class FleetStore {
   constructor(dial, self) {
     this.self = self;
     this.socket = new PageSocket({
-      opened: () => void (this.#isKnown = false),
+      opened: () => void (this.sync.hasGreeted = false),
       text: (text, at_ms) => this.#emitter.guard(() => this.#heard(text, at_ms)),
       bytes: () => {},
       closed: () => this.#emitter.guard(() => this.#requests.broke()),
@@ -192,7 +192,7 @@ export class FleetStore {
     this.isAnswering = true;
     this.unserved = '';
     this.#clock.greeted(hello, at_ms, this.socket.dialled_ms);
-    this.#isKnown = this.socket.send({ kind: 'hello', boot: hello.boot, name: this.self.name, page: this.self.page });
+    this.sync.hasGreeted = this.socket.send({ kind: 'hello', boot: hello.boot, name: this.self.name, page: this.self.page });
     this.#hasGreeted = true;
     this.#emitter.emit('open', hello);
   }
