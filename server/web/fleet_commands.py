@@ -42,6 +42,10 @@ class FleetCommands:
         self._orders = Allowance(limits.commands, now())
         self._announcements = Announcements(bus)
 
+    @property
+    def sender(self) -> PageSender:
+        return self._sender
+
     def begin(self, message: Mapping[str, Any]) -> None:
         """The page's hello."""
         self._sender.begin(message)
@@ -86,8 +90,8 @@ class FleetCommands:
         return None
 
     async def present(self, message: Mapping[str, Any]) -> None:
-        """Pass on the page's status, once a second, to every car: without a reply, not of a viewer's page, and not before
-        its hello: it would be counted under another id."""
+        """Pass on the page's status, once a second, to every car: without a reply, not of a viewer's page, and not
+        before its hello: it would be counted under another id."""
         if not self._sender.is_operator or not self._sender.has_begun:
             return
         self._sender.hear(message)

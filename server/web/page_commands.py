@@ -72,6 +72,10 @@ class PageCommands:
         self._opening: asyncio.Task[None] | None = None
         self._announcements = Announcements(bus)  # to other cars
 
+    @property
+    def sender(self) -> PageSender:
+        return self._sender
+
     def begin(self, message: Mapping[str, Any]) -> None:
         """The page's hello."""
         self._sender.begin(message)

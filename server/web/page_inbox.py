@@ -32,6 +32,7 @@ class PageInbox:
         self._now = now
         self._send = send
         self._complaints = 0
+        self.read_s = now()  # when the page sent anything
 
     @property
     def is_hopeless(self) -> bool:
@@ -44,6 +45,7 @@ class PageInbox:
 
     def read(self, text: str | None) -> dict[str, Any] | None:
         """A message of the page; None: it is none, and the page was sent why."""
+        self.read_s = self._now()
         if not self._allowance.takes(self._now()) and not _may_slow_down(text):
             self.complain("Too many messages at once.")
             return None

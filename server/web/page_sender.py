@@ -36,6 +36,10 @@ class PageSender:
     def is_operator(self) -> bool:
         return self._principal.is_operator
 
+    def is_same(self, other: PageSender) -> bool:
+        """Whether both are of one page."""
+        return self.has_begun and (self._principal.id, self._page) == (other._principal.id, other._page)
+
     def begin(self, hello: Mapping[str, Any]) -> None:
         """The page's hello: its name, and the id that it keeps over a reload, of which only the first counts."""
         page = hello.get("page")
