@@ -20,6 +20,27 @@ const PAGES = [
   ['of all cars', (dial) => new FleetStore(dial, { name: 'Ann', page: 'page-ann' })],
 ];
 
+test('what a page of all cars reads after a sleep, before it looks at the time, is covered', (t) => {
+  t.mock.timers.enable({ apis: ['setTimeout', 'setInterval'] });
+  let [now_ms, slept_ms] = [1000, 0];
+  t.mock.method(performance, 'now', () => now_ms);
+  t.mock.method(Date, 'now', () => now_ms + slept_ms);
+  const socket = /** @type {any} */ ({ send() {}, close() {} });
+  const store = new FleetStore(() => socket, { name: 'Ann', page: 'page-ann' });
+  store.painter.picture = store.painter.look = store.painter.draw = () => {};
+  store.start();
+  socket.onopen();
+  const say = (/** @type {object} */ message) => socket.onmessage({ data: JSON.stringify(message) });
+  say(HELLO);
+  say({ kind: 'cars', time_ms: 0, cars: [] });
+  assert.equal(store.isSilent, false);
+  now_ms += 100;
+  slept_ms = 60_000;
+  say({ kind: 'cars', time_ms: 100, cars: [] }); // it came before the phone slept
+  assert.equal(store.isSilent, true);
+  store.stop();
+});
+
 for (const [name, storeOf] of PAGES) {
   test(`a page ${name} whose command was not answered requests its outcome once it has greeted the next connection`, async (t) => {
     t.mock.timers.enable({ apis: ['setTimeout', 'setInterval'] });

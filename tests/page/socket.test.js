@@ -85,7 +85,7 @@ test('a connection of a weak radio gets more time, and what was measured holds f
     at(Number(took_ms));
     pageSocket.send({ kind: 'take', seq: 1 });
     pageSocket.answered(Number(came_ms), 'state');
-    pageSocket.answered(Number(came_ms) + 500, 'state'); // a frame that nobody asked for says nothing of the round trip
+    pageSocket.answered(Number(came_ms) + 500, 'state'); // a frame that nobody requested says nothing of the round trip
     pageSocket.proof(Number(came_ms));
   }
   look(5700, 8700);
@@ -365,6 +365,20 @@ test('after a sleep states are trusted once the take is answered that is sent at
   assert.equal(pageSocket.isTrusted, false, 'of before the sleep');
   pageSocket.offered(/** @type {any} */ ({ seq: 3, of: [], took: 2 }), 1200);
   assert.equal(pageSocket.isTrusted, true);
+});
+
+test('after a sleep no state is trusted before that either where none comes ahead now, but of a former server each', () => {
+  for (const [took, isTrusted] of /** @type {[number | undefined, boolean][]} */ ([[0, false], [undefined, true]])) {
+    const { sockets, at, pageSocket } = set();
+    pageSocket.look(0);
+    at(20);
+    sockets[0]?.onopen();
+    pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'], ...(took === undefined ? {} : { took }) }), 30);
+    pageSocket.slept();
+    assert.deepEqual([pageSocket.isTrusted, sockets[0]?.sent.length], [isTrusted, isTrusted ? 0 : 1]);
+    pageSocket.offered(/** @type {any} */ ({ seq: 2, of: ['state'], ...(took === undefined ? {} : { took: 1 }) }), 60);
+    assert.equal(pageSocket.isTrusted, true);
+  }
 });
 
 test('a server that refuses at once is dialled every two seconds', () => {

@@ -79,9 +79,9 @@ export class PageSocket {
     return asked_ms;
   }
 
-  /** The phone slept: states that came ahead meanwhile look young, for its clock may have stood still. */
+  /** The phone slept: states that were under way look young, for its clock may have stood still. */
   slept() {
-    if (!this.#takes.ahead) return;
+    if (!this.#takes.areNamed) return; // a former server sends no state before it is taken
     this.#takes.distrust();
     this.send({ kind: 'take', seq: 0 });
   }
@@ -103,6 +103,11 @@ export class PageSocket {
       this.proof(at_ms);
     }
     if (kind === 'state' && takes.ahead) this.takeInTurn(() => this.send({ kind: 'take', seq: 0 }), kind);
+  }
+
+  /** A message came that could not be read: a state counts all the same, or the server would take it for under way for good. @param {string} text */
+  unread(text) {
+    if (text.startsWith('{"kind":"state"')) this.#takes.got(true);
   }
 
   /**

@@ -16,7 +16,9 @@ export class Takes {
   #trustedFrom = 0;
   /** States come without an offer: so many may be under way. */
   ahead = 0;
-  /** When the last frame was asked for, or this connection; and whether it is still to come. */
+  /** The server names the take that an offer answers. */
+  areNamed = false;
+  /** When the last frame was requested, or this connection; and whether it is still to come. */
   asked_ms;
   isOwed = false;
   /** What waits for its turn: an offer, a state that came ahead. @type {Set<string>} */
@@ -51,12 +53,13 @@ export class Takes {
    * @param {number} [at_ms] when the answer came, where the take was answered at once
    */
   received(number, most, at_ms) {
+    this.areNamed = true;
     if (number >= this.#trustedFrom) this.#trustedFrom = 0;
     if (at_ms !== undefined) this.#window.answered(this.sent_ms(number), at_ms);
     this.ahead = Math.min(most, this.#window.size);
   }
 
-  /** A frame came; whether that was asked for. @param {boolean} isState */
+  /** A frame came; whether that was requested. @param {boolean} isState */
   got(isState) {
     const { isOwed } = this;
     if (isState) this.#got += 1;

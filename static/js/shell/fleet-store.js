@@ -157,6 +157,7 @@ export class FleetStore {
 
   /** @param {string} text @param {number} [at_ms] when it came */
   #heard(text, at_ms = this.now()) {
+    this.#woke(); // a phone that wakes may read what came before the page looks at the time
     const message = readMessage(text);
     if (!message) return undefined;
     switch (message.kind) {
@@ -219,13 +220,15 @@ export class FleetStore {
   #look() {
     this.painter.look(!document.hidden);
     const now_ms = this.now();
-    if (this.#watch.slept_ms(now_ms) > 2000 && this.cars) this.deadMan.cover();
+    this.#woke();
     this.deadMan.look(now_ms);
     this.socket.look(now_ms);
     if (this.socket.isOpen) this.#requests.look(now_ms);
     if (!document.hidden) this.painter.keepUp(now_ms, this.deadMan.heard_ms);
     this.#emitter.emit('tick');
   }
+
+  #woke = () => void (this.#watch.slept_ms(this.now()) > 2000 && this.cars && this.deadMan.cover());
 
   /** Hidden, frozen or back. @param {boolean} isBack @param {boolean} isRestored */
   #slept(isBack, isRestored) {
