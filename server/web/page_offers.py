@@ -56,6 +56,10 @@ class PageOffers:
         return 0 < self._ahead <= THIN_AHEAD
 
     @property
+    def carries_scans(self) -> bool:
+        return not 0 < self._ahead < THIN_AHEAD
+
+    @property
     def has_room(self) -> bool:
         """Whether one more state may be under way."""
         return not self._ahead or self._sent - self._received < self._ahead

@@ -277,7 +277,7 @@ class PageWriter:
         return not is_early
 
     def _is_new(self, kind: FrameKind) -> bool:
-        is_wanted = kind != "scan" or (self._watches_scan and not self._offers.is_thin)
+        is_wanted = kind != "scan" or (self._watches_scan and self._offers.carries_scans)
         return is_wanted and self._view.number(kind) > self._sent[kind]
 
     async def _send_newest(self, kind: FrameKind, *, unasked: bool = False) -> None:
