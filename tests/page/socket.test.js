@@ -320,6 +320,24 @@ test('an offer answers the take that it names, and one of nothing measures the r
   assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 5, of: ['state'] }), 1400), 1200, 'of a former server: the last one');
 });
 
+test('the first state of the next connection is answered at once: the server may then send ahead; a former one is not', () => {
+  const { sockets, at, pageSocket, look } = slow();
+  const [, second, third] = [1000, 4000, 7000].map((ms) => {
+    sockets.at(-1)?.onclose?.();
+    at(ms);
+    pageSocket.look(ms);
+    sockets.at(-1)?.onopen();
+    pageSocket.answered(ms, 'state');
+    if (ms === 4000) pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'] }), ms);
+    return sockets.at(-1)?.sent.map((text) => JSON.parse(text));
+  });
+  assert.deepEqual(second, [{ kind: 'take', seq: 0, n: 1, ahead: 3, got: 1 }]);
+  assert.deepEqual(third, []);
+  pageSocket.slept();
+  assert.equal(pageSocket.isTrusted, true);
+  look(7100, 7100);
+});
+
 test('a state that came ahead proves nothing, nor does an answer that took longer than a connection may be quiet', () => {
   for (const [lag_ms, isClosed] of /** @type {[number, boolean][]} */ ([[500, false], [20_000, true]])) {
     const { sockets, at, pageSocket, look } = slow();

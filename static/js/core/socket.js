@@ -67,7 +67,7 @@ export class PageSocket {
    * @param {number} at_ms when it came
    */
   offered({ took, of }, at_ms) {
-    if (took === undefined) return this.#takes.asked_ms;
+    if (took === undefined) return this.#takes.unnamed();
     const asked_ms = this.#takes.sent_ms(took);
     const isEcho = of.length === 0 && asked_ms > -Infinity;
     if (isEcho) {
@@ -224,8 +224,8 @@ export class PageSocket {
     this.#dials.opened(this.now(), isInPlace);
     this.#proof_ms = this.#came_ms = this.now();
     const opened_ms = (at_ms - asked_ms) / 2; // to connect, and to become a WebSocket
-    this.#takes = new Takes(asked_ms, opened_ms);
     if (isSlower(this.trip, opened_ms)) this.trip = measured(null, opened_ms);
+    this.#takes = new Takes(asked_ms, opened_ms, aheadOf(this.trip), this.#takes.areNamed);
     socket.onmessage = (/** @type {{data: any, at_ms?: number}} */ event) => {
       this.#came_ms = this.now();
       if (typeof event.data === 'string') return this.ear.text(event.data, event.at_ms);
