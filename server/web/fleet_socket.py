@@ -151,7 +151,7 @@ class FleetPage:
         self._people = people
         self._events = events
         self._writer = FleetWriter(socket, bus, events, wakeup, wall_ms=wall_ms)
-        self.on_hello: Callable[[], None] = lambda: None  # called once the page has said who it is
+        self.on_hello: Callable[[], None] = lambda: None  # called with the hello of the page
         self._inbox = PageInbox(limits, now=now, send=self._writer.queue)
         self._commands = FleetCommands(
             bus,

@@ -65,7 +65,7 @@ class Page:
             on_turned=lambda: self._writer.on_turned(),
         )
         self._writer = PageWriter(socket, bus, vehicle, view, wakeup, now=now, wall_ms=wall_ms)
-        self.on_hello: Callable[[], None] = lambda: None  # called once the page has said who it is
+        self.on_hello: Callable[[], None] = lambda: None  # called with the hello of the page
         self._inbox = PageInbox(limits, now=now, send=self._writer.queue)
         self._commands = PageCommands(
             bus,
