@@ -173,9 +173,9 @@ class FleetPage:
         return self._commands.sender
 
     @property
-    def read_s(self) -> float:
-        """When the page sent anything."""
-        return self._inbox.read_s
+    def quiet_s(self) -> float:
+        """How long the page has sent nothing, while a message of it is waited for."""
+        return self._inbox.quiet_s
 
     async def serve(self) -> None:
         """Runs until the page leaves."""
@@ -198,7 +198,7 @@ class FleetPage:
 
     async def _read(self) -> None:
         while not self._inbox.is_hopeless and not self._writer.is_full:
-            received = await self._socket.receive()
+            received = await self._inbox.receive(self._socket)
             if received["type"] == "websocket.disconnect":
                 if received.get("code") == GOING_AWAY:
                     await self._commands.leave()

@@ -142,12 +142,13 @@ class Hub:
     def _end_former(self, page: Page | FleetPage) -> None:
         """End connections that the page has given up and that have not noticed it: they count for its device.
 
-        A tab that was duplicated has the same id, and is served.
+        A tab that was duplicated has the same id, and is served. One that carries out a command, or ends already, is
+        not interrupted.
         """
         for other, task in self._pages.items():
             if other is page:
                 return
-            if other.sender.is_same(page.sender) and self._now() - other.read_s > QUIET_S:
+            if other.sender.is_same(page.sender) and other.quiet_s > QUIET_S:
                 self._replaced.add(task)
                 task.cancel()
 

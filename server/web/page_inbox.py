@@ -12,6 +12,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 import orjson
+from starlette.types import Message
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from server.protocol import commands, messages
@@ -32,12 +33,25 @@ class PageInbox:
         self._now = now
         self._send = send
         self._complaints = 0
-        self.read_s = now()  # when the page sent anything
+        self._waits_s: float | None = None  # since when a message of the page is waited for
 
     @property
     def is_hopeless(self) -> bool:
         """Whether the page sent too many invalid messages."""
         return self._complaints >= MAX_COMPLAINTS
+
+    @property
+    def quiet_s(self) -> float:
+        """How long the page has sent nothing; 0 while a message of it is carried out, and once its connection ends."""
+        return 0.0 if self._waits_s is None else self._now() - self._waits_s
+
+    async def receive(self, socket: WebSocket) -> Message:
+        """What the page sends next, or its end."""
+        self._waits_s = self._now()
+        try:
+            return await socket.receive()
+        finally:
+            self._waits_s = None
 
     def complain(self, reason: str) -> None:
         self._complaints += 1
@@ -45,7 +59,6 @@ class PageInbox:
 
     def read(self, text: str | None) -> dict[str, Any] | None:
         """A message of the page; None: it is none, and the page was sent why."""
-        self.read_s = self._now()
         if not self._allowance.takes(self._now()) and not _may_slow_down(text):
             self.complain("Too many messages at once.")
             return None
