@@ -82,7 +82,7 @@ class PageCommands:
         self.send_duty()
 
     def send_duty(self) -> None:
-        """Send the page who is on duty, once it said who it is."""
+        """Send the page who is on duty, after its hello."""
         if self._sender.has_begun:
             self._send(self._sender.duty)
 
