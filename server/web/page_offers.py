@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
 AHEAD_EVERY_S = 0.15  # least time between two states that are sent ahead
-THIN_AHEAD = 3  # a page that allows no more has a radio that carries little, or has not measured it yet
+THIN_AHEAD = 2  # a page that allows no more has a radio that carries little
 MOST_AHEAD = 12  # to a page that does not answer: its answers may wait 1.8 s for one that was lost
 ECHO_EVERY_S = 0.5  # so often a take is answered at once: by it the page measures the radio and bounds the clock
 
@@ -51,13 +51,8 @@ class PageOffers:
         return True
 
     @property
-    def is_thin(self) -> bool:
-        """Whether the page's radio carries little, or was not measured yet: a long message would hold up the states."""
-        return 0 < self._ahead <= THIN_AHEAD
-
-    @property
     def carries_scans(self) -> bool:
-        return not 0 < self._ahead < THIN_AHEAD
+        return not 0 < self._ahead <= THIN_AHEAD
 
     @property
     def has_room(self) -> bool:

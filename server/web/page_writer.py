@@ -83,7 +83,7 @@ class PageWriter:
         self._resumed: messages.Resumed | None = None  # to be sent with the next events
         self._is_greeted = False
         self._run = ""  # of the vehicle's session when the page was greeted
-        self._feed = EventFeed(bus, vehicle, now, lambda: self.on_new("events"), lambda: self._offers.is_thin)
+        self._feed = EventFeed(bus, vehicle, now, lambda: self.on_new("events"))
         self._are_events_due = self._are_events_unanswered = False
         self._has_begun = False  # the page said hello
         self._is_former = False

@@ -34,11 +34,12 @@ STATE, SMALL = 800, 120
 
 
 def event(n: int) -> dict[str, Any]:
+    """Of 50 bytes, compressed beside others."""
     digits = hashlib.sha256(str(n).encode()).hexdigest()
     return {
         "alarm": f"signal_slow.{digits[:8]}", "occurrence": n, "change": "raised", "priority": "warning",
-        "title": f"{digits[:8]} slower than expected", "text": f"{digits[8:20]} messages a second, at least 8 expected",
-        "at_ms": 1_790_000_000_000 + int(digits[20:26], 16), "cause": None, "by": None, "reason": None,
+        "title": f"{digits[:8]} slower than expected", "text": f"{digits[8:56]} messages a second, at least 8 expected",
+        "at_ms": 1_790_000_000_000 + int(digits[56:62], 16), "cause": None, "by": None, "reason": None,
     }  # fmt: skip
 
 
@@ -242,6 +243,19 @@ async def test_over_16_kbit_s_200_missed_events_come_in_short_messages_and_scans
         assert max(b - a for a, b in pairwise(came_s)) <= 2.0
         assert page.longest_s < 1.0, "after that, the page dials another connection"
         assert (page.scans > 0) is (ahead == 3)
+
+
+@pytest.mark.parametrize("kbit_s", [24, 32, 50])
+@pytest.mark.parametrize("round_trip_s", [0.1, 0.4])
+async def test_over_a_little_more_200_missed_events_come_in_messages_of_less_than_a_second(
+    kbit_s: int, round_trip_s: float
+) -> None:
+    page = SlowPage(4)
+    page.byte_s, page.round_trip_s = 8 / (1000 * kbit_s), round_trip_s
+    async with watching(page, missed=200):
+        await asyncio.sleep(30.0)
+    assert page.most_event == 200
+    assert page.longest_s < 1.0, "after that, the page dials another connection"
 
 
 def offers_of(now_s: float = 0.0) -> PageOffers:
