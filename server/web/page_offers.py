@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
 AHEAD_EVERY_S = 0.15  # least time between two states that are sent ahead
 THIN_AHEAD = 2  # a page that allows no more has a radio that carries little
+THIN_SCAN_EVERY_S = 3.0  # scans of the live car over such a radio: it may be a route that has only become longer
 MOST_AHEAD = 12  # to a page that does not answer: its answers may wait 1.8 s for one that was lost
 ECHO_EVERY_S = 0.5  # so often a take is answered at once: by it the page measures the radio and bounds the clock
 
@@ -35,6 +36,7 @@ class PageOffers:
         self._open_seq = 0  # of the newest offer of anything
         self._ahead = 0  # so many states may be under way; 0: the page takes them one by one
         self._ahead_s = float("-inf")
+        self._scan_s = float("-inf")
         self._sent = 0  # states of this connection
         self._received = 0  # of these, as the page stated
 
@@ -51,8 +53,10 @@ class PageOffers:
         return True
 
     @property
-    def carries_scans(self) -> bool:
-        return not 0 < self._ahead <= THIN_AHEAD
+    def has_room_for_scan(self) -> bool:
+        """Whether a scan may be sent: over a radio that carries little, seldom."""
+        is_thin = 0 < self._ahead <= THIN_AHEAD
+        return not is_thin or self._now() >= self._scan_s + THIN_SCAN_EVERY_S
 
     @property
     def has_room(self) -> bool:
@@ -71,6 +75,9 @@ class PageOffers:
     def sent_state(self) -> None:
         self._ahead_s = self._now()
         self._sent += 1
+
+    def sent_scan(self) -> None:
+        self._scan_s = self._now()
 
     def offer_wait_s(self) -> float:
         """How long the next offer has to wait."""
