@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from server.protocol.messages import FrameKind
+
 OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
 AHEAD_EVERY_S = 0.15  # least time between two states that are sent ahead
 THIN_AHEAD = 2  # a page that allows no more has a radio that carries little
@@ -53,7 +55,7 @@ class PageOffers:
         return True
 
     @property
-    def has_room_for_scan(self) -> bool:
+    def carries_scan(self) -> bool:
         """Whether a scan may be sent: over a radio that carries little, seldom."""
         is_thin = 0 < self._ahead <= THIN_AHEAD
         return not is_thin or self._now() >= self._scan_s + THIN_SCAN_EVERY_S
@@ -72,12 +74,13 @@ class PageOffers:
         """How long the next state that is sent ahead has to wait."""
         return self._ahead_s + AHEAD_EVERY_S - self._now()
 
-    def sent_state(self) -> None:
-        self._ahead_s = self._now()
-        self._sent += 1
-
-    def sent_scan(self) -> None:
-        self._scan_s = self._now()
+    def sent(self, kind: FrameKind) -> None:
+        """A frame was sent."""
+        if kind == "state":
+            self._ahead_s = self._now()
+            self._sent += 1
+        elif kind == "scan":
+            self._scan_s = self._now()
 
     def offer_wait_s(self) -> float:
         """How long the next offer has to wait."""

@@ -277,9 +277,8 @@ class PageWriter:
         return not is_early
 
     def _is_new(self, kind: FrameKind) -> bool:
-        if kind == "scan" and not (self._watches_scan and (self._view.is_replaying or self._offers.has_room_for_scan)):
-            return False
-        return self._view.number(kind) > self._sent[kind]
+        is_held = kind == "scan" and not (self._watches_scan and (self._view.is_replaying or self._offers.carries_scan))
+        return not is_held and self._view.number(kind) > self._sent[kind]
 
     async def _send_newest(self, kind: FrameKind, *, unasked: bool = False) -> None:
         number, frame = self._view.number(kind), self._view.newest(kind)
@@ -288,11 +287,9 @@ class PageWriter:
         if frame is None or not is_new:
             return
         self._sent[kind] = frame.number
+        self._offers.sent(kind)
         if kind == "state":
-            self._offers.sent_state()
             self._is_state_waiting = False
-        if kind == "scan":
-            self._offers.sent_scan()
         if isinstance(frame.payload, bytes):
             await self._socket.send_bytes(frame.payload)
         else:

@@ -269,7 +269,7 @@ def test_an_answer_that_comes_twice_or_names_more_than_was_sent_allows_no_more()
         offers.taken({"seq": 0, "n": number, "ahead": 2, "got": 10**9})
         assert offers.may_push
     for _ in range(2):
-        offers.sent_state()
+        offers.sent("state")
     assert not offers.may_push
     for number in range(4, 9):
         offers.taken({"seq": 0, "n": number, "ahead": 2, "got": 0})
