@@ -7,7 +7,7 @@ import hmac
 import math
 import os
 import secrets
-from collections import OrderedDict
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,9 +22,8 @@ COOKIE_RENEWED_AFTER_S = 86_400
 _LONGEST_COOKIE = 400  # letters; ours has about 110
 
 TICKET_LASTS_S = 5.0
-TICKET_AFTER_SOCKET_S = (
-    600.0  # after the end of the socket that it was given with: a page that is away for longer requests one
-)
+TICKET_AFTER_SOCKET_S = 600.0  # after the end of the device's last socket: a page that is away for longer requests one
+LEFT_A_SOCKET = 4  # tickets of ended sockets that are kept for each one that is served, beside its own
 MOST_TICKETS = 2000
 
 SHORTEST_KEY = 20  # letters: `openssl rand -hex 16` gives 32
@@ -86,6 +85,8 @@ class Tickets:
 
     def __init__(self) -> None:
         self._open: OrderedDict[str, tuple[str, float]] = OrderedDict()  # ticket → whose, until when [s]
+        self._served: Counter[str] = Counter()  # sockets of each
+        self._left: dict[str, deque[str]] = {}  # given with sockets that have ended, while others are served
 
     def new(self, whose: str, *, now_s: float, lasts_s: float = TICKET_LASTS_S) -> str:
         """A ticket for the device or program `whose`."""
@@ -98,13 +99,24 @@ class Tickets:
 
     @contextmanager
     def beside_socket(self, whose: str, *, now: Callable[[], float]) -> Iterator[str]:
-        """A ticket for the socket after the one that is served meanwhile."""
+        """A ticket for the socket after the one that is served meanwhile.
+
+        While another socket of the device is served, it lasts: a page may have it of a second connection that it did
+        not need.
+        """
         ticket = self.new(whose, now_s=now(), lasts_s=math.inf)
+        self._served[whose] += 1
         try:
             yield ticket
         finally:
-            if ticket in self._open:
-                self._open[ticket] = (whose, now() + TICKET_AFTER_SOCKET_S)
+            self._served -= Counter((whose,))
+            left = self._left.setdefault(whose, deque())
+            left.append(ticket)
+            while len(left) > LEFT_A_SOCKET * self._served[whose]:
+                if (oldest := left.popleft()) in self._open:
+                    self._open[oldest] = (whose, now() + TICKET_AFTER_SOCKET_S)
+            if not left:
+                del self._left[whose]
 
     def use(self, ticket: str, whose: str, *, now_s: float) -> bool:
         """Whether `whose` may open a socket with it. It is used up by being shown, right or not."""

@@ -50,7 +50,8 @@ class ServerHello(TypedDict):
 class Hello(ServerHello):
     who: Identity
     ticket: Annotated[
-        str, doc('for the next socket of this device, until 10 minutes after the end of this one; "": none is needed')
+        str,
+        doc('for the next socket of this device, until 10 minutes after the end of its last one; "": none is needed'),
     ]
 
 

@@ -13,8 +13,9 @@ from server.protocol.replay_commands import ReplayOrder
 
 
 class PageHello(TypedDict):
-    """Before everything else but `take`: the server then sends what the page missed, and no event before it (or 1 s
-    after the connection, where none comes). A command that comes before it is refused."""
+    """Before everything else but `take`: the server then sends what the page missed, and no event before it (or 10 s
+    after the connection, where none comes). A command that comes before it is refused, also that of a client which
+    sends no hello; a `present` that comes before it does not count."""
 
     kind: Literal["hello"]
     have_event: NotRequired[Annotated[int | None, doc("number of the newest event that the page has")]]

@@ -10,24 +10,33 @@ from server.bus.bus import NotServed, PageBus
 from server.bus.log_runs import Resumed
 
 AGAIN_S = 1.0
-LEAST_A_BATCH = 100  # events in one message
+FIRST_BATCH = 10  # events in one message: some 1 kB, compressed, half a second at 16 kbit/s
 MOST_A_BATCH = 400  # some 120 kB
-QUICK_S = 0.1  # a page that has a batch within this gets a larger one next
+QUICK_S = 0.5  # a page that has a batch within this gets twice as many next, which then take a second at most
+SLOW_S = 1.0  # within this, so many more as the first one has; after it, half as many
+NEVER_S = float("inf")
 
 
 class EventFeed:
     """Of one page and vehicle. `on_read` is called when events that were not in memory have been read.
 
     A page that has missed many gets them in batches that grow while it receives them quickly, so that a slow radio
-    carries small ones between its newest values, and a fast one catches up soon.
+    carries small ones between its newest values, and a fast one catches up soon: a message that takes more than a
+    second would look like a connection that fell silent.
     """
 
-    def __init__(self, bus: PageBus, vehicle: str, now: Callable[[], float], on_read: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        bus: PageBus,
+        vehicle: str,
+        now: Callable[[], float],
+        on_read: Callable[[], None],
+    ) -> None:
         self._bus = bus
         self._vehicle = vehicle
         self._now = now
-        self._batch = LEAST_A_BATCH
-        self._sent_s = float("-inf")
+        self._batch = self._limit = FIRST_BATCH  # the next one, and what was read at most
+        self._sent_s = NEVER_S  # when the batch was sent that is not acknowledged yet
         self._is_catching_up = False  # more events wait than one message takes
         self._on_read = on_read
         self._reading: asyncio.Task[list[dict[str, Any]]] | None = None
@@ -51,29 +60,30 @@ class EventFeed:
     def sent(self, events: Sequence[object]) -> None:
         """These were sent to the page."""
         self._sent_s = self._now()
-        self._is_catching_up = len(events) == self._batch
-        if not self._is_catching_up:
-            self._batch = LEAST_A_BATCH
+        self._is_catching_up = len(events) == self._limit
 
     def acknowledged(self) -> bool:
         """The page has them. Returns whether it is catching up: more of them wait."""
-        if not self._is_catching_up:
-            return False
-        self._is_catching_up = False
-        is_quick = self._now() - self._sent_s <= QUICK_S
-        self._batch = min(MOST_A_BATCH, 2 * self._batch) if is_quick else LEAST_A_BATCH
-        return True
+        took_s, is_catching_up = self._now() - self._sent_s, self._is_catching_up
+        self._sent_s, self._is_catching_up = NEVER_S, False
+        if took_s > SLOW_S:
+            self._batch = max(FIRST_BATCH, self._batch // 2)
+        elif is_catching_up:
+            more = self._batch if took_s <= QUICK_S else FIRST_BATCH
+            self._batch = min(MOST_A_BATCH, self._batch + more)
+        return is_catching_up
 
     def after(self, n: int) -> list[dict[str, Any]]:
         """The next batch after number `n`; none yet where the disk must be read, for which `on_read` is called."""
-        limit = self._batch
-        recent = self._bus.recent_events(self._vehicle, n, limit)
+        if self._reading is None:
+            self._limit = self._batch
+        recent = self._bus.recent_events(self._vehicle, n, self._limit)
         if recent is not None:
             return recent
         reading = self._reading
         if reading is None:
             self._reading_after = n
-            self._reading = asyncio.create_task(self._bus.events_after(self._vehicle, n, limit))
+            self._reading = asyncio.create_task(self._bus.events_after(self._vehicle, n, self._limit))
             self._reading.add_done_callback(self._read)
             return []
         if not reading.done():
@@ -85,7 +95,7 @@ class EventFeed:
         if reading.cancelled():
             return
         if isinstance(reading.exception(), NotServed):  # they are at an agent that does not answer
-            self._reading, self._batch = None, LEAST_A_BATCH
+            self._reading = None
             self._again = asyncio.get_running_loop().call_later(AGAIN_S, self._on_read)
         else:
             self._on_read()

@@ -25,6 +25,7 @@ from server.web.fair_wakeup import FairWakeup
 from server.web.fleet_commands import FleetCommands
 from server.web.fleet_log import FleetLog
 from server.web.page_inbox import PageInbox
+from server.web.page_sender import PageSender
 from server.web.page_socket import GOING_AWAY
 from server.web.page_writer import MAX_REPLIES
 
@@ -150,6 +151,7 @@ class FleetPage:
         self._people = people
         self._events = events
         self._writer = FleetWriter(socket, bus, events, wakeup, wall_ms=wall_ms)
+        self.on_hello: Callable[[], None] = lambda: None  # called with the hello of the page
         self._inbox = PageInbox(limits, now=now, send=self._writer.queue)
         self._commands = FleetCommands(
             bus,
@@ -165,6 +167,15 @@ class FleetPage:
     def skipped(self) -> int:
         """Frames that were replaced by newer ones before this page took them."""
         return self._writer.skipped
+
+    @property
+    def sender(self) -> PageSender:
+        return self._commands.sender
+
+    @property
+    def quiet_s(self) -> float:
+        """How long the page has sent nothing, while a message of it is waited for."""
+        return self._inbox.quiet_s
 
     async def serve(self) -> None:
         """Runs until the page leaves."""
@@ -187,7 +198,7 @@ class FleetPage:
 
     async def _read(self) -> None:
         while not self._inbox.is_hopeless and not self._writer.is_full:
-            received = await self._socket.receive()
+            received = await self._inbox.receive(self._socket)
             if received["type"] == "websocket.disconnect":
                 if received.get("code") == GOING_AWAY:
                     await self._commands.leave()
@@ -202,7 +213,8 @@ class FleetPage:
             case "take":
                 self._writer.take()
             case "hello":
-                await self._commands.begin(message)
+                self._commands.begin(message)
+                self.on_hello()
             case "present":
                 await self._commands.present(message)
             case _:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections import Counter
 from collections.abc import Callable
 
@@ -23,6 +24,7 @@ from server.web.fleet_socket import FleetPage
 from server.web.page_socket import Page
 
 MAX_PAGES = 500
+QUIET_S = 2.0  # a page that is served sends more often
 
 
 class Hub:
@@ -48,7 +50,8 @@ class Hub:
         self._wall_ms = wall_ms
         self._replays = replays
         self._server = server
-        self._pages: set[Page | FleetPage] = set()
+        self._pages: dict[Page | FleetPage, asyncio.Task[None]] = {}  # the oldest first
+        self._replaced: set[asyncio.Task[None]] = set()
         self._wakeup = FairWakeup()
         self._cars = CarsBoard(bus, off=off, now=now, wall_ms=wall_ms)
         self._fleet_log = FleetLog(bus)
@@ -120,13 +123,34 @@ class Hub:
         return True
 
     async def _serve(self, page: Page | FleetPage, principal: Principal) -> None:
-        self._pages.add(page)
+        task = asyncio.current_task()
+        assert task is not None
+        self._pages[page] = task
         self._by_device[principal.id] += 1
+        page.on_hello = lambda: self._end_former(page)
         try:
             await page.serve()
+        except asyncio.CancelledError:
+            if task not in self._replaced:
+                raise
+            task.uncancel()
         finally:
-            self._pages.discard(page)
+            del self._pages[page]
+            self._replaced.discard(task)
             self._by_device -= Counter((principal.id,))
+
+    def _end_former(self, page: Page | FleetPage) -> None:
+        """End connections that the page has given up and that have not noticed it: they count for its device.
+
+        A tab that was duplicated has the same id, and is served. One that carries out a command, or ends already, is
+        not interrupted.
+        """
+        for other, task in self._pages.items():
+            if other is page:
+                return
+            if other.sender.is_same(page.sender) and other.quiet_s > QUIET_S:
+                self._replaced.add(task)
+                task.cancel()
 
     def _has_too_many(self, principal: Principal) -> bool:
         return principal is not LOCAL and self._by_device[principal.id] >= self._limits.pages

@@ -70,18 +70,19 @@ class PageCommands:
         self._orders = Allowance(limits.commands, now())
         self._slow_downs = Allowance(limits.slow_down, now())
         self._opening: asyncio.Task[None] | None = None
-        self._is_counted = False  # as a page that may show and sound alarms
         self._announcements = Announcements(bus)  # to other cars
 
-    async def begin(self, message: Mapping[str, Any]) -> None:
+    @property
+    def sender(self) -> PageSender:
+        return self._sender
+
+    def begin(self, message: Mapping[str, Any]) -> None:
         """The page's hello."""
-        if self._is_counted and self._sender.is_other(message):
-            await self.leave()  # it was counted under the former id, which is no longer used
         self._sender.begin(message)
         self.send_duty()
 
     def send_duty(self) -> None:
-        """Send the page who is on duty, once it said who it is."""
+        """Send the page who is on duty, after its hello."""
         if self._sender.has_begun:
             self._send(self._sender.duty)
 
@@ -117,11 +118,11 @@ class PageCommands:
         return None
 
     async def present(self, message: Mapping[str, Any]) -> None:
-        """Pass on the page's status, once a second: without a reply, and not of a viewer's page."""
-        if not self._sender.is_operator:
+        """Pass on the page's status, once a second: without a reply, not of a viewer's page, and not before its hello:
+        it would be counted under another id."""
+        if not self._sender.is_operator or not self._sender.has_begun:
             return
         self._sender.hear(message)
-        self._is_counted = True
         try:
             commands.read(message)  # also where the page's own car is not served, and nobody else reads it
         except commands.NotUnderstood as why:

@@ -12,6 +12,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 import orjson
+from starlette.types import Message
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from server.protocol import commands, messages
@@ -32,11 +33,25 @@ class PageInbox:
         self._now = now
         self._send = send
         self._complaints = 0
+        self._waits_s: float | None = None  # since when a message of the page is waited for
 
     @property
     def is_hopeless(self) -> bool:
         """Whether the page sent too many invalid messages."""
         return self._complaints >= MAX_COMPLAINTS
+
+    @property
+    def quiet_s(self) -> float:
+        """How long the page has sent nothing; 0 while a message of it is carried out, and once its connection ends."""
+        return 0.0 if self._waits_s is None else self._now() - self._waits_s
+
+    async def receive(self, socket: WebSocket) -> Message:
+        """What the page sends next, or its end."""
+        self._waits_s = self._now()
+        try:
+            return await socket.receive()
+        finally:
+            self._waits_s = None
 
     def complain(self, reason: str) -> None:
         self._complaints += 1

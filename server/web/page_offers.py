@@ -9,8 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from server.protocol.messages import FrameKind
+
 OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
 AHEAD_EVERY_S = 0.15  # least time between two states that are sent ahead
+THIN_AHEAD = 2  # a page that allows no more has a radio that carries little
+THIN_SCAN_EVERY_S = 3.0  # scans of the live car over such a radio: it may be a route that has only become longer
 MOST_AHEAD = 12  # to a page that does not answer: its answers may wait 1.8 s for one that was lost
 ECHO_EVERY_S = 0.5  # so often a take is answered at once: by it the page measures the radio and bounds the clock
 
@@ -34,8 +38,9 @@ class PageOffers:
         self._open_seq = 0  # of the newest offer of anything
         self._ahead = 0  # so many states may be under way; 0: the page takes them one by one
         self._ahead_s = float("-inf")
+        self._scan_s = float("-inf")
         self._sent = 0  # states of this connection
-        self._received = 0  # of these, as the page said
+        self._received = 0  # of these, as the page stated
 
     def taken(self, take: Mapping[str, object]) -> bool:
         """The page takes; whether it took what was offered. One of a former page, without a number, always does."""
@@ -48,6 +53,12 @@ class PageOffers:
             return False
         self.is_open = False
         return True
+
+    @property
+    def carries_scan(self) -> bool:
+        """Whether a scan may be sent: over a radio that carries little, seldom."""
+        is_thin = 0 < self._ahead <= THIN_AHEAD
+        return not is_thin or self._now() >= self._scan_s + THIN_SCAN_EVERY_S
 
     @property
     def has_room(self) -> bool:
@@ -63,9 +74,13 @@ class PageOffers:
         """How long the next state that is sent ahead has to wait."""
         return self._ahead_s + AHEAD_EVERY_S - self._now()
 
-    def sent_state(self) -> None:
-        self._ahead_s = self._now()
-        self._sent += 1
+    def sent(self, kind: FrameKind) -> None:
+        """A frame was sent."""
+        if kind == "state":
+            self._ahead_s = self._now()
+            self._sent += 1
+        elif kind == "scan":
+            self._scan_s = self._now()
 
     def offer_wait_s(self) -> float:
         """How long the next offer has to wait."""

@@ -36,15 +36,15 @@ class PageSender:
     def is_operator(self) -> bool:
         return self._principal.is_operator
 
-    def is_other(self, hello: Mapping[str, Any]) -> bool:
-        """Whether this hello gives the page another id: the first one that gives any, and no later one."""
-        page = hello.get("page")
-        return not self.has_begun and isinstance(page, str) and re.fullmatch(command_base.PAGE, page) is not None
+    def is_same(self, other: PageSender) -> bool:
+        """Whether both are of one page."""
+        return self.has_begun and (self._principal.id, self._page) == (other._principal.id, other._page)
 
     def begin(self, hello: Mapping[str, Any]) -> None:
         """The page's hello: its name, and the id that it keeps over a reload, of which only the first counts."""
-        if self.is_other(hello):
-            self._page = hello["page"]
+        page = hello.get("page")
+        if not self.has_begun and isinstance(page, str) and re.fullmatch(command_base.PAGE, page):
+            self._page = page
         self._name = display_name.clean(hello.get("name")) or self._name
         self.has_begun = True
 

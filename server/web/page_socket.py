@@ -21,6 +21,7 @@ from server.web.cars_board import CarsBoard
 from server.web.fair_wakeup import FairWakeup
 from server.web.page_commands import PageCommands
 from server.web.page_inbox import PageInbox
+from server.web.page_sender import PageSender
 from server.web.page_writer import PageWriter
 
 GOING_AWAY = 1001  # a browser closes so when its page is closed, and not when its phone falls asleep (RFC 6455, 7.4.1)
@@ -64,6 +65,7 @@ class Page:
             on_turned=lambda: self._writer.on_turned(),
         )
         self._writer = PageWriter(socket, bus, vehicle, view, wakeup, now=now, wall_ms=wall_ms)
+        self.on_hello: Callable[[], None] = lambda: None  # called with the hello of the page
         self._inbox = PageInbox(limits, now=now, send=self._writer.queue)
         self._commands = PageCommands(
             bus,
@@ -82,6 +84,15 @@ class Page:
     def skipped(self) -> int:
         """Frames that were replaced by newer ones before this page took them."""
         return self._writer.skipped
+
+    @property
+    def sender(self) -> PageSender:
+        return self._commands.sender
+
+    @property
+    def quiet_s(self) -> float:
+        """How long the page has sent nothing, while a message of it is waited for."""
+        return self._inbox.quiet_s
 
     async def serve(self) -> None:
         """Runs until the page leaves."""
@@ -107,7 +118,7 @@ class Page:
 
     async def _read(self) -> None:
         while not self._inbox.is_hopeless and not self._writer.is_full:
-            received = await self._socket.receive()
+            received = await self._inbox.receive(self._socket)
             if received["type"] == "websocket.disconnect":
                 if received.get("code") == GOING_AWAY:
                     await self._commands.leave()
@@ -126,7 +137,8 @@ class Page:
             case "watch":
                 self._writer.watch_scan(message.get("scan") is True)
             case "hello":
-                await self._commands.begin(message)
+                self._commands.begin(message)
+                self.on_hello()
                 is_former = "page" in message and "build" not in message  # a page of before the builds were named
                 self._writer.begin(message.get("have_event"), message.get("boot"), is_former=is_former)
             case "present":

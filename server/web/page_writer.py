@@ -83,9 +83,8 @@ class PageWriter:
         self._resumed: messages.Resumed | None = None  # to be sent with the next events
         self._is_greeted = False
         self._run = ""  # of the vehicle's session when the page was greeted
-        self._feed = EventFeed(bus, vehicle, now, on_read=lambda: self.on_new("events"))
-        self._are_events_due = False
-        self._are_events_unanswered = False
+        self._feed = EventFeed(bus, vehicle, now, lambda: self.on_new("events"))
+        self._are_events_due = self._are_events_unanswered = False
         self._has_begun = False  # the page said hello
         self._is_former = False
         self._is_state_waiting = False  # a state of the live car came that was not sent yet
@@ -278,7 +277,8 @@ class PageWriter:
         return not is_early
 
     def _is_new(self, kind: FrameKind) -> bool:
-        return (kind != "scan" or self._watches_scan) and self._view.number(kind) > self._sent[kind]
+        is_held = kind == "scan" and not (self._watches_scan and (self._view.is_replaying or self._offers.carries_scan))
+        return not is_held and self._view.number(kind) > self._sent[kind]
 
     async def _send_newest(self, kind: FrameKind, *, unasked: bool = False) -> None:
         number, frame = self._view.number(kind), self._view.newest(kind)
@@ -287,8 +287,8 @@ class PageWriter:
         if frame is None or not is_new:
             return
         self._sent[kind] = frame.number
+        self._offers.sent(kind)
         if kind == "state":
-            self._offers.sent_state()
             self._is_state_waiting = False
         if isinstance(frame.payload, bytes):
             await self._socket.send_bytes(frame.payload)

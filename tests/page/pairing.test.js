@@ -92,6 +92,35 @@ test('a connection that was dialled beside a quiet one and is not needed brings 
   assert.equal(dialled[3].ticket, 'fetched');
 });
 
+test('a ticket is used up once its socket has opened, also where the server then greets nobody', async (t) => {
+  /** @type {any[]} */
+  const dialled = [];
+  t.mock.method(globalThis, 'fetch', async () => ({ ok: true, json: async () => ({ ticket: 'fetched' }) }));
+  t.after(() => { delete /** @type {any} */ (globalThis).WebSocket; });
+  globalThis.WebSocket = /** @type {any} */ (class {
+    /** @param {string} address */
+    constructor(address) {
+      this.ticket = new URL(address).searchParams.get('ticket');
+      dialled.push(this);
+    }
+
+    close() {}
+  });
+  const admission = new Admission(() => 'ws://car/ws', () => {});
+  admission.greeted(/** @type {any} */ ({ ticket: 'brought' }));
+  const dial = async () => {
+    const socket = admission.dial(null);
+    await new Promise((resolve) => { setTimeout(resolve); });
+    return socket;
+  };
+  const spare = await dial();
+  dialled[0].onopen();
+  dialled[0].onmessage({ data: JSON.stringify({ kind: 'unserved', why: 'The agent is not there.' }) });
+  spare.close();
+  await dial();
+  assert.deepEqual(dialled.map(({ ticket }) => ticket), ['brought', 'fetched']);
+});
+
 test('a PIN is its digits, however it is typed', () => {
   for (const [typed, digits, shown] of [['', '', ''], ['12', '12', '12'], ['123', '123', '123'], ['123 4', '1234', '123 4'], ['12-34-56-78', '123456', '123 456'], ['a1', '1', '1']]) {
     assert.equal(digitsOf(typed), digits);

@@ -204,9 +204,9 @@ test('another connection that takes the place of the one over which the recordin
 
 test('an answer that a connection took with it when it broke is none of the server', async (t) => {
   const { store, socket, pass } = opened(t);
-  const asked = store.ask('replay', { do: 'play' });
+  const answer = store.ask('replay', { do: 'play' });
   socket.onclose();
-  assert.equal((await asked).isBroken, true);
+  assert.equal((await answer).isBroken, true);
   assert.equal((await store.ask('replay', { do: 'play' })).isBroken, true);
   store.socket.look(10_000);
   socket.onopen();

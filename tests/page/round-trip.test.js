@@ -32,7 +32,7 @@ test('over a slow radio states come ahead, and beside a quiet connection another
   assert.deepEqual([null, after(99), after(100), after(600), after(3000)].map((trip) => limitsOf(trip).spare_ms), [Infinity, Infinity, 1000, 1200, 1500]);
 });
 
-/** What may be under way after echoes that took so long, each asked for 0.5 s after the one before. @param {number[]} waited_ms */
+/** What may be under way after echoes that took so long, each requested after the one before. @param {number[]} waited_ms */
 function windowAfter(waited_ms) {
   const window = new AheadWindow(400);
   waited_ms.forEach((ms, i) => window.answered(10_000 * i, 10_000 * i + ms));

@@ -3,6 +3,8 @@ import { test } from 'node:test';
 import { readMessage } from '../../static/js/core/protocol.js';
 import { PageSocket } from '../../static/js/core/socket.js';
 
+const HELLO = JSON.stringify({ kind: 'hello', boot: 'a', time_ms: 0 });
+
 /** A socket as a browser has it, moved by the test. */
 class Socket {
   /** @type {string[]} */
@@ -83,7 +85,7 @@ test('a connection of a weak radio gets more time, and what was measured holds f
     at(Number(took_ms));
     pageSocket.send({ kind: 'take', seq: 1 });
     pageSocket.answered(Number(came_ms), 'state');
-    pageSocket.answered(Number(came_ms) + 500, 'state'); // a frame that nobody asked for says nothing of the round trip
+    pageSocket.answered(Number(came_ms) + 500, 'state'); // a frame that nobody requested says nothing of the round trip
     pageSocket.proof(Number(came_ms));
   }
   look(5700, 8700);
@@ -151,7 +153,7 @@ function slow() {
   return one;
 }
 
-test('over a slow radio another connection is dialled beside a quiet one, and takes its place with its first message', () => {
+test('over a slow radio another connection is dialled beside a quiet one, and takes its place once the server greets it', () => {
   const { sockets, heard, at, look, pageSocket } = slow();
   look(400, 1300);
   assert.equal(sockets.length, 1);
@@ -164,12 +166,25 @@ test('over a slow radio another connection is dialled beside a quiet one, and ta
   sockets[1]?.onopen();
   pageSocket.send({ kind: 'pause' });
   assert.deepEqual([sockets[0]?.isClosed, sockets[0]?.sent.length], [false, 2], 'the server may still refuse the other one');
-  sockets[1]?.onmessage({ data: 'hello' });
+  sockets[1]?.onmessage({ data: 'duty' });
+  assert.equal(sockets[0]?.isClosed, false, 'it brings no ticket');
+  sockets[1]?.onmessage({ data: HELLO });
   assert.equal(sockets[0]?.isClosed, true);
   pageSocket.send({ kind: 'pause' });
   assert.deepEqual([sockets[0]?.sent.length, sockets[1]?.sent.length], [2, 1], 'over one connection, never over both');
-  assert.deepEqual(heard, ['open', 'closed', 'open', 'hello']);
+  assert.deepEqual(heard, ['open', 'closed', 'open', 'duty', HELLO]);
   assert.equal(sockets[0]?.onmessage, null);
+});
+
+test('what the other connection brought before its greeting is read where the first one is given up meanwhile', () => {
+  const { sockets, heard, look } = slow();
+  look(400, 1500);
+  sockets[1]?.onopen();
+  sockets[1]?.onmessage({ data: 'duty' });
+  look(1600, 3000);
+  assert.equal(sockets[0]?.isClosed, true);
+  sockets[1]?.onmessage({ data: 'unserved' });
+  assert.deepEqual(heard, ['open', 'closed', 'open', 'duty', 'unserved']);
 });
 
 test('a quiet connection that answers before the other one does stays, and one that the server refuses takes no place', () => {
@@ -178,13 +193,15 @@ test('a quiet connection that answers before the other one does stays, and one t
   sockets[1]?.onopen();
   sockets[1]?.onclose(); // as of a device with too many pages
   assert.deepEqual([sockets[0]?.isClosed, sockets[1]?.isClosed, pageSocket.isOpen], [false, true, true]);
-  look(1600, 1700);
+  look(1600, 2500);
+  assert.equal(sockets.length, 2, 'the next one waits for a second');
+  look(2600, 2700);
   assert.equal(sockets.length, 3);
-  at(1800);
-  pageSocket.proof(1800);
+  at(2800);
+  pageSocket.proof(2800);
   assert.equal(sockets[2]?.isClosed, false, 'what it brings may be needed yet');
   sockets[2]?.onopen();
-  sockets[2]?.onmessage({ data: 'hello' });
+  sockets[2]?.onmessage({ data: HELLO });
   assert.deepEqual([sockets[0]?.isClosed, sockets[2]?.isClosed, sockets[2]?.onmessage], [false, true, null]);
   assert.deepEqual([sockets.length, heard], [3, ['open']]);
 });
@@ -205,9 +222,29 @@ test('connections that are not needed become seldom: after 1, 2, 4, 8 and 10 s',
     last_ms = ms;
     pageSocket.proof(quiet_ms = ms);
     sockets.at(-1)?.onopen();
-    sockets.at(-1)?.onmessage({ data: 'hello' });
+    sockets.at(-1)?.onmessage({ data: HELLO });
   }
   assert.deepEqual(gaps.slice(1).map((ms) => Math.floor(ms / 1000)), [1, 2, 4, 8, 10, 10, 10], String(gaps));
+});
+
+test('connections that take each other\'s place within half a minute become seldom too, until there was none for so long', () => {
+  const { sockets, pageSocket, at } = slow();
+  /** @type {number[]} */
+  const gaps = [];
+  let [swapped_ms, came_ms] = [NaN, 0];
+  for (let ms = 400; ms < 120_000; ms += 100) {
+    const count = sockets.length;
+    at(ms);
+    if (ms - came_ms >= 1900 || ms > 50_000 && ms < 85_000) pageSocket.proof(came_ms = ms); // one long message after another
+    pageSocket.look(ms);
+    if (sockets.length === count) continue;
+    sockets.at(-1)?.onopen();
+    sockets.at(-1)?.onmessage({ data: HELLO });
+    assert.equal(sockets.at(-2)?.isClosed, true);
+    gaps.push(Math.round((ms - swapped_ms) / 1000));
+    [swapped_ms, came_ms] = [ms, ms];
+  }
+  assert.deepEqual(gaps.slice(1), [1, 1, 3, 5, 9, 11, 11, 45, 1, 1, 3, 5, 9, 11]);
 });
 
 test('nothing is sent on a connection that was quiet for too long, though the other one is not open yet', () => {
@@ -283,6 +320,24 @@ test('an offer answers the take that it names, and one of nothing measures the r
   assert.equal(pageSocket.offered(/** @type {any} */ ({ seq: 5, of: ['state'] }), 1400), 1200, 'of a former server: the last one');
 });
 
+test('the first state of the next connection is answered at once: the server may then send ahead; a former one is not', () => {
+  const { sockets, at, pageSocket, look } = slow();
+  const [, second, third] = [1000, 4000, 7000].map((ms) => {
+    sockets.at(-1)?.onclose?.();
+    at(ms);
+    pageSocket.look(ms);
+    sockets.at(-1)?.onopen();
+    pageSocket.answered(ms, 'state');
+    if (ms === 4000) pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'] }), ms);
+    return sockets.at(-1)?.sent.map((text) => JSON.parse(text));
+  });
+  assert.deepEqual(second, [{ kind: 'take', seq: 0, n: 1, ahead: 3, got: 1 }]);
+  assert.deepEqual(third, []);
+  pageSocket.slept();
+  assert.equal(pageSocket.isTrusted, true);
+  look(7100, 7100);
+});
+
 test('a state that came ahead proves nothing, nor does an answer that took longer than a connection may be quiet', () => {
   for (const [lag_ms, isClosed] of /** @type {[number, boolean][]} */ ([[500, false], [20_000, true]])) {
     const { sockets, at, pageSocket, look } = slow();
@@ -328,6 +383,20 @@ test('after a sleep states are trusted once the take is answered that is sent at
   assert.equal(pageSocket.isTrusted, false, 'of before the sleep');
   pageSocket.offered(/** @type {any} */ ({ seq: 3, of: [], took: 2 }), 1200);
   assert.equal(pageSocket.isTrusted, true);
+});
+
+test('after a sleep no state is trusted before that either where none comes ahead now, but of a former server each', () => {
+  for (const [took, isTrusted] of /** @type {[number | undefined, boolean][]} */ ([[0, false], [undefined, true]])) {
+    const { sockets, at, pageSocket } = set();
+    pageSocket.look(0);
+    at(20);
+    sockets[0]?.onopen();
+    pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'], ...(took === undefined ? {} : { took }) }), 30);
+    pageSocket.slept();
+    assert.deepEqual([pageSocket.isTrusted, sockets[0]?.sent.length], [isTrusted, isTrusted ? 0 : 1]);
+    pageSocket.offered(/** @type {any} */ ({ seq: 2, of: ['state'], ...(took === undefined ? {} : { took: 1 }) }), 60);
+    assert.equal(pageSocket.isTrusted, true);
+  }
 });
 
 test('a server that refuses at once is dialled every two seconds', () => {

@@ -37,6 +37,7 @@ class Story {
   accepts_ms = 0; // how long the server takes to accept a connection
   every_ms = 100; // from one state to the next
   isFormer = false; // a server that sends nothing ahead
+  brokenEvery = Infinity; // so many states one cannot be read
   kbit_s = Infinity; // what each direction carries
   mostUnderWay = 0; // states sent ahead
   /** How long events took that nothing delayed on purpose. @type {number[]} */
@@ -118,7 +119,7 @@ class Story {
       pushed_ms = this.now_ms;
       pushed = newest;
       sent += 1;
-      say(newest, STATE);
+      say(sent % this.brokenEvery === 0 ? { kind: 'state', server: null } : newest, STATE);
       if (ahead) this.mostUnderWay = Math.max(this.mostUnderWay, sent - got);
     };
     const beat = () => {
@@ -267,6 +268,15 @@ for (const [radio, least] of /** @type {[string, number][]} */ ([['fair', 4], ['
     assert.ok(Number(rates[0]) > least && Number(rates[0]) > 1.2 * Number(rates[1]), String(rates));
   });
 }
+
+test('states that cannot be read do not use up how many may be under way', (t) => {
+  const story = new Story('fair', 1);
+  story.brokenEvery = 5;
+  const { run, end, store } = page(t, story);
+  run(60_000);
+  const { beats } = end();
+  assert.ok(store.unreadable > 20 && beats > 120, `${store.unreadable} could not be read, ${beats} could`);
+});
 
 /** A minute over a radio that carries little, from the first connection on. @param {import('node:test').TestContext} t @param {number} kbit_s @param {number} seed */
 function thin(t, kbit_s, seed) {

@@ -2,6 +2,7 @@
 // Usage: node page.mjs TREE ADDRESS KEY; TREE holds the page's modules.
 //   b TIME AGE LATE CUT ALARMS   a fresh frame came: ms since 1970, its true age [ms]; of the link to the car how late [s] and
 //                                whether it is cut, and the alarms
+//   d TIME                       it dials
 //   s TIME COVERED SHOWN TRUE    twenty times a second: the age that is shown and the true one [ms]
 import path from 'node:path';
 import { WebSocket } from 'ws';
@@ -10,7 +11,10 @@ import { storeAlone } from '../page/alone.mjs';
 const [tree = '.', address = '', key = ''] = process.argv.slice(2);
 console.error = () => {}; // nothing is drawn here
 const Store = await storeAlone(path.resolve(tree, 'static/js'));
-const store = new Store(() => new WebSocket(address, { headers: { Authorization: `Bearer ${key}` } }).on('error', () => {})); // one that is given up ends the program without
+const store = new Store(() => {
+  console.log(`d ${Date.now()}`);
+  return new WebSocket(address, { headers: { Authorization: `Bearer ${key}` } }).on('error', () => {}); // one that is given up ends the program without
+});
 store.painter.picture = store.painter.look = () => {};
 const age_ms = () => Date.now() - store.frame.server.time_ms; // server and page run on one machine
 store.on('beat', () => {

@@ -19,6 +19,7 @@ class Seen:
     frames: list[tuple[float, float]] = field(default_factory=list)  # time, true age
     cars: list[tuple[float, float, bool, str]] = field(default_factory=list)  # time, how late, cut, alarms
     samples: list[tuple[float, bool, float, float]] = field(default_factory=list)  # time, covered, shown, true age
+    dials: list[float] = field(default_factory=list)  # times
 
     def read(self, line: str) -> None:
         match line.split():
@@ -27,6 +28,8 @@ class Seen:
             case ["b", time, age, late, cut, alarms]:
                 self.frames.append((float(time), float(age) / 1000))
                 self.cars.append((float(time), float(late), cut == "1", alarms))
+            case ["d", time]:
+                self.dials.append(float(time))
             case ["s", time, covered, shown, true]:
                 self.samples.append((float(time), covered == "1", float(shown) / 1000, float(true) / 1000))
 
@@ -36,6 +39,7 @@ class Seen:
             [one for one in self.frames if from_ms <= one[0] < to_ms],
             [one for one in self.cars if from_ms <= one[0] < to_ms],
             [one for one in self.samples if from_ms <= one[0] < to_ms],
+            [one for one in self.dials if from_ms <= one < to_ms],
         )
 
     @property
@@ -75,6 +79,7 @@ class Seen:
         return (
             f"{len(self.frames) / max(0.001, self.lasts_s):4.1f}/s  age {at(ages, 0.5):.2f}/{at(ages, 0.95):.2f}/"
             f"{at(ages, 1.0):.2f} s  gap {self.gap_s:.1f} s  veiled {self.veiled:.0%}  "
+            f"dials {60 * len(self.dials) / max(0.001, self.lasts_s):.1f}/min  "
             f"shown − true ≥ {self.youngest_s:+.2f} s"
         )
 

@@ -60,8 +60,8 @@ export class Presence {
 
   /** @param {object} word */
   #send(word) {
-    const { named } = this.store.seal;
-    if (!named) return false;
+    const { seal: { named }, sync } = this.store;
+    if (!named || !sync.hasGreeted) return false; // before its hello the server would count it as another page
     return this.store.socket.send({ kind: 'present', ...word, ...named, lag_s: Math.min(MOST_LAG_S, this.store.lag_s) });
   }
 }

@@ -7,10 +7,11 @@ const FIRST_WAIT_MS = 300;
 const LAST_WAIT_MS = 2000;
 /** Waits are longer by up to this share, by chance: pages that one server kept waiting do not all dial at once. */
 const SPREAD = 0.5;
-/** After another connection that was not needed the next one waits so long; twice as long after each further one, until there was none for a while [ms]. */
+/** After another connection that was not needed, or that was needed so soon after the one before, the next one waits so long; twice as long after each further one, until there was none for a while [ms]. */
 const FIRST_SPARE_MS = 1000;
 const LAST_SPARE_MS = 10_000;
 const CALM_MS = 60_000;
+const SOON_MS = 30_000;
 
 /** Of one page. Time is an argument. */
 export class Dials {
@@ -23,6 +24,8 @@ export class Dials {
   #longer = 1;
   #spareWait_ms = FIRST_SPARE_MS;
   #maySpare_ms = -Infinity;
+  /** When one took the place of another. */
+  #swapped_ms = -Infinity;
   #looked_ms = -Infinity;
 
   /** @param {() => number} chance from 0 to 1 */
@@ -59,12 +62,16 @@ export class Dials {
     this.#longer = 1 + SPREAD * this.chance();
   }
 
-  opened() {
+  /** @param {number} now_ms @param {boolean} isInPlace of one that was open */
+  opened(now_ms, isInPlace) {
     this.#failed = 0;
-    this.#spareWait_ms = FIRST_SPARE_MS;
+    if (!isInPlace) return;
+    if (now_ms - this.#swapped_ms < SOON_MS) this.unneeded(now_ms); // the radio may carry too little for two
+    else this.#spareWait_ms = FIRST_SPARE_MS;
+    this.#swapped_ms = now_ms;
   }
 
-  /** The open one answered before it. @param {number} now_ms */
+  /** The open one answered before it, or the server refused it. @param {number} now_ms */
   unneeded(now_ms) {
     if (now_ms - this.#maySpare_ms > CALM_MS) this.#spareWait_ms = FIRST_SPARE_MS;
     this.#maySpare_ms = now_ms + this.#longer * this.#spareWait_ms;

@@ -902,7 +902,7 @@ export interface Hello {
   /** of a web node: orders are signed, as agents require it */
   signs?: boolean;
   who: Identity;
-  /** for the next socket of this device, until 10 minutes after the end of this one; "": none is needed */
+  /** for the next socket of this device, until 10 minutes after the end of its last one; "": none is needed */
   ticket: string;
 }
 
@@ -1431,7 +1431,7 @@ export interface OrderSteps {
   slows_ms: number | null;
 }
 
-/** Before everything else but `take`: the server then sends what the page missed, and no event before it (or 1 s after the connection, where none comes). A command that comes before it is refused. */
+/** Before everything else but `take`: the server then sends what the page missed, and no event before it (or 10 s after the connection, where none comes). A command that comes before it is refused, also that of a client which sends no hello; a `present` that comes before it does not count. */
 export interface PageHello {
   kind: "hello";
   /** number of the newest event that the page has */

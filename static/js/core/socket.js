@@ -2,6 +2,7 @@
 // that one is dead) and on a dial that does not open (a server may be stopped while its port still accepts).
 
 import { Dials } from './dials.js';
+import { readMessage } from './protocol.js';
 import { aheadOf, isSlower, limitsOf, measured } from './round-trip.js';
 import { Takes } from './takes.js';
 
@@ -25,7 +26,7 @@ const EVENLY = { take: [2, 85], replay: [2, 250] };
 export class PageSocket {
   /** The one that is open. @type {Socket | null} */
   #socket = null;
-  /** One that is connecting: it takes the place of the open one with its first message, unless that one has answered meanwhile. @type {Socket | null} */
+  /** One that is connecting: it takes the place of the open one once the server greets it, unless something came over that one shortly before. @type {Socket | null} */
   #next = null;
   /** How long an answer takes here, over all connections. @type {import('./round-trip.js').RoundTrip | null} */
   trip = null;
@@ -66,7 +67,7 @@ export class PageSocket {
    * @param {number} at_ms when it came
    */
   offered({ took, of }, at_ms) {
-    if (took === undefined) return this.#takes.asked_ms;
+    if (took === undefined) return this.#takes.unnamed();
     const asked_ms = this.#takes.sent_ms(took);
     const isEcho = of.length === 0 && asked_ms > -Infinity;
     if (isEcho) {
@@ -78,9 +79,9 @@ export class PageSocket {
     return asked_ms;
   }
 
-  /** The phone slept: states that came ahead meanwhile look young, for its clock may have stood still. */
+  /** The phone slept: states that were under way look young, for its clock may have stood still. */
   slept() {
-    if (!this.#takes.ahead) return;
+    if (!this.#takes.areNamed) return; // a former server sends no state before it is taken
     this.#takes.distrust();
     this.send({ kind: 'take', seq: 0 });
   }
@@ -91,7 +92,7 @@ export class PageSocket {
   }
 
   /**
-   * A frame came, fresh or not: if it was asked for, the connection is alive, whatever is known of the clocks yet.
+   * A frame came, fresh or not: if it was requested, the connection is alive, whatever is known of the clocks yet.
    * @param {number} at_ms
    * @param {'state' | 'cars' | 'scan'} kind
    */
@@ -102,6 +103,11 @@ export class PageSocket {
       this.proof(at_ms);
     }
     if (kind === 'state' && takes.ahead) this.takeInTurn(() => this.send({ kind: 'take', seq: 0 }), kind);
+  }
+
+  /** A message came that could not be read: a state counts all the same, or the server would take it for under way for good. @param {string} text */
+  unread(text) {
+    if (text.startsWith('{"kind":"state"')) this.#takes.got(true);
   }
 
   /**
@@ -191,33 +197,35 @@ export class PageSocket {
     socket.binaryType = 'arraybuffer';
     this.#next = socket;
     socket.onopen = (/** @type {{at_ms?: number} | undefined} */ event) => this.#connected(socket, socket.dialled_ms ?? now_ms, event?.at_ms ?? this.now());
-    socket.onclose = () => this.#failedDial();
+    socket.onclose = () => this.#socket ? this.#unneeded() : this.#failedDial();
     socket.onerror = () => {}; // a close always follows
   }
 
-  /** Where another one is open, only a message proves that the server serves this one too. @param {Socket} socket @param {number} asked_ms @param {number} at_ms */
+  /** Where another one is open, only the greeting proves that the server serves this one too, and brings the page its next ticket. @param {Socket} socket @param {number} asked_ms @param {number} at_ms */
   #connected(socket, asked_ms, at_ms) {
     if (!this.#socket) return this.#opened(socket, asked_ms, at_ms);
-    socket.onmessage = (/** @type {unknown} */ event) => {
-      if (this.#socket && this.now() - this.#came_ms <= limitsOf(this.trip).spare_ms) { // it has answered meanwhile
-        this.#forsake();
-        return this.#dials.unneeded(this.now());
-      }
+    /** What came before the greeting, as of a car whose agent is not there. @type {{data: any}[]} */
+    const came = [];
+    socket.onmessage = (/** @type {{data: any}} */ event) => {
+      came.push(event);
+      if (this.#socket && readMessage(event.data)?.kind !== 'hello') return;
+      if (this.#socket && this.now() - this.#came_ms <= limitsOf(this.trip).spare_ms) return this.#unneeded();
       this.#opened(socket, asked_ms, at_ms);
-      socket.onmessage(event);
+      for (const one of came) socket.onmessage(one);
     };
   }
 
   /** @param {Socket} socket @param {number} asked_ms @param {number} at_ms */
   #opened(socket, asked_ms, at_ms) {
     this.#next = null;
-    if (this.#socket) this.#drop();
+    const isInPlace = this.isOpen;
+    if (isInPlace) this.#drop();
     this.#socket = socket;
-    this.#dials.opened();
+    this.#dials.opened(this.now(), isInPlace);
     this.#proof_ms = this.#came_ms = this.now();
     const opened_ms = (at_ms - asked_ms) / 2; // to connect, and to become a WebSocket
-    this.#takes = new Takes(asked_ms, opened_ms);
     if (isSlower(this.trip, opened_ms)) this.trip = measured(null, opened_ms);
+    this.#takes = new Takes(asked_ms, opened_ms, aheadOf(this.trip), this.#takes.areNamed);
     socket.onmessage = (/** @type {{data: any, at_ms?: number}} */ event) => {
       this.#came_ms = this.now();
       if (typeof event.data === 'string') return this.ear.text(event.data, event.at_ms);
@@ -240,6 +248,12 @@ export class PageSocket {
   #failedDial() {
     this.#forsake();
     this.#dials.failed();
+  }
+
+  /** The open one stays. */
+  #unneeded() {
+    this.#forsake();
+    this.#dials.unneeded(this.now());
   }
 
   /** Give up the one that is connecting. */

@@ -195,7 +195,7 @@ export class Store extends Known {
   #heard(text, at_ms = this.now()) {
     this.#woke(); // a phone that wakes may read what came before the page looks at the time
     const message = readMessage(text);
-    if (!message) return void (this.unreadable += 1);
+    if (!message) return void [this.unreadable += 1, this.socket.unread(text)];
     if (message.kind === 'state' || message.kind === 'cars') this.socket.answered(at_ms, message.kind);
     switch (message.kind) {
       case 'hello': return this.#greeted(message, at_ms);

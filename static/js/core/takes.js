@@ -16,17 +16,21 @@ export class Takes {
   #trustedFrom = 0;
   /** States come without an offer: so many may be under way. */
   ahead = 0;
-  /** When the last frame was asked for, or this connection; and whether it is still to come. */
+  /** The server names the take that an offer answers. */
+  areNamed;
+  /** When the last frame was requested, or this connection; and whether it is still to come. */
   asked_ms;
   isOwed = false;
   /** What waits for its turn: an offer, a state that came ahead. @type {Set<string>} */
   waiting = new Set();
 
-  /** @param {number} dialled_ms @param {number} opened_ms how long a round trip took to connect */
-  constructor(dialled_ms = -Infinity, opened_ms = Infinity) {
+  /** @param {number} dialled_ms @param {number} opened_ms how long a round trip took to connect @param {number} most how many states may come ahead at most @param {boolean} areNamed as over the connection before */
+  constructor(dialled_ms = -Infinity, opened_ms = Infinity, most = 0, areNamed = false) {
     this.#sent = new Map([[0, dialled_ms]]);
     this.asked_ms = dialled_ms;
     this.#window = new AheadWindow(opened_ms);
+    this.areNamed = areNamed;
+    this.ahead = areNamed ? Math.min(most, this.#window.size) : 0;
   }
 
   /** When a take was sent; −Infinity: it is none of this connection's. @param {number} number */
@@ -37,6 +41,13 @@ export class Takes {
   /** Whether states are of after the last sleep. */
   get isTrusted() {
     return this.#trustedFrom === 0;
+  }
+
+  /** It is a former server, which names no take; when the last one was sent. */
+  unnamed() {
+    this.areNamed = false;
+    this.ahead = this.#trustedFrom = 0;
+    return this.asked_ms;
   }
 
   /** States are trusted once the next take was answered. */
@@ -51,12 +62,13 @@ export class Takes {
    * @param {number} [at_ms] when the answer came, where the take was answered at once
    */
   received(number, most, at_ms) {
+    this.areNamed = true;
     if (number >= this.#trustedFrom) this.#trustedFrom = 0;
     if (at_ms !== undefined) this.#window.answered(this.sent_ms(number), at_ms);
     this.ahead = Math.min(most, this.#window.size);
   }
 
-  /** A frame came; whether that was asked for. @param {boolean} isState */
+  /** A frame came; whether that was requested. @param {boolean} isState */
   got(isState) {
     const { isOwed } = this;
     if (isState) this.#got += 1;

@@ -39,7 +39,7 @@ export class Admission {
   dial(trip) {
     const next = this.#next;
     const ticketOf = next === null ? (/** @type {() => boolean} */ isWanted) => this.#ticket(isWanted, limitsOf(trip).ticket_ms) : async () => next;
-    // One that is given up was hardly shown; one that the server refuses was.
+    // One of a socket that is given up before was hardly shown.
     return new TicketSocket(this.address(), ticketOf, (hello) => this.greeted(hello), () => { if (this.#next === next) this.#next = null; });
   }
 
@@ -95,7 +95,7 @@ class TicketSocket {
   #socket = null;
   #isClosed = false;
   #onHello;
-  #onRefused;
+  #onUsed;
   /** @type {number | undefined} */
   dialled_ms;
 
@@ -103,11 +103,11 @@ class TicketSocket {
    * @param {string} address
    * @param {(isWanted: () => boolean) => Promise<string | null>} ticketOf
    * @param {(hello: import('../core/protocol-types.js').Hello) => void} onHello also of a socket that the page then does not need: it used the ticket up, and brings the next
-   * @param {() => void} onRefused it closed by itself before it was greeted
+   * @param {() => void} onUsed the ticket was shown: the socket opened, or closed by itself before
    */
-  constructor(address, ticketOf, onHello, onRefused) {
+  constructor(address, ticketOf, onHello, onUsed) {
     this.#onHello = onHello;
-    this.#onRefused = onRefused;
+    this.#onUsed = onUsed;
     ticketOf(() => !this.#isClosed).catch(() => null).then((ticket) => this.#open(address, ticket));
   }
 
@@ -133,7 +133,10 @@ class TicketSocket {
     this.dialled_ms = performance.now();
     let isGreeted = false;
     socket.binaryType = this.binaryType;
-    socket.onopen = () => this.onopen?.();
+    socket.onopen = () => {
+      this.#onUsed();
+      this.onopen?.();
+    };
     socket.onmessage = (event) => {
       const hello = isGreeted ? null : readMessage(event.data);
       if (hello?.kind === 'hello') {
@@ -143,7 +146,7 @@ class TicketSocket {
       this.onmessage?.(event);
     };
     socket.onclose = () => {
-      if (!isGreeted && !this.#isClosed) this.#onRefused();
+      if (!isGreeted && !this.#isClosed) this.#onUsed();
       this.onclose?.();
     };
     socket.onerror = () => this.onerror?.();

@@ -40,15 +40,13 @@ export class FleetStore {
   #cars_ms = -Infinity;
   #started_ms = 0;
   #hasGreeted = false;
-  /** The server knows who this page is, on this connection: before, it files a command under nobody. */
-  #isKnown = false;
   #clock = new ServerClock();
   /** @type {Emitter<Topic>} */
   #emitter = new Emitter((error) => this.painter.failed(error));
   painter = new Painter(this.#emitter);
   seal = new Seal(() => ({ who: this.who, duty: this.duty, ...this.self }));
   #requests = new Requests(
-    (message) => this.#isKnown && this.socket.send(message), (answer) => this.#emitter.emit('refused', answer), (message) => this.#sealed(message),
+    (message) => this.sync.hasGreeted && this.socket.send(message), (answer) => this.#emitter.emit('refused', answer), (message) => this.#sealed(message),
     (found) => this.#emitter.emit('became', found),
   );
   #watch = new PageWatch({
@@ -58,6 +56,8 @@ export class FleetStore {
   });
   /** As the ordinary page's store has it. */
   sync = {
+    /** The server knows who this page is, on this connection: before, it files a command under nobody. */
+    hasGreeted: false,
     whenOpen: (/** @type {() => void} */ listener) => {
       if (this.#hasGreeted) listener();
       return this.on('open', listener);
@@ -71,7 +71,7 @@ export class FleetStore {
   constructor(dial, self) {
     this.self = self;
     this.socket = new PageSocket({
-      opened: () => void (this.#isKnown = false),
+      opened: () => void (this.sync.hasGreeted = false),
       text: (text, at_ms) => this.#emitter.guard(() => this.#heard(text, at_ms)),
       bytes: () => {},
       closed: () => this.#emitter.guard(() => this.#requests.broke()),
@@ -157,6 +157,7 @@ export class FleetStore {
 
   /** @param {string} text @param {number} [at_ms] when it came */
   #heard(text, at_ms = this.now()) {
+    this.#woke(); // a phone that wakes may read what came before the page looks at the time
     const message = readMessage(text);
     if (!message) return undefined;
     switch (message.kind) {
@@ -192,7 +193,7 @@ export class FleetStore {
     this.isAnswering = true;
     this.unserved = '';
     this.#clock.greeted(hello, at_ms, this.socket.dialled_ms);
-    this.#isKnown = this.socket.send({ kind: 'hello', boot: hello.boot, name: this.self.name, page: this.self.page });
+    this.sync.hasGreeted = this.socket.send({ kind: 'hello', boot: hello.boot, name: this.self.name, page: this.self.page });
     this.#hasGreeted = true;
     this.#emitter.emit('open', hello);
   }
@@ -219,13 +220,15 @@ export class FleetStore {
   #look() {
     this.painter.look(!document.hidden);
     const now_ms = this.now();
-    if (this.#watch.slept_ms(now_ms) > 2000 && this.cars) this.deadMan.cover();
+    this.#woke();
     this.deadMan.look(now_ms);
     this.socket.look(now_ms);
     if (this.socket.isOpen) this.#requests.look(now_ms);
     if (!document.hidden) this.painter.keepUp(now_ms, this.deadMan.heard_ms);
     this.#emitter.emit('tick');
   }
+
+  #woke = () => void (this.#watch.slept_ms(this.now()) > 2000 && this.cars && this.deadMan.cover());
 
   /** Hidden, frozen or back. @param {boolean} isBack @param {boolean} isRestored */
   #slept(isBack, isRestored) {

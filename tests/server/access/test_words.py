@@ -141,6 +141,33 @@ def test_a_ticket_of_a_socket_lasts_ten_minutes_beyond_it(away_s: float, is_in: 
     assert tickets.use(ticket, "a", now_s=50_000.0 + away_s) is is_in
 
 
+def test_a_ticket_of_a_second_socket_lasts_while_the_first_one_is_served() -> None:
+    tickets, now_s = Tickets(), [0.0]
+    with tickets.beside_socket("a", now=lambda: now_s[0]) as first:
+        assert tickets.use(first, "a", now_s=0.0)
+        with tickets.beside_socket("a", now=lambda: now_s[0]) as second:
+            pass
+        now_s[0] = 50_000.0
+        tickets.new("b", now_s=now_s[0])
+        assert second in tickets._open
+    tickets.new("b", now_s=50_599.0)
+    assert second in tickets._open
+    assert not tickets.use(second, "a", now_s=50_601.0)
+    assert not tickets._served
+    assert not tickets._left
+
+
+def test_of_sockets_that_end_beside_another_one_few_tickets_are_kept() -> None:
+    tickets = Tickets()
+    with tickets.beside_socket("a", now=lambda: 0.0) as own:
+        left = []
+        for _ in range(50):
+            with tickets.beside_socket("a", now=lambda: 0.0) as ticket:
+                left.append(ticket)
+        tickets.new("b", now_s=700.0)
+        assert [one for one in (own, *left) if one in tickets._open] == [own, *left[-4:]]
+
+
 def test_a_ticket_of_a_socket_that_was_used_meanwhile_stays_used() -> None:
     tickets = Tickets()
     with tickets.beside_socket("a", now=lambda: 0.0) as ticket:

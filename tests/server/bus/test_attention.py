@@ -118,7 +118,7 @@ async def test_a_car_whose_agent_is_gone_cannot_be_taken() -> None:
     clock, replies = Clock(), list[Any]()
     async with running_broker() as broker, node(broker.address, clock) as room:
         page = FleetCommands(room, LOCAL, Limits(), now=clock, send=replies.append, complain=replies.append)
-        await page.begin({"kind": "hello", "page": "page-ann"})
+        page.begin({"kind": "hello", "page": "page-ann"})
 
         async def why() -> str:
             await page.command({"kind": "take_item", "vehicle": "ocelot", "id": "1"})

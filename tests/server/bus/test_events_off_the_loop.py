@@ -18,7 +18,7 @@ import pytest
 from server.bus.journal import SLOW_DISK_S, Journal
 from server.bus.local import LocalBus
 from server.storage.storage_thread import StorageThread
-from server.web.event_feed import EventFeed
+from server.web.event_feed import FIRST_BATCH, EventFeed
 
 
 def event(text: str = "x", **more: Any) -> dict[str, Any]:
@@ -193,7 +193,7 @@ async def test_older_events_are_read_while_the_page_gets_its_other_frames(tmp_pa
         assert feed.after(0) == []
         assert not ready.is_set()
     await asyncio.wait_for(ready.wait(), 5)
-    assert numbers(feed.after(0)) == list(range(1, 101))
+    assert numbers(feed.after(0)) == list(range(1, FIRST_BATCH + 1))
     ready.clear()
     assert feed.after(100) == []
     await asyncio.wait_for(ready.wait(), 5)

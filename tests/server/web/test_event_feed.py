@@ -65,9 +65,13 @@ class Long:
         return [{"n": n + 1 + i} for i in range(limit)]
 
 
+def feed_of(bus: object) -> EventFeed:
+    return EventFeed(cast(PageBus, bus), "car", time.monotonic, lambda: None)
+
+
 async def test_batches_grow_while_a_page_has_them_quickly_and_a_slow_one_gets_small_ones() -> None:
-    feed, sizes, n = EventFeed(cast(PageBus, Long()), "car", time.monotonic, lambda: None), list[int](), 0
-    for delay_s in (0.0, 0.05, 0.09, 0.05, 0.2, 0.05, 3.0):
+    feed, sizes, n = feed_of(Long()), list[int](), 0
+    for delay_s in (0.0, 0.05, 0.49, 0.7, 0.95, 0.4, 0.1, 0.1, 0.1, 1.1, 3.0):
         events = feed.after(n)
         n = events[-1]["n"]
         sizes.append(len(events))
@@ -76,14 +80,26 @@ async def test_batches_grow_while_a_page_has_them_quickly_and_a_slow_one_gets_sm
         assert feed.acknowledged()
         assert not feed.acknowledged(), "of one batch once"
     sizes.append(len(feed.after(n)))
-    assert sizes == [100, 200, 400, 400, 400, 100, 200, 100]
+    assert sizes == [10, 20, 40, 80, 90, 100, 200, 400, 400, 400, 200, 100]
 
 
-async def test_the_next_gap_begins_with_a_small_batch_again() -> None:
-    feed = EventFeed(cast(PageBus, Long()), "car", time.monotonic, lambda: None)
-    feed.sent(feed.after(0))
-    assert feed.acknowledged()
-    assert len(feed.after(100)) == 200
-    feed.sent([{"n": 101}])  # all that there was
-    assert not feed.acknowledged()
-    assert len(feed.after(101)) == 100
+async def test_no_batch_is_smaller_than_the_first_one() -> None:
+    feed = feed_of(Long())
+    for _ in range(3):
+        feed.sent(feed.after(0))
+        await asyncio.sleep(5.0)
+        assert feed.acknowledged()
+    assert len(feed.after(0)) == 10
+
+
+async def test_the_next_gap_begins_as_the_last_one_ended_unless_an_answer_was_slow_meanwhile() -> None:
+    feed = feed_of(Long())
+    for _ in range(3):
+        feed.sent(feed.after(0))
+        assert feed.acknowledged()
+    for took_s, size in ((0.1, 80), (2.0, 40)):
+        assert len(feed.after(100)) == 80
+        feed.sent([{"n": 101}])  # all that there was
+        await asyncio.sleep(took_s)
+        assert not feed.acknowledged()
+        assert len(feed.after(101)) == size

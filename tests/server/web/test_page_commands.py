@@ -39,6 +39,7 @@ async def test_another_car_that_is_lost_does_not_hold_up_the_page() -> None:
     page = PageCommands(
         bus, "ocelot", view, LOCAL, Limits(), now=lambda: 0.0, wall_ms=lambda: 0, send=lambda _: None, complain=print
     )
+    page.begin({"kind": "hello"})
     async with asyncio.timeout(0.5):
         for _ in range(3):
             await page.present(
@@ -70,6 +71,7 @@ async def test_other_cars_are_announced_while_the_own_one_is_not_served() -> Non
         send=lambda _: None,
         complain=complaints.append,
     )
+    page.begin({"kind": "hello"})
     await page.present(
         {"kind": "present", "visible": True, "sound": "ready", "awake": "ready", "announces": ["serval"]}
     )
@@ -78,8 +80,26 @@ async def test_other_cars_are_announced_while_the_own_one_is_not_served() -> Non
     assert complaints == []
 
 
+async def test_a_page_of_all_cars_is_not_counted_on_before_its_hello() -> None:
+    reached: list[str] = []
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        reached.append(command["page"])
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=lambda: 0.0)
+    bus.serve("ocelot", car)
+    page = FleetCommands(bus, LOCAL, Limits(), now=lambda: 0.0, send=lambda _: None, complain=print)
+    present = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready"}
+    await page.present(present)
+    page.begin({"kind": "hello", "page": "page-ann"})
+    await page.present(present)
+    await page.leave()
+    assert set(reached) == {"page-ann"}
+
+
 @pytest.mark.parametrize("is_fleet", [False, True])
-async def test_before_its_hello_no_command_of_a_page_is_carried_out_and_no_outcome_is_told(is_fleet: bool) -> None:
+async def test_before_its_hello_no_command_of_a_page_is_carried_out_and_no_outcome_is_given(is_fleet: bool) -> None:
     outcomes = Outcomes(lambda: 1000.0)
     outcomes._since_s = 0.0
     done: list[str] = []
@@ -111,19 +131,19 @@ async def test_before_its_hello_no_command_of_a_page_is_carried_out_and_no_outco
 
     hello = {"kind": "hello", "page": "page-ann"}
     acknowledge = {"kind": "acknowledge", "vehicle": "ocelot", "alarm": "speed_limit", "occurrence": 1}
-    asked = {"kind": "outcome", "id": "a-1?", "of": "a-1", "ago_s": 1.0, "vehicle": "ocelot"}
+    query = {"kind": "outcome", "id": "a-1?", "of": "a-1", "ago_s": 1.0, "vehicle": "ocelot"}
 
     async def answer(to: PageCommands | FleetCommands, message: dict[str, Any]) -> dict[str, Any]:
         await to.command(message)
         return next(one for one in reversed(replies) if one.get("id") == message["id"])
 
     before, after = page(), page()
-    await before.begin(hello)
+    before.begin(hello)
     assert (await answer(before, {**acknowledge, "id": "a-1"}))["ok"] is True
-    reply = await answer(after, asked)
+    reply = await answer(after, query)
     assert (reply["ok"], reply.get("became")) == (False, None)
     assert (await answer(after, {**acknowledge, "id": "a-2"}))["ok"] is False
-    await after.begin(hello)
-    assert (await answer(after, asked))["became"] == "done"
+    after.begin(hello)
+    assert (await answer(after, query))["became"] == "done"
     assert (await answer(after, {**acknowledge, "id": "a-3"}))["ok"] is True
     assert done == ["a-1", "a-3"]

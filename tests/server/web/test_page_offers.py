@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import json
 import time
+import zlib
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from itertools import pairwise
@@ -22,13 +24,23 @@ from server.protocol.state import ServerState
 from server.replay.manager import ReplayManager
 from server.replay.view_source import ViewSource
 from server.web.fair_wakeup import FairWakeup
-from server.web.page_offers import AHEAD_EVERY_S, MOST_AHEAD, PageOffers
+from server.web.page_offers import AHEAD_EVERY_S, MOST_AHEAD, THIN_SCAN_EVERY_S, PageOffers
 from server.web.page_writer import PageWriter
 
 pytestmark = pytest.mark.virtual_time
 
 
 STATE, SMALL = 800, 120
+
+
+def event(n: int) -> dict[str, Any]:
+    """Of 50 bytes, compressed beside others."""
+    digits = hashlib.sha256(str(n).encode()).hexdigest()
+    return {
+        "alarm": f"signal_slow.{digits[:8]}", "occurrence": n, "change": "raised", "priority": "warning",
+        "title": f"{digits[:8]} slower than expected", "text": f"{digits[8:56]} messages a second, at least 8 expected",
+        "at_ms": 1_790_000_000_000 + int(digits[56:62], 16), "cause": None, "by": None, "reason": None,
+    }  # fmt: skip
 
 
 class SlowPage:
@@ -42,6 +54,9 @@ class SlowPage:
         self.more: Sequence[str] = ()  # what comes besides states
         self.most_under_way = 0
         self.events_s: list[float] = []  # how long each took
+        self.longest_s = 0.0  # that one message was on the air
+        self.scans = 0
+        self.most_event = 0
         self.states: list[tuple[float, int]] = []  # when each came, and its number
         self.offers: list[dict[str, Any]] = []
         self.writer: PageWriter | None = None
@@ -58,17 +73,20 @@ class SlowPage:
             self.most_under_way = max(self.most_under_way, self._sent - self._got)
         elif kind == "offer":
             self.offers.append({**message, "at_s": now_s})
-        self._free_s = max(self._free_s, now_s) + self.byte_s * (STATE if kind == "state" else SMALL)
+        size = {"state": STATE, "events": len(zlib.compress(text.encode()))}.get(kind, SMALL)
+        self.longest_s = max(self.longest_s, self.byte_s * size)
+        self._free_s = max(self._free_s, now_s) + self.byte_s * size
         if kind == "state" and self.ahead:
             self._take_later(0)
         elif kind == "offer" and message["of"]:
             self._take_later(message["seq"])
         elif kind == "events":
+            self.most_event = message["events"][-1]["n"]
             self.events_s.append(self._free_s - now_s)
-            asyncio.get_running_loop().call_later(self._free_s - now_s, self._have)
+            asyncio.get_running_loop().call_later(self._free_s - now_s + self.round_trip_s, self._have)
 
     async def send_bytes(self, _: bytes) -> None:
-        pass
+        self.scans += 1
 
     def _have(self) -> None:
         assert self.writer is not None
@@ -88,14 +106,15 @@ class SlowPage:
 
 
 @asynccontextmanager
-async def watching(page: SlowPage) -> AsyncIterator[LocalBus]:
-    """A car whose state is made twenty times a second."""
+async def watching(page: SlowPage, missed: int = 0) -> AsyncIterator[LocalBus]:
+    """A car whose state is made twenty times a second; `missed`: events that the page has not got."""
 
     async def car(_: Mapping[str, Any]) -> Mapping[str, Any]:
         return {"ok": True}
 
     bus = LocalBus(Journal(None), now=time.monotonic)
     bus.serve("car", car)
+    bus.append("car", [event(n) for n in range(missed)])
 
     async def drive() -> None:
         number = 0
@@ -211,6 +230,35 @@ async def test_over_16_kbit_s_no_more_states_are_under_way_than_the_page_allows_
     assert max(page.events_s) <= (ahead * STATE + 4 * SMALL) * page.byte_s
 
 
+@pytest.mark.parametrize("ahead", [2, 3])
+async def test_over_16_kbit_s_200_missed_events_come_in_short_messages_and_scans_seldom_where_less_is_allowed(
+    ahead: int,
+) -> None:
+    page = SlowPage(ahead)
+    page.byte_s, page.more = 8 / 16_000, ("scan",)
+    async with watching(page, missed=200):
+        await asyncio.sleep(40.0)
+        assert page.most_event == 200
+        came_s = [at_s for at_s, _ in page.states]
+        assert max(b - a for a, b in pairwise(came_s)) <= 2.0
+        assert page.longest_s < 1.0, "after that, the page dials another connection"
+        most = 40.0 / THIN_SCAN_EVERY_S + 1
+        assert 8 <= page.scans <= most if ahead == 2 else page.scans > most
+
+
+@pytest.mark.parametrize("kbit_s", [24, 32, 50])
+@pytest.mark.parametrize("round_trip_s", [0.1, 0.4])
+async def test_over_a_little_more_200_missed_events_come_in_messages_of_less_than_a_second(
+    kbit_s: int, round_trip_s: float
+) -> None:
+    page = SlowPage(4)
+    page.byte_s, page.round_trip_s = 8 / (1000 * kbit_s), round_trip_s
+    async with watching(page, missed=200):
+        await asyncio.sleep(30.0)
+    assert page.most_event == 200
+    assert page.longest_s < 1.0, "after that, the page dials another connection"
+
+
 def offers_of(now_s: float = 0.0) -> PageOffers:
     return PageOffers(lambda: now_s, lambda: 5)
 
@@ -221,7 +269,7 @@ def test_an_answer_that_comes_twice_or_names_more_than_was_sent_allows_no_more()
         offers.taken({"seq": 0, "n": number, "ahead": 2, "got": 10**9})
         assert offers.may_push
     for _ in range(2):
-        offers.sent_state()
+        offers.sent("state")
     assert not offers.may_push
     for number in range(4, 9):
         offers.taken({"seq": 0, "n": number, "ahead": 2, "got": 0})

@@ -9,6 +9,7 @@ import time
 
 import pytest
 import websockets
+from websockets.protocol import State
 
 from server.rosbridge_server.server import RosBridge
 from server.web import page_writer
@@ -198,3 +199,27 @@ async def test_hello_says_what_the_protocol_promises(server: str) -> None:
         assert hello["kind"] == "hello"
         assert set(hello) >= {"version", "boot", "vehicle", "vehicles", "time_ms", "last_event", "veil_after_s"}
         assert json.loads(await socket.recv())["kind"] == "state"
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize("fleet", [False, True])
+async def test_a_page_that_connects_again_ends_its_connection_that_is_quiet_and_no_other(
+    bridge: RosBridge, server: str, fleet: bool
+) -> None:
+    async with (
+        driving(bridge),
+        viewer(server, page="page-ann", fleet=fleet) as dead,
+        viewer(server, page="page-ann", fleet=fleet) as tab,
+        viewer(server, page="page-ben", fleet=fleet) as quiet,
+    ):
+        for one in (dead, tab, quiet):
+            await one.until(lambda one=one: one.offers)
+        dead.takes = quiet.takes = False
+        await asyncio.sleep(4.0)
+        assert dead.socket.state is State.OPEN
+        async with viewer(server, page="page-ann", fleet=fleet) as again, asyncio.timeout(10.0):
+            await dead.socket.wait_closed()
+            for one in (again, tab):
+                count = len(one.offers)
+                await one.until(lambda one=one, count=count: len(one.offers) > count + 5)
+        assert (tab.socket.state, quiet.socket.state) == (State.OPEN, State.OPEN)

@@ -66,6 +66,7 @@ class OnePage:
 
     def __init__(self, limit: int = RUNAWAY) -> None:
         self._limit = limit
+        self.more: dict[str, int] = {}  # of its takes
         self.takes_s: list[float] = []
         self.received: Counter[str] = Counter()
         self.events: list[int] = []  # their numbers
@@ -78,7 +79,7 @@ class OnePage:
             if len(self.takes_s) >= self._limit:
                 raise RuntimeError("the page is flooded")
             self.takes_s.append(time.monotonic())
-            self.writer.take({"seq": message["seq"]})
+            self.writer.take({"seq": message["seq"], **self.more})
         if message.get("kind") == "events" and self.writer is not None:
             self.events += [event["n"] for event in message["events"]]
             self.writer.have_events()
@@ -147,6 +148,15 @@ async def test_however_often_a_live_car_is_told_of_a_page_takes_at_most_so_many_
                 await asyncio.sleep(0.005)
         assert page.received["scan"] >= 50
         assert page.most_in_a_second <= A_SECOND
+
+
+async def test_over_a_radio_that_carries_little_scans_of_a_replay_come_as_they_are_played() -> None:
+    async with watching(replays=True) as (page, _bus, tapes, _view):
+        page.more = {"n": 1, "ahead": 1, "got": 0}
+        for _ in range(20):
+            tapes.tape.play("scan", payload=b"beams")
+            await asyncio.sleep(0.5)
+        assert page.received["scan"] == 20
 
 
 async def test_back_before_the_first_scan_nothing_is_offered_that_cannot_be_sent() -> None:
