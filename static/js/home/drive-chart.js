@@ -201,8 +201,7 @@ class DriveChart {
     const { head, stage } = this.parts;
     const box = this.panes.box;
     const left = box.left - stage.getBoundingClientRect().left;
-    const { cursor_s } = this;
-    const [from_s, to_s] = this.view;
+    const { cursor_s, view: [from_s, to_s] } = this;
     const marks = this.#scene().marks.map(({ x, priority, title, count, at_s }) => svg('g', { class: priority, transform: `translate(${(left + x - 11).toFixed(1)} 3)` },
       svg('title', {}, `${timeOfDay(this.#clock(at_s))} ${title}${count > 1 ? ` and ${count - 1} more` : ''}`), svg('use', { href: `#i-${ICONS[priority]}`, width: 22, height: 22 })));
     const tag = [];
