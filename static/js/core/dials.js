@@ -12,6 +12,8 @@ const FIRST_SPARE_MS = 1000;
 const LAST_SPARE_MS = 10_000;
 const CALM_MS = 60_000;
 const SOON_MS = 30_000;
+/** After one that took the place of another it waits so long at most: over a radio that loses much, two may be needed in a row [ms]. */
+const LAST_SWAPPED_MS = 4000;
 
 /** Of one page. Time is an argument. */
 export class Dials {
@@ -66,15 +68,15 @@ export class Dials {
   opened(now_ms, isInPlace) {
     this.#failed = 0;
     if (!isInPlace) return;
-    if (now_ms - this.#swapped_ms < SOON_MS) this.unneeded(now_ms); // the radio may carry too little for two
+    if (now_ms - this.#swapped_ms < SOON_MS) this.unneeded(now_ms, LAST_SWAPPED_MS); // the radio may carry too little for two
     else this.#spareWait_ms = FIRST_SPARE_MS;
     this.#swapped_ms = now_ms;
   }
 
-  /** The open one answered before it, or the server refused it. @param {number} now_ms */
-  unneeded(now_ms) {
+  /** The open one answered before it, or the server refused it. @param {number} now_ms @param {number} [longest_ms] the next one waits at most */
+  unneeded(now_ms, longest_ms = LAST_SPARE_MS) {
     if (now_ms - this.#maySpare_ms > CALM_MS) this.#spareWait_ms = FIRST_SPARE_MS;
-    this.#maySpare_ms = now_ms + this.#longer * this.#spareWait_ms;
+    this.#maySpare_ms = now_ms + this.#longer * Math.min(longest_ms, this.#spareWait_ms);
     this.#spareWait_ms = Math.min(LAST_SPARE_MS, 2 * this.#spareWait_ms);
   }
 
