@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { chipOf } from '../../static/js/control/control-layout.js';
-import { dutyWords, initialsOf, partOf } from '../../static/js/control/duty-layout.js';
+import { LeftNotice, dutyWords, initialsOf, partOf } from '../../static/js/control/duty-layout.js';
 import { endWords, leftLines, lineWords, markOf } from '../../static/js/control/handover-layout.js';
 import { lastWords } from '../../static/js/control/people-layout.js';
 import { requestItem, supervisorWords, unownedWords } from '../../static/js/shell/fleet-requests.js';
@@ -82,4 +82,14 @@ test('a request for control that nobody answers is an item', () => {
   assert.equal(requestItem('ocelot', summary({ requests: [] }), 0), null);
   assert.equal(requestItem('ocelot', summary({ requests: undefined }), 0), null, 'an older agent does not state it');
   assert.match(requestItem('ocelot', summary({ requests: [{ page: 'b', name: 'Ben', left_s: 1 }, { page: 'c', name: 'Cem', left_s: 5 }] }), 9)?.detail ?? '', /Granted in 0 s .* 1 other asks too/);
+});
+
+test('what others left is shown once in a duty, where it is known within 10 s of its beginning', () => {
+  const notice = new LeftNotice();
+  const found = (/** @type {boolean} */ isLeft, /** @type {number} */ now_ms, since_ms = AT) => notice.isDue(since_ms, isLeft, now_ms);
+  assert.deepEqual([found(false, 0), found(true, 1_500), found(false, 2_000), found(true, 60_000)], [false, true, false, true]); // it waits while it may not open
+  notice.isShown = true;
+  assert.equal(found(true, 61_000), false);
+  assert.deepEqual([found(false, 70_000, AT + 1), found(true, 80_001, AT + 1)], [false, false]); // left later
+  assert.equal(found(true, 90_000, AT + 2), true);
 });

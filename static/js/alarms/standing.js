@@ -66,6 +66,11 @@ export function ownerWords({ acknowledged_by, off_duty_ms }) {
   return `acknowledged${acknowledged_by ? ` by ${acknowledged_by}` : ''}${off_duty_ms ? `, off duty since ${timeOfDay(off_duty_ms).slice(0, 5)}` : ''}`;
 }
 
+/** Whether another person left it acknowledged who is off duty by now; who is on duty again owns what they had. @param {import('../core/protocol-types.js').StandingAlarm} alarm @param {{name: string}} me */
+export function isLeftBehind({ off_duty_ms, acknowledged_by }, me) {
+  return Boolean(off_duty_ms) && !acknowledged_by?.startsWith(`${me.name} (`);
+}
+
 /** @param {import('../core/protocol-types.js').StandingAlarm} alarm */
 function said(alarm) {
   const by = (/** @type {string | null | undefined} */ who) => (who ? ` by ${who}` : '');
