@@ -203,6 +203,11 @@ class Authorization:
         """When the duty of who acted under this name ended; None: it goes on, or it is not known to be a person."""
         return self._off_ms.get(display_name.person_of(signed) or "") if signed else None
 
+    @property
+    def has_people(self) -> bool:
+        """Whether anybody is on duty or was lately, as stated last."""
+        return bool(self._duties)
+
     def supervisors(self, now_s: float) -> tuple[str, ...] | None:
         """Who is on duty as supervisor; None: no page states it now."""
         stated = self._supervisors

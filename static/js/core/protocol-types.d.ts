@@ -2586,7 +2586,7 @@ export interface Take {
   seq: number;
 }
 
-/** Makes who sends it the owner of an acknowledged alarm; refused unless the duty of its owner has ended. */
+/** Makes who sends it the owner of an acknowledged alarm; refused unless the duty of its owner has ended, and from where nobody is on duty while people sign on at all. */
 export interface TakeAlarmCommand {
   id?: string | null;
   /** the car that the page named to its operator; refused by any other */
