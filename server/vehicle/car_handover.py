@@ -118,7 +118,7 @@ class CarHandover:
         return offer.by
 
     def take_alarm(self, command: handover_commands.TakeAlarm, caller: Caller, now_s: float) -> None:
-        """Make who is on duty where it is sent the owner of an acknowledged alarm whose owner is off duty. Raises Refused."""
+        """Make who sends it the owner of an acknowledged alarm whose owner is off duty. Raises Refused."""
         monitor = self._judgement.monitor
         alarm = monitor.alarms.get(command.alarm)
         if alarm is None or alarm.state is not AlarmState.ACKED or alarm.occurrence != command.occurrence:

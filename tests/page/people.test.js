@@ -37,7 +37,8 @@ test('who is on duty, and since when', () => {
   assert.deepEqual([row(null), row(AT - 60_000), row(AT - 20 * 3_600_000), row(AT - 3 * 86_400_000)], ['no shift yet', 'last shift today 13:57', 'last shift yesterday', 'last shift 16 Nov']);
 });
 
-test('a hand-over concerns two pages, and opens once all is read', () => {
+test('a hand-over concerns two pages, and opens once all is read', (t) => {
+  t.mock.timers.enable({ apis: ['Date'], now: AT });
   const handover = /** @type {any} */ ({ by: 'A', by_page: 'page-a', name: 'M. R.', page: 'page-b', since_ms: 0, lines: [{}, {}, {}], left: 1, version: 'x' });
   assert.deepEqual(['page-a', 'page-b', 'page-c', ''].map((page) => partOf(handover, page)), ['giver', 'taker', null, null]);
   assert.deepEqual(endWords(handover, 'taker'), { title: 'Take over control', text: '1 line not read back yet', isOpen: false });
@@ -58,10 +59,12 @@ test('who signs on is shown what people who are off duty left acknowledged, and 
   assert.equal(lines[0]?.text, '12 m/s. Acknowledged by M. R. (Desk).');
 });
 
-test('the queue says whose alarms are left without an owner on duty', () => {
+test('the queue says whose alarms are left without an owner on duty', (t) => {
+  t.mock.timers.enable({ apis: ['Date'], now: AT });
   const of = (/** @type {any} */ unowned) => unownedWords(/** @type {any} */ ({ unowned }));
   assert.equal(of({ count: 1, by: 'A. K. (Pixel)', since_ms: AT }), 'acknowledged by A. K. (Pixel), off duty since 13:58');
   assert.equal(of({ count: 3, by: 'A. K. (Pixel)', since_ms: AT }), '3 alarms acknowledged by A. K. (Pixel), off duty since 13:58');
+  assert.equal(of({ count: 1, by: 'A. K. (Pixel)', since_ms: AT - 86_400_000 }), 'acknowledged by A. K. (Pixel), off duty since 18 Nov, 13:58');
   assert.deepEqual([of(null), of(undefined)], ['', '']);
 });
 

@@ -1,7 +1,7 @@
 // A hand-over, in words: what the taker reads back. Fetched with its sheet.
 
 import { isLeftBehind, snackWords } from '../alarms/standing.js';
-import { timeOfDay } from '../core/format.js';
+import { sinceTime, timeOfDay } from '../core/format.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').HandoverState} HandoverState
@@ -10,7 +10,7 @@ import { timeOfDay } from '../core/format.js';
 
 /** The second line of a line. @param {HandoverLine} line */
 export function lineWords({ text, since_ms, until_ms, off_duty_ms }) {
-  const said = off_duty_ms ? `${text.replace(/\.$/, '')}, off duty since ${timeOfDay(off_duty_ms).slice(0, 5)}` : text; // who has acknowledged it ends the text
+  const said = off_duty_ms ? `${text.replace(/\.$/, '')}, off duty since ${sinceTime(off_duty_ms)}` : text; // who has acknowledged it ends the text
   const since = since_ms === null ? '' : `since ${timeOfDay(since_ms)}`;
   const until = until_ms === null ? '' : `back at ${timeOfDay(until_ms)}`;
   return [said, since || until].filter(Boolean).join(' · ');
