@@ -839,7 +839,7 @@ export interface HandoverLine {
   /** of an alarm */
   priority: Priority | null;
   since_ms: number | null;
-  /** of an acknowledged alarm: when the duty of its owner ended; null: it goes on */
+  /** of an acknowledged alarm: when the duty of its owner ended; null: on duty, or not known */
   off_duty_ms?: number | null;
   /** of what is shelved */
   until_ms: number | null;
@@ -2444,7 +2444,7 @@ export interface StandingAlarm {
   actions: Array<Action>;
   advice: string;
   acknowledged_by: string | null;
-  /** when the duty of who acknowledged it ended; null: it goes on, or nobody signed on */
+  /** when the duty of who acknowledged it ended; null: on duty, or not known */
   off_duty_ms?: number | null;
   shelved_until_ms: number | null;
   shelved_by: string | null;
