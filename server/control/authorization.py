@@ -180,13 +180,13 @@ class Authorization:
         """Store the status of a page that shows another car: it may hear alarms, and has no part in control."""
         if (operator := caller.operator) is None:
             return
-        self._hear_duties(caller, now_s)
+        self._take_duties(caller, now_s)
         if word.leaves:
             self._reach.leave_elsewhere(operator)
         else:
             self._reach.hear_elsewhere(operator, _present(word, caller), now_s)
 
-    def _hear_duties(self, caller: Caller, now_s: float) -> None:
+    def _take_duties(self, caller: Caller, now_s: float) -> None:
         if caller.supervisors is not None:
             self._supervisors = caller.supervisors, now_s
         if caller.duties is None or caller.duties == self._duties:
@@ -200,8 +200,14 @@ class Authorization:
         self._off_ms = dict(list(self._off_ms.items())[-MOST_DUTIES:])
 
     def off_duty_ms(self, signed: str | None) -> int | None:
-        """When the duty of who acted under this name ended; None: it goes on, or it is not known to be a person."""
+        """When the duty of who acted under this name ended; None: on duty, or not known (not a
+        person, renamed, or removed from the list before this session began)."""
         return self._off_ms.get(display_name.person_of(signed) or "") if signed else None
+
+    @property
+    def has_people(self) -> bool:
+        """Whether anybody is on duty or was lately, as stated last."""
+        return bool(self._duties)
 
     def supervisors(self, now_s: float) -> tuple[str, ...] | None:
         """Who is on duty as supervisor; None: no page states it now."""
@@ -210,7 +216,7 @@ class Authorization:
 
     def _note_duty(self, operator: Operator, caller: Caller, now_s: float) -> None:
         """Log who comes on duty, and who goes, at a page of this car."""
-        self._hear_duties(caller, now_s)
+        self._take_duties(caller, now_s)
         key, now = (operator.who, operator.page), caller.person
         before = self._on_duty.pop(key, None)
         self._on_duty = dict([*self._on_duty.items(), (key, now)][-MOST_NOTED:])

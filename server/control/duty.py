@@ -22,7 +22,7 @@ ENDS_AFTER_H = 12.0
 ENDS_WITHIN_H = (1.0, 24.0)
 NOTE_LASTS_MS = 86_400_000  # that a duty ended is shown for a day
 MOST_DUTIES = 100
-OFF_STATED_MS = 7 * 86_400_000  # cars are told so long that a duty ended
+OFF_STATED_MS = 7 * 86_400_000  # for so long each request to a car states that a duty ended
 HOUR_MS = 3_600_000
 
 

@@ -72,7 +72,7 @@ class StandingAlarm(TypedDict):
     advice: str
     acknowledged_by: str | None
     off_duty_ms: NotRequired[
-        Annotated[int | None, doc("when the duty of who acknowledged it ended; null: it goes on, or nobody signed on")]
+        Annotated[int | None, doc("when the duty of who acknowledged it ended; null: on duty, or not known")]
     ]
     shelved_until_ms: int | None
     shelved_by: str | None

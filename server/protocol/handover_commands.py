@@ -56,7 +56,8 @@ HandoverCommand = OfferControl | ReadBack | AcceptControl | EndOffer
 
 
 class TakeAlarm(OfCar):
-    """Makes who sends it the owner of an acknowledged alarm; refused unless the duty of its owner has ended."""
+    """Makes who sends it the owner of an acknowledged alarm; refused unless the duty of its owner has ended, and from
+    where nobody is on duty while people sign on at all."""
 
     needs: ClassVar[Needs] = "operator"
     http: ClassVar[str] = "Become the owner of an acknowledged alarm whose owner is off duty"

@@ -37,7 +37,9 @@ class HandoverLine(TypedDict):
     priority: Annotated[Priority | None, doc("of an alarm")]
     since_ms: int | None
     off_duty_ms: NotRequired[
-        Annotated[int | None, doc("of an acknowledged alarm: when the duty of its owner ended; null: it goes on")]
+        Annotated[
+            int | None, doc("of an acknowledged alarm: when the duty of its owner ended; null: on duty, or not known")
+        ]
     ]
     until_ms: Annotated[int | None, doc("of what is shelved")]
     read: Annotated[bool, doc("who takes over has confirmed it")]

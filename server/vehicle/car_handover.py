@@ -117,15 +117,17 @@ class CarHandover:
         self._judgement.report(self._judgement.monitor.hand_over(is_read_back, by.name, now_s))
         return offer.by
 
-    def take_alarm(self, command: handover_commands.TakeAlarm, by: str, now_s: float) -> None:
-        """Make `by` the owner of an acknowledged alarm whose owner is off duty. Raises Refused."""
+    def take_alarm(self, command: handover_commands.TakeAlarm, caller: Caller, now_s: float) -> None:
+        """Make who sends it the owner of an acknowledged alarm whose owner is off duty. Raises Refused."""
         monitor = self._judgement.monitor
         alarm = monitor.alarms.get(command.alarm)
         if alarm is None or alarm.state is not AlarmState.ACKED or alarm.occurrence != command.occurrence:
             raise Refused("This alarm is not an acknowledged one any more: look at the list again.")
         if self._authorization.off_duty_ms(alarm.acknowledged_by) is None:
             raise Refused(f"{alarm.spec.title}: {alarm.acknowledged_by} has acknowledged it and is not off duty.")
-        self._judgement.report(monitor.take_over(command.alarm, by, now_s, is_read_back=True))
+        if caller.person is None and self._authorization.has_people:
+            raise Refused("Sign on first: only a person who is on duty takes an alarm over.")
+        self._judgement.report(monitor.take_over(command.alarm, caller.name, now_s, is_read_back=True))
 
     def refusal(self, why: NotReadBack, now_s: float, wall_ms: int) -> Answer:
         """The answer to a read-back that does not fit, with what stands now."""

@@ -214,7 +214,7 @@ class CommandHandler:
                 judgement = parts.judgement
                 judgement.report(respond(judgement.monitor, command, now_s, by))
             case handover_commands.TakeAlarm():
-                parts.handover.take_alarm(command, by, now_s)
+                parts.handover.take_alarm(command, caller, now_s)
             case commands.TakeControl():
                 parts.authorization.obey(command, caller, now_s)
                 self._actions.attention_changed()  # the queue shows who asks for control

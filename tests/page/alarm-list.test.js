@@ -30,7 +30,8 @@ test('whatever is unacknowledged can be acknowledged, also once it has returned;
   assert.deepEqual(shown([alarm('a')], [], false)[0]?.keys, []);
 });
 
-test('an acknowledged alarm whose owner is off duty says so, can be taken over, and is not called acknowledged alone', () => {
+test('an acknowledged alarm whose owner is off duty says so, can be taken over, and is not called acknowledged alone', (t) => {
+  t.mock.timers.enable({ apis: ['Date'], now: new Date(2026, 10, 19, 23, 0).getTime() });
   const off = { state: 'ACKED', acknowledged_by: 'A. K. (Pixel)', off_duty_ms: new Date(2026, 10, 19, 14, 2, 30).getTime(), actions: ['shelve'], for_s: 90 };
   const rows = shown([alarm('a', off)]);
   assert.match(rows[0]?.state ?? '', /^acknowledged by A\. K\. \(Pixel\), off duty since 14:02 · active for/);

@@ -53,7 +53,8 @@ test('a car that is off on purpose is in no count and sounds nothing, and says w
   assert.deepEqual([row?.text, row?.kind, row?.isLost, row?.isAsking], ['Off on purpose', '', false, false]);
 });
 
-test('what somebody acknowledged who is off duty is asked for like what nobody has', () => {
+test('what somebody acknowledged who is off duty is asked for like what nobody has', (t) => {
+  t.mock.timers.enable({ apis: ['Date'], now: NOW });
   const unowned = { count: 1, by: 'A. K. (Pixel)', since_ms: NOW - 60_000 };
   const acked = (/** @type {any} */ more) => summary({ worst: worst({ state: 'ACKED', priority: 'warning' }), attention: item({ escalates_ms: null }), ...more });
   const of = seen({ a: acked({}), b: acked({ unowned }) });
@@ -61,7 +62,7 @@ test('what somebody acknowledged who is off duty is asked for like what nobody h
   assert.equal(first?.name, 'b');
   assert.match(first?.detail ?? '', /^12\.6 m\/s, limit 11\.0 m\/s; acknowledged by A\. K\. \(Pixel\), off duty since \d\d:\d\d$/);
   const rows = Object.fromEntries(carRows(of, ['b', 'a'], false).map(({ name, text }) => [name, text]));
-  assert.match(rows['b'] ?? '', /^owner off duty · /);
+  assert.match(rows['b'] ?? '', /^.+ · owner off duty$/);
   assert.doesNotMatch(rows['a'] ?? '', /off duty/);
 });
 

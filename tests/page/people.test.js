@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { chipOf } from '../../static/js/control/control-layout.js';
-import { dutyWords, initialsOf, partOf } from '../../static/js/control/duty-layout.js';
+import { LeftNotice, dutyWords, initialsOf, partOf } from '../../static/js/control/duty-layout.js';
 import { endWords, leftLines, lineWords, markOf } from '../../static/js/control/handover-layout.js';
 import { lastWords } from '../../static/js/control/people-layout.js';
 import { requestItem, supervisorWords, unownedWords } from '../../static/js/shell/fleet-requests.js';
@@ -37,7 +37,8 @@ test('who is on duty, and since when', () => {
   assert.deepEqual([row(null), row(AT - 60_000), row(AT - 20 * 3_600_000), row(AT - 3 * 86_400_000)], ['no shift yet', 'last shift today 13:57', 'last shift yesterday', 'last shift 16 Nov']);
 });
 
-test('a hand-over concerns two pages, and opens once all is read', () => {
+test('a hand-over concerns two pages, and opens once all is read', (t) => {
+  t.mock.timers.enable({ apis: ['Date'], now: AT });
   const handover = /** @type {any} */ ({ by: 'A', by_page: 'page-a', name: 'M. R.', page: 'page-b', since_ms: 0, lines: [{}, {}, {}], left: 1, version: 'x' });
   assert.deepEqual(['page-a', 'page-b', 'page-c', ''].map((page) => partOf(handover, page)), ['giver', 'taker', null, null]);
   assert.deepEqual(endWords(handover, 'taker'), { title: 'Take over control', text: '1 line not read back yet', isOpen: false });
@@ -58,10 +59,12 @@ test('who signs on is shown what people who are off duty left acknowledged, and 
   assert.equal(lines[0]?.text, '12 m/s. Acknowledged by M. R. (Desk).');
 });
 
-test('the queue says whose alarms are left without an owner on duty', () => {
+test('the queue says whose alarms are left without an owner on duty', (t) => {
+  t.mock.timers.enable({ apis: ['Date'], now: AT });
   const of = (/** @type {any} */ unowned) => unownedWords(/** @type {any} */ ({ unowned }));
   assert.equal(of({ count: 1, by: 'A. K. (Pixel)', since_ms: AT }), 'acknowledged by A. K. (Pixel), off duty since 13:58');
   assert.equal(of({ count: 3, by: 'A. K. (Pixel)', since_ms: AT }), '3 alarms acknowledged by A. K. (Pixel), off duty since 13:58');
+  assert.equal(of({ count: 1, by: 'A. K. (Pixel)', since_ms: AT - 86_400_000 }), 'acknowledged by A. K. (Pixel), off duty since 18 Nov, 13:58');
   assert.deepEqual([of(null), of(undefined)], ['', '']);
 });
 
@@ -82,4 +85,14 @@ test('a request for control that nobody answers is an item', () => {
   assert.equal(requestItem('ocelot', summary({ requests: [] }), 0), null);
   assert.equal(requestItem('ocelot', summary({ requests: undefined }), 0), null, 'an older agent does not state it');
   assert.match(requestItem('ocelot', summary({ requests: [{ page: 'b', name: 'Ben', left_s: 1 }, { page: 'c', name: 'Cem', left_s: 5 }] }), 9)?.detail ?? '', /Granted in 0 s .* 1 other asks too/);
+});
+
+test('what others left is shown once in a duty, where it is known within 10 s of its beginning', () => {
+  const notice = new LeftNotice();
+  const found = (/** @type {boolean} */ isLeft, /** @type {number} */ now_ms, since_ms = AT) => notice.isDue(since_ms, isLeft, now_ms);
+  assert.deepEqual([found(false, 0), found(true, 1_500), found(false, 2_000), found(true, 60_000)], [false, true, false, true]); // it waits while it may not open
+  notice.isShown = true;
+  assert.equal(found(true, 61_000), false);
+  assert.deepEqual([found(false, 70_000, AT + 1), found(true, 80_001, AT + 1)], [false, false]); // left later
+  assert.equal(found(true, 90_000, AT + 2), true);
 });

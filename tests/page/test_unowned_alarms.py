@@ -23,6 +23,11 @@ DUTY: dict[str, Any] = {
 }  # fmt: skip
 
 
+LATER = """window.late_ms = 0;
+    const now = performance.now.bind(performance);
+    performance.now = () => now() + window.late_ms;"""
+
+
 def left(name: str, title: str, **more: Any) -> dict[str, Any]:
     """An acknowledged alarm whose owner is off duty."""
     owner = {"state": "ACKED", "acknowledged_by": "A. K. (Desk)", "off_duty_ms": OFF_MS}
@@ -68,14 +73,30 @@ async def test_what_nobody_took_stands_in_the_list_with_its_key(phone: Phone, ca
     await until_sent(canned, "take_alarm")
 
 
-async def test_what_its_owner_left_after_this_person_signed_on_opens_nothing(phone: Phone, canned: Canned) -> None:
+async def test_it_opens_also_where_the_car_knows_of_the_end_of_the_duty_a_moment_later(
+    phone: Phone, canned: Canned
+) -> None:
     canned.duty = DUTY
     gps = left("gps_drift", "GPS drift", off_duty_ms=None)
     canned.state["alarms"] = [gps]
     await opened(phone, canned)
     await phone.drawn()
     gps |= {"off_duty_ms": OFF_MS}
+    await expect(phone.page.locator("#sheet-left")).to_contain_text("0 of 1 taken over")
+
+
+@pytest.mark.own_phone
+async def test_what_its_owner_left_later_in_this_duty_opens_nothing(phone: Phone, canned: Canned) -> None:
+    await phone.page.add_init_script(LATER)
+    canned.duty = DUTY
+    gps = left("gps_drift", "GPS drift", off_duty_ms=None)
+    canned.state["alarms"] = [gps]
+    await opened(phone, canned)
     await phone.drawn()
+    await phone.page.evaluate("window.late_ms = 11000")
+    await phone.drawn()
+    gps |= {"off_duty_ms": OFF_MS}
+    await phone.drawn(20)  # a sheet would be loaded by then
     await expect(phone.page.locator("#sheet-left")).to_have_count(0)
     assert sent(canned, "take_alarm") == []
 

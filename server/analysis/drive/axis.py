@@ -45,6 +45,15 @@ def day_time(at_ms: float, *, with_seconds: bool = True) -> str:
         return "–"
 
 
+def dated_time(at_ms: float, beside_ms: float) -> str:
+    """As `day_time`, with the day where it is another than that of `beside_ms`."""
+    try:
+        at, beside = (datetime.fromtimestamp(one / 1000, UTC) for one in (at_ms, beside_ms))
+    except (OverflowError, ValueError, OSError):
+        return day_time(at_ms)
+    return day_time(at_ms) if at.date() == beside.date() else f"{at:%-d %b %Y}, {day_time(at_ms)}"
+
+
 @dataclass(frozen=True, slots=True)
 class Scale:
     """Numbers of the drive to units of the drawing."""

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from server.analysis.alarm_load import Load
-from server.analysis.drive.axis import day_time
+from server.analysis.drive.axis import dated_time
 from server.recording.catalog.annotations import Annotations
 from server.recording.drive import people
 from server.recording.drive.facts import DriveFacts, DriveLog, figures_of
@@ -81,13 +81,16 @@ def _unrecorded(one: Unrecorded, facts: DriveFacts) -> dict[str, Any]:
     def at_ms(at_s: float) -> int:
         return facts.start_ms + round(at_s * 1000)
 
+    def clock(at_s: float) -> str:
+        return dated_time(at_ms(at_s), facts.start_ms)
+
     return {
         "from_ms": None if one.from_s is None else at_ms(one.from_s),
         "to_ms": None if one.to_s is None else at_ms(one.to_s),
-        "time": one.time(lambda at_s: day_time(at_ms(at_s))),
+        "time": one.time(clock),
         "parts": list(one.parts),
         "what": one.what,
-        "sentence": one.sentence(lambda at_s: day_time(at_ms(at_s))),
+        "sentence": one.sentence(clock),
     }
 
 

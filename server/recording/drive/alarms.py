@@ -15,7 +15,13 @@ from server.recording.drive.components import component_of
 from server.recording.drive.drive_events import Event, text_of
 
 MOST_ALARMS = 5000
-MARKS = {"planned_stop": "planned stop", "shelved": "shelved", "suppressed": "suppressed by another alarm"}
+PAUSED = "paused"  # among what suppresses an alarm: not an alarm but the pause
+MARKS = {
+    "planned_stop": "planned stop",
+    "shelved": "shelved",
+    "paused": "suppressed: monitoring was paused",
+    "suppressed": "suppressed by another alarm",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +40,7 @@ class AlarmInDrive:
     planned_stop: bool = False  # it was raised in a planned stop
     shelved: bool = False  # somebody had it hidden for a time
     suppressed: bool = False  # another alarm explained it for a time
+    paused: bool = False  # it was hidden while monitoring was paused
 
     @property
     def to_acknowledge_s(self) -> float | None:
@@ -54,7 +61,7 @@ def alarms_of(events: Sequence[Event]) -> list[AlarmInDrive]:
             found.append(_raised(alarm, event))
         if (place := standing.get(alarm)) is None:
             continue
-        found[place] = _hidden(found[place], event.get("state"))
+        found[place] = _hidden(found[place], event)
         if change == "acknowledged" and found[place].acknowledged_ms is None:
             by = text_of(event, "person", 60) or text_of(event, "by", 120)
             found[place] = replace(found[place], acknowledged_ms=event["at_ms"], acknowledged_by=by)
@@ -84,11 +91,16 @@ def by_component(alarms: Sequence[AlarmInDrive]) -> dict[str, int]:
     return dict(Counter(alarm.component for alarm in alarms).most_common(40))
 
 
-def _hidden(alarm: AlarmInDrive, state: object) -> AlarmInDrive:
+def _hidden(alarm: AlarmInDrive, event: Event) -> AlarmInDrive:
     """With the mark of the state in which an event left it."""
+    state, causes = event.get("state"), event.get("suppressed_by")
     if state == AlarmState.SHELVED:
         return replace(alarm, shelved=True)
-    return replace(alarm, suppressed=True) if state == AlarmState.SUPPRESSED else alarm
+    if state != AlarmState.SUPPRESSED:
+        return alarm
+    is_paused = isinstance(causes, list) and PAUSED in causes
+    is_explained = not is_paused or causes != [PAUSED]
+    return replace(alarm, paused=alarm.paused or is_paused, suppressed=alarm.suppressed or is_explained)
 
 
 def _raised(alarm: str, event: Event) -> AlarmInDrive:

@@ -46,7 +46,7 @@ class Unrecorded:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Beside:
-    """What tells of parts that are not among those of a drive."""
+    """By what parts are known that are not among those of a drive."""
 
     known: frozenset[str] = frozenset()  # names of recordings in the same folders, or named by one of them
     files: frozenset[str] = frozenset()  # those of them whose files are there, and are not known to be unreadable
@@ -63,7 +63,7 @@ def unrecorded_of(recording: Recording, parts: Sequence[DrivePart]) -> list[Unre
 
 
 def beside(recording: Recording, parts: Sequence[DrivePart]) -> Beside:
-    """What the folders of a recording tell. A part that is gone for good is named by the recording behind it."""
+    """What the folders of a recording hold. A part that is gone for good is named by the recording behind it."""
     folders = {path.parent for path in recording.paths}
     files = {id for folder in folders for id in readable_beside(folder)} - {id_of(path) for path in recording.paths}
     known = {id for folder in folders for id in known_beside(folder)}

@@ -1,6 +1,6 @@
 // How a standing alarm and the alarm load read: pure functions, no DOM.
 
-import { ageWords, fixed, timeOfDay } from '../core/format.js';
+import { ageWords, fixed, sinceTime, timeOfDay } from '../core/format.js';
 
 /**
  * What is wrong, and who has said what to it.
@@ -63,7 +63,12 @@ function bare(sentence) {
 
 /** Who has acknowledged it, and since when they are off duty. @param {Pick<import('../core/protocol-types.js').StandingAlarm, 'acknowledged_by' | 'off_duty_ms'>} alarm */
 export function ownerWords({ acknowledged_by, off_duty_ms }) {
-  return `acknowledged${acknowledged_by ? ` by ${acknowledged_by}` : ''}${off_duty_ms ? `, off duty since ${timeOfDay(off_duty_ms).slice(0, 5)}` : ''}`;
+  return `acknowledged${acknowledged_by ? ` by ${acknowledged_by}` : ''}${off_duty_ms ? `, off duty since ${sinceTime(off_duty_ms)}` : ''}`;
+}
+
+/** Whether another person left it acknowledged who is off duty by now; who is on duty again owns what they had. @param {import('../core/protocol-types.js').StandingAlarm} alarm @param {{name: string}} me */
+export function isLeftBehind({ off_duty_ms, acknowledged_by }, me) {
+  return Boolean(off_duty_ms) && !acknowledged_by?.startsWith(`${me.name} (`);
 }
 
 /** @param {import('../core/protocol-types.js').StandingAlarm} alarm */

@@ -26,3 +26,25 @@ export function partOf(handover, page) {
   if (!handover || !page) return null;
   return handover.page === page ? 'taker' : handover.by_page === page ? 'giver' : null;
 }
+
+/** For how long after a duty began it is shown what others left: a car knows of the end of another duty only by the next status of a page. */
+const LEFT_WITHIN_MS = 10_000;
+
+/** Whether who signs on is to be shown what people who are off duty left acknowledged: once in a duty. */
+export class LeftNotice {
+  isShown = false;
+  #since_ms = 0;
+  #until_ms = 0;
+  #isDue = false;
+
+  /** @param {number} since_ms when the duty began, by the server @param {boolean} isLeft @param {number} now_ms by a clock of the page */
+  isDue(since_ms, isLeft, now_ms) {
+    if (since_ms !== this.#since_ms) {
+      this.#since_ms = since_ms;
+      this.#until_ms = now_ms + LEFT_WITHIN_MS;
+      this.#isDue = this.isShown = false;
+    }
+    if (isLeft && now_ms <= this.#until_ms) this.#isDue = true;
+    return isLeft && this.#isDue && !this.isShown;
+  }
+}

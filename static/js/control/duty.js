@@ -1,6 +1,7 @@
 // Who is on duty at this device: asks once who it is where there is a list, tells how a duty ended, shows a hand-over.
 
-import { dutyWords, partOf } from './duty-layout.js';
+import { LeftNotice, dutyWords, partOf } from './duty-layout.js';
+import { isLeftBehind } from '../alarms/standing.js';
 import { field, listen, need, setText } from '../core/dom.js';
 import { request } from './request.js';
 import { closeSheet, mustWait } from '../shell/sheet.js';
@@ -81,16 +82,21 @@ function asker(store, say) {
 
 /** Whoever signs on is shown once what people who are off duty left acknowledged; later it stands in the list of alarms. @param {Store} store @param {Say} say */
 function leftBehind(store, say) {
-  let asked_ms = 0; // since when they are on duty who were shown it
+  const notice = new LeftNotice();
+  let isOpening = false;
 
   return () => {
     const { frame, duty } = store;
-    if (!frame || !duty?.me || duty.me.since_ms === asked_ms || store.isSilent || !mayAsk(store)) return;
-    asked_ms = duty.me.since_ms;
-    if (!frame.alarms.some(({ off_duty_ms }) => off_duty_ms)) return;
+    const me = duty?.me;
+    if (!frame || !me || store.isSilent) return;
+    const isDue = notice.isDue(me.since_ms, frame.alarms.some((alarm) => isLeftBehind(alarm, me)), performance.now());
+    if (!isDue || isOpening || !mayAsk(store)) return;
+    isOpening = true;
     import('./left-sheet.js').then(({ LeftSheet }) => {
-      if (!mustWait() && mayAsk(store)) new LeftSheet(store);
-      else asked_ms = 0;
+      isOpening = false;
+      if (mustWait() || !mayAsk(store)) return;
+      notice.isShown = true;
+      new LeftSheet(store);
     }).catch(() => say('The alarms that were left behind could not be loaded. They are in the list of alarms.', 'Not opened'));
   };
 }

@@ -1,7 +1,7 @@
 // A hand-over, in words: what the taker reads back. Fetched with its sheet.
 
-import { snackWords } from '../alarms/standing.js';
-import { timeOfDay } from '../core/format.js';
+import { isLeftBehind, snackWords } from '../alarms/standing.js';
+import { sinceTime, timeOfDay } from '../core/format.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').HandoverState} HandoverState
@@ -10,7 +10,7 @@ import { timeOfDay } from '../core/format.js';
 
 /** The second line of a line. @param {HandoverLine} line */
 export function lineWords({ text, since_ms, until_ms, off_duty_ms }) {
-  const said = off_duty_ms ? `${text.replace(/\.$/, '')}, off duty since ${timeOfDay(off_duty_ms).slice(0, 5)}` : text; // who has acknowledged it ends the text
+  const said = off_duty_ms ? `${text.replace(/\.$/, '')}, off duty since ${sinceTime(off_duty_ms)}` : text; // who has acknowledged it ends the text
   const since = since_ms === null ? '' : `since ${timeOfDay(since_ms)}`;
   const until = until_ms === null ? '' : `back at ${timeOfDay(until_ms)}`;
   return [said, since || until].filter(Boolean).join(' · ');
@@ -26,8 +26,7 @@ export function lineWords({ text, since_ms, until_ms, off_duty_ms }) {
 export function leftLines(alarms, me, taken) {
   return alarms.flatMap((alarm) => {
     const key = `${alarm.id} ${alarm.occurrence}`;
-    const isOwn = alarm.acknowledged_by?.startsWith(`${me.name} (`) ?? false; // who is on duty again owns what they had
-    if (alarm.state !== 'ACKED' || !(taken.has(key) || (alarm.off_duty_ms && !isOwn))) return [];
+    if (alarm.state !== 'ACKED' || !(taken.has(key) || isLeftBehind(alarm, me))) return [];
     const text = `${snackWords(alarm)}. Acknowledged by ${alarm.acknowledged_by}.`.replace('..', '.');
     return [{ key, kind: 'alarm', title: alarm.title, text, priority: alarm.priority, since_ms: alarm.raised_ms, until_ms: null, off_duty_ms: alarm.off_duty_ms ?? null, read: taken.has(key) }];
   });

@@ -65,6 +65,16 @@ export function timeOfDay(at_ms) {
 }
 
 /**
+ * Since when something is so, to the minute: "14:02", and "18 Nov, 14:02" where that is another day.
+ * @param {number} at_ms
+ */
+export function sinceTime(at_ms) {
+  const date = new Date(at_ms);
+  const day = date.toDateString() === new Date().toDateString() ? '' : `${date.toLocaleDateString('en-GB', { day: 'numeric', month: 'short' })}, `;
+  return `${day}${timeOfDay(at_ms).slice(0, 5)}`;
+}
+
+/**
  * A bearing in radians, counter-clockwise with 0 ahead, as degrees and a side.
  * @param {number | null | undefined} bearing_rad
  * @returns {{degrees: string, side: string} | null}

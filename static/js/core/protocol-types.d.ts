@@ -839,7 +839,7 @@ export interface HandoverLine {
   /** of an alarm */
   priority: Priority | null;
   since_ms: number | null;
-  /** of an acknowledged alarm: when the duty of its owner ended; null: it goes on */
+  /** of an acknowledged alarm: when the duty of its owner ended; null: on duty, or not known */
   off_duty_ms?: number | null;
   /** of what is shelved */
   until_ms: number | null;
@@ -2450,7 +2450,7 @@ export interface StandingAlarm {
   actions: Array<Action>;
   advice: string;
   acknowledged_by: string | null;
-  /** when the duty of who acknowledged it ended; null: it goes on, or nobody signed on */
+  /** when the duty of who acknowledged it ended; null: on duty, or not known */
   off_duty_ms?: number | null;
   shelved_until_ms: number | null;
   shelved_by: string | null;
@@ -2599,7 +2599,7 @@ export interface Take {
   got?: number;
 }
 
-/** Makes who sends it the owner of an acknowledged alarm; refused unless the duty of its owner has ended. */
+/** Makes who sends it the owner of an acknowledged alarm; refused unless the duty of its owner has ended, and from where nobody is on duty while people sign on at all. */
 export interface TakeAlarmCommand {
   id?: string | null;
   /** the car that the page named to its operator; refused by any other */

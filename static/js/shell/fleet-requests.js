@@ -1,6 +1,6 @@
 // Who is called next for an item, and who asks for control of a car that another has: pure functions for the attention queue.
 
-import { counted, duration, timeOfDay } from '../core/format.js';
+import { counted, duration, sinceTime } from '../core/format.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').AttentionItem} AttentionItem
@@ -22,7 +22,7 @@ export function supervisorWords({ escalated_ms, escalates_ms, supervisors }, now
 
 /** What people who are off duty by now left acknowledged. @param {CarSummary} summary @returns {string} '' where nothing is left so */
 export function unownedWords({ unowned }) {
-  return unowned ? `${unowned.count > 1 ? `${unowned.count} alarms ` : ''}acknowledged by ${unowned.by}, off duty since ${timeOfDay(unowned.since_ms).slice(0, 5)}` : '';
+  return unowned ? `${unowned.count > 1 ? `${unowned.count} alarms ` : ''}acknowledged by ${unowned.by}, off duty since ${sinceTime(unowned.since_ms)}` : '';
 }
 
 /**

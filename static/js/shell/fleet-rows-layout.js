@@ -64,13 +64,13 @@ export function carRows(seen, needing, isSilent) {
     const value_mps = row.speed.value_mps ?? kept?.speed.value_mps ?? null;
     const percent = (lost ? kept : car.summary)?.energy_percent ?? null;
     const text = isSilent ? 'not known now' : isNew ? 'No data yet' : isOff ? 'Off on purpose' : lost ? 'No data' : row.worst ? row.text.replace(/, ([\d:.,]+ s|acknowledged)(?=$| \+)/, '') : row.icon === 'ok' ? '–' : row.text.replace(/:.*/, '');
-    const before = !lost && car.summary?.unowned ? 'owner off duty' : '';
+    const owner = !lost && car.summary?.unowned ? 'owner off duty' : '';
     const stop = !lost && car.summary?.planned_stop ? 'planned stop' : '';
     const was = kept ? kept.holder : '';
     return {
       key: row.name, name: row.name, cars: [row.name],
       icon: isSilent || isNew ? 'unknown' : row.worst && isCut ? 'link-off' : row.icon,
-      kind: isSilent || isNew ? '' : row.kind, isAsking: !isSilent && !isNew && row.kind !== '' && row.needs, isLost: lost && !isOff, text: before || stop ? [before, text, stop].filter((part) => part && part !== '–').join(' · ') : text,
+      kind: isSilent || isNew ? '' : row.kind, isAsking: !isSilent && !isNew && row.kind !== '' && row.needs, isLost: lost && !isOff, text: owner || stop ? [text, owner, stop].filter((part) => part && part !== '–').join(' · ') : text,
       chain: lost ? NO_CHAIN : row.chain ?? NO_CHAIN, speed: { ink: value_mps === null ? 'never' : ink, value_mps },
       mode: modeOf(lost ? 'stale' : ink, row.speed.value_mps),
       operator: lost ? `${was ?? 'No one'}?` : row.operator,

@@ -151,7 +151,7 @@ def test_an_order_is_signed_by_the_person_at_the_device(person: Any, name: str) 
     assert (caller.person is not None) == (name != "Desk")
 
 
-def test_cars_are_told_who_is_on_duty_and_when_the_duty_of_others_ended(board: DutyBoard) -> None:
+def test_each_status_states_who_is_on_duty_and_when_the_duty_of_others_ended(board: DutyBoard) -> None:
     assert board.stated(500) == {}
     board.sign_on("phone", "Pixel 7", "ak", None, 1000)
     board.sign_on("desk", "Desk", "mr", None, 2000)

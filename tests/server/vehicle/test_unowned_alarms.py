@@ -104,6 +104,16 @@ async def test_who_takes_it_is_its_owner_also_after_a_restart() -> None:
     assert why == "Test warning: M. R. (Ben) has acknowledged it and is not off duty."
 
 
+@pytest.mark.parametrize("who", [BEN, PROGRAM])
+async def test_only_who_is_on_duty_takes_it_while_people_sign_on(who: dict[str, Any]) -> None:
+    car = await left()
+    assert "Sign on first" in await car.refused(who, "take_alarm", **TAKE)
+    assert listed(car)[2] == OFF_MS
+    await car.obeyed(SEEN | BEN | {"duties": {}}, "present")  # the list is empty: nobody can sign on
+    await car.obeyed(who, "take_alarm", **TAKE)
+    assert listed(car)[2] is None
+
+
 async def test_nobody_takes_what_has_an_owner_or_was_raised_again() -> None:
     car = await acknowledged()
     assert "is not off duty" in await car.refused(BEN | MR, "take_alarm", **TAKE)

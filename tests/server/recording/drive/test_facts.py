@@ -289,13 +289,19 @@ def test_an_alarm_that_was_shelved_or_suppressed_bears_the_mark(tmp_path: Path) 
         logged(7.0, "unsuppressed", "speed_limit", state="UNACKED"),
         logged(8.0, "raised", "fuel", state="UNACKED"),
         logged(9.0, "acknowledged", "fuel", state="ACKED"),
+        logged(10.0, "suppressed", "fuel", state="SUPPRESSED", suppressed_by=["paused"]),
+        logged(11.0, "raised", "laser", state="UNACKED"),
+        logged(12.0, "suppressed", "laser", state="SUPPRESSED", suppressed_by=["paused", "speed_limit"]),
+        logged(13.0, "raised", "tracks", state="UNACKED"),
     ]
     alarms = [asdict(one) for one in log_of(recorded(tmp_path, own)).alarms]
     assert [(one["alarm"], marks_of(one)) for one in alarms] == [
         ("gps_drift", "shelved"),
         ("gps_drift", "shelved"),
         ("speed_limit", "suppressed by another alarm"),
-        ("fuel", ""),
+        ("fuel", "suppressed: monitoring was paused"),
+        ("laser", "suppressed: monitoring was paused · suppressed by another alarm"),
+        ("tracks", ""),
     ]
 
 

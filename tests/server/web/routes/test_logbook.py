@@ -109,7 +109,7 @@ async def test_what_nobody_knows_is_an_empty_cell_and_no_zero(client: httpx.Asyn
     assert number(third, "alarms", "marks", "alarms per km") == [0, 0, 0]
 
 
-async def test_the_table_has_the_drives_that_were_asked_for(client: httpx.AsyncClient) -> None:
+async def test_the_table_has_the_drives_that_were_chosen(client: httpx.AsyncClient) -> None:
     assert [row["recording"] for row in await rows(client)] == [FIRST, SECOND, THIRD]
     assert [row["recording"] for row in await rows(client, tag="wet")] == [FIRST]
     assert [row["recording"] for row in await rows(client, person="A. K.")] == [FIRST]
