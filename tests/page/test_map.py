@@ -428,8 +428,11 @@ COVERED = """() => {
   const names = ['.name:nth-of-type(1)', '.name:nth-of-type(2)', '.beside'].map(at);
   const marks = ['.car-mark', '.phone-mark'].map(at);
   const over = ['.fabs', '.compass', '.map-by'].map(at);
-  const pairs = [...[...names, ...marks].flatMap((one) => over.map((other) => [one, other])), ...names.flatMap((one) => marks.map((other) => [one, other]))];
-  return pairs.filter(([[, a], [, b]]) => a?.width && b?.width && a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 1 && b.top < a.bottom - 1)
+  const pairs = [...names, ...marks].flatMap((one) => over.map((other) => [one, other]));
+  pairs.push(...names.flatMap((one) => marks.map((other) => [one, other])));
+  const meet = (a, b, from, to) => a[from] < b[to] - 1 && b[from] < a[to] - 1;
+  return pairs.filter(([[, a], [, b]]) => a?.width && b?.width)
+    .filter(([[, a], [, b]]) => meet(a, b, 'left', 'right') && meet(a, b, 'top', 'bottom'))
     .map(([[a], [b]]) => `${a} under ${b}`);
 }"""
 
