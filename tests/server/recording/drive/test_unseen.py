@@ -86,7 +86,7 @@ def test_a_late_link_has_the_farthest_way_of_what_it_showed() -> None:
 
 
 def told(facts: DriveFacts) -> dict[str, Any]:
-    recording = cast(Recording, SimpleNamespace(count=1, damage=[], metadata={}, paths=(), files=()))
+    recording = cast(Recording, SimpleNamespace(count=1, damage=[], metadata={}, paths=(), files=(), start_s=0.0))
     return report_json(facts, recording, name="", load=None, verified=(), annotations=annotations.NONE)
 
 
