@@ -51,7 +51,7 @@ def newest_head(path: Path) -> Head | None:
         ids = {id_of(each): each for each in _recordings(path.parent) if each.name.startswith(vehicle)}
     except OSError:
         return None
-    older = sorted((each for each in ids if _is_text(each) and _order(each) < _order(id)), key=_order, reverse=True)
+    older = sorted((each for each in ids if is_id(each) and _order(each) < _order(id)), key=_order, reverse=True)
     for each in older[:MOST_WITHOUT]:
         if (head := read_head(ids[each], each)) is not None:
             return head
@@ -235,11 +235,6 @@ def _siblings(folder: Path) -> list[Path]:
 
 def _recordings(folder: Path) -> Iterable[Path]:
     return (each for each in folder.iterdir() if each.name.endswith((FINISHED, WRITING)))
-
-
-def _is_text(id: str) -> bool:
-    """Whether metadata can hold it: a file's name may be bytes that are no UTF-8."""
-    return id.encode(errors="ignore").decode() == id
 
 
 def _order(id: str) -> tuple[tuple[int, int | str], ...]:

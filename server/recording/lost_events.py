@@ -89,7 +89,7 @@ def _behind(paths: Sequence[Path], vehicle: str, kept: Kept, check: Check) -> It
     at_ms = (kept.find(vehicle, newest) or (0,))[0]
     for path in paths:
         check()
-        if path.stat().st_mtime * 1000 <= at_ms:
+        if _stat(path)[0] * 1000 <= at_ms:
             continue
         rows = _newest_of(path, vehicle, newest, check)
         behind = [row for row in rows if row["n"] > newest]
@@ -98,7 +98,7 @@ def _behind(paths: Sequence[Path], vehicle: str, kept: Kept, check: Check) -> It
         goes_on = not known and behind and behind[0]["n"] <= top + MOST_BETWEEN and behind[0]["at_ms"] >= at_ms
         if all(same) if same else goes_on:
             is_whole = [row["n"] for row in behind] == list(range(newest + 1, newest + 1 + len(behind)))
-            was_cut = is_whole and top == newest and path.name.endswith(WRITING)
+            was_cut = is_whole and top == newest and path is paths[-1] and path.name.endswith(WRITING)
             cut: dict[str, Any] = {"was_cut": True} if was_cut else {}
             yield from ({**row, **cut} for row in behind if row["n"] > top)
             top = behind[-1]["n"] if behind else top
@@ -109,11 +109,21 @@ def _newest_of(path: Path, vehicle: str, newest: int, check: Check) -> Rows:
     """As `_events_of`; where the time does not suffice for a long recording that was never closed, those of its end, so
     that their numbers are not given again."""
     rows = _events_of(path, vehicle, MOST_OF_CUT, check)
-    is_long = path.name.endswith(WRITING) and path.stat().st_size > MOST_OF_CUT
+    is_long = path.name.endswith(WRITING) and _stat(path)[1] > MOST_OF_CUT
     if is_long and (not rows or rows[0]["n"] > newest):  # events before its end may be lost too
         with suppress(TimeoutError):
             rows = _events_of(path, vehicle, None, check)
     return rows
+
+
+def _stat(path: Path) -> tuple[float, int]:
+    """When it was written to last, in s since 1970, and its bytes; 0 of a file that is no longer there."""
+    try:
+        found = path.stat()
+    except OSError as error:
+        log.warning("recording not searched for events: path=%s error=%s", path, error)
+        return 0.0, 0
+    return found.st_mtime, found.st_size
 
 
 def _identity(row: Mapping[str, Any]) -> tuple[int, str | None, str]:

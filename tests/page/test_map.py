@@ -437,7 +437,7 @@ COVERED = """() => {
 }"""
 
 
-@pytest.mark.parametrize("size", [(360, 740), (412, 915), (820, 1180), (1440, 900)])
+@pytest.mark.parametrize("size", [(320, 640), (360, 740), (412, 915), (820, 1180), (1440, 900)])
 async def test_car_phone_and_their_names_stand_clear_of_keys_and_each_other(
     phone: Phone, canned: Canned, size: tuple[int, int]
 ) -> None:

@@ -101,7 +101,7 @@ def missing(parts: Sequence[DrivePart], beside: Beside = Beside()) -> list[Unrec
                 Unrecorded(
                     from_s=earlier.to_s if earlier is not None else until_s,
                     to_s=later.from_s if later is not None else next_s,
-                    why=_why(numbers, elsewhere, first.id),
+                    why=_why(numbers, elsewhere, first.id, is_end=later is None and next_s is not None),
                     parts=numbers,
                     is_elsewhere=len(elsewhere) == len(numbers),
                 )
@@ -130,12 +130,13 @@ def _runs(
             run = []
 
 
-def _why(numbers: Sequence[int], elsewhere: Sequence[int], first: str) -> str:
+def _why(numbers: Sequence[int], elsewhere: Sequence[int], first: str, *, is_end: bool) -> str:
     why = f"{_parts(numbers)} of the drive of {first} {'are' if len(numbers) > 1 else 'is'} not in this report"
     if not elsewhere:
         return f"{why}: not readable, deleted, or not among its files."
+    end = " When it ended, and whether anything was recorded behind it, is not known." if is_end else ""
     which = "" if len(elsewhere) == len(numbers) else f" of {_parts(elsewhere).lower()}"
-    return f"{why}: the file{which} is being recorded, in the trash, or beside the others."
+    return f"{why}: the file{which} is being recorded, in the trash, or beside the others.{end}"
 
 
 def _parts(numbers: Sequence[int]) -> str:
@@ -157,7 +158,7 @@ def _damaged(recording: Recording) -> Iterator[Unrecorded]:
 
 
 def _cut(recording: Recording) -> list[Unrecorded]:
-    """What was in the ends that files lack. What the log said there is in no later part."""
+    """What was in the ends that files lack. What the log had there is in no later part."""
     filled = [file for file in recording.files if any(channel.count for channel in file.channels)]
     found = []
     for file in filled:

@@ -28,6 +28,7 @@ from server.recording.read.unpack import verified
 log = logging.getLogger("catgraph.recording")
 
 _HEAD = struct.Struct("<BQ")  # opcode, length
+_OF_DATA = {Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.DATA_END}
 _MOST_TEXT = 16 << 20  # bytes of a record that declares something
 _LINK_WITHIN = 8 << 20  # bytes in which a record of the chain begins; one is written twice a second
 
@@ -78,7 +79,7 @@ def _of_closed(file: IO[bytes], topic: str, check: Check) -> Iterator[tuple[int,
     file.seek(at)
     while 0 < at < end:
         opcode, length = _HEAD.unpack(file.read(HEAD_BYTES))
-        if length > _MOST_TEXT:
+        if length > _MOST_TEXT or opcode in _OF_DATA:  # the footer is damaged: there is no index
             break
         body = file.read(length)
         at += HEAD_BYTES + length
@@ -87,7 +88,10 @@ def _of_closed(file: IO[bytes], topic: str, check: Check) -> Iterator[tuple[int,
         elif opcode == Opcode.CHUNK_INDEX:
             check()
             place, size = int.from_bytes(body[16:24], "little"), int.from_bytes(body[32:36], "little")
-            if any(int.from_bytes(body[one : one + 2], "little") in numbers for one in range(36, 36 + size, 10)):
+            if any(
+                int.from_bytes(body[one : one + 2], "little") in numbers
+                for one in range(36, min(36 + size, len(body)), 10)
+            ):
                 places.append(place)
     yield from ((place, numbers) for place in sorted(places))
 

@@ -97,7 +97,11 @@ function leftBehind(store, say) {
       if (mustWait() || !mayAsk(store)) return;
       notice.isShown = true;
       new LeftSheet(store);
-    }).catch(() => say('The alarms that were left behind could not be loaded. They are in the list of alarms.', 'Not opened'));
+    }).catch(() => {
+      isOpening = false;
+      notice.isShown = true;
+      say('The alarms that were left behind could not be loaded. They are in the list of alarms.', 'Not opened');
+    });
   };
 }
 

@@ -215,7 +215,7 @@ class MapTab {
 /** What lies over the map: the keys, whose map it is, and the head of its pane where it is no row of its own. @param {HTMLElement} root @param {HTMLElement} box of the map */
 function takenOf(root, box) {
   const { left, top, width } = box.getBoundingClientRect();
-  const over = ['.fabs', '.map-by'].map((one) => need(root, one).getBoundingClientRect());
+  const over = [...root.querySelectorAll('.fab, .map-by')].map((one) => one.getBoundingClientRect());
   const head = root.querySelector(':scope > .ph');
   const isOver = head !== null && getComputedStyle(head).position === 'absolute';
   const strip = { left: HEAD_PX.from, top: 0, width, height: HEAD_PX.high };

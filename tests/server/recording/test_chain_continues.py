@@ -171,6 +171,14 @@ def test_part_ten_follows_part_nine(tmp_path: Path) -> None:
     assert newest_head(tmp_path / "none" / "car_1.mcap") is None
 
 
+def test_a_copy_with_a_name_that_no_recording_has_is_not_named_as_the_one_before(tmp_path: Path) -> None:
+    for name in ("car_20260601T120000Z", "car_20260601T120000Z (copy)"):
+        closed(tmp_path / f"{name}.mcap", [[1]])
+    head = newest_head(tmp_path / "car_20260602T120000Z.mcap")
+    assert head is not None
+    assert head.id == "car_20260601T120000Z"
+
+
 async def test_a_recorder_names_the_part_before_also_after_a_restart(tmp_path: Path) -> None:
     heads = []
     for run in range(2):

@@ -331,16 +331,21 @@ async def test_what_is_brought_back_restores_no_state(data: Path) -> None:
             assert [one["n"] for one in shown if one["change"] == "stopped"] == [57], start
 
 
-@pytest.mark.parametrize(("is_closed", "lacks", "stands"), [(False, 0, True), (True, 0, False), (False, 1, False)])
+@pytest.mark.parametrize(
+    ("is_closed", "lacks", "has_newer", "stands"),
+    [(False, 0, False, True), (True, 0, False, False), (False, 1, False, False), (False, 0, True, False)],
+)
 async def test_a_pause_that_only_the_recording_of_a_killed_server_has_stands(
-    data: Path, *, is_closed: bool, lacks: int, stands: bool
+    data: Path, *, is_closed: bool, lacks: int, has_newer: bool, stands: bool
 ) -> None:
-    """The recorder was a moment ahead of the log. What came after a recording that ended, or in its gap, is unknown."""
+    """The recorder was a moment ahead of the log. Of what came after a recording, or in its gap, nothing is known."""
     started, paused = {"change": "started", "address": ADDRESS}, {"change": "paused", "by": "Ann", "since_ms": BEGAN_MS}
     with closing(Journal(data / "events.sqlite", run="killed")) as journal:
         journal.append("car", [{key: value for key, value in event(51, **started).items() if key != "n"}])
     rows = [event(51, **started), event(52, **paused, was_cut=True), event(53 + lacks)]
     record(data, rows, part=3, is_closed=is_closed)
+    if has_newer:
+        record(data, [], part=4)
     for start in range(2):
         async with serving(config(data)) as server, viewer(server) as page:
             session = (await page.state(lambda one: one["session"]["address"]))["session"]
