@@ -215,7 +215,7 @@ class Phone:
 LOST = re.compile(
     r"Service Worker registration blocked|WebSocket connection to"
     r"|Failed to load resource: net::ERR_(CONNECTION|EMPTY|CONTENT_LENGTH|SOCKET_NOT_CONNECTED)|ERR_CONNECTION"
-    r"|404 \(Not Found\) \S+[?&]replay="  # another connection took the place of a quiet one, which has a replay of its own
+    r"|404 \(Not Found\) \S+[?&]replay="  # of a connection that another one replaced
     r"|The page now draws the scan itself"  # on a machine that lets its thread wait; test_scan.py asks for it
     # A web node that has not heard the agent yet, where the port of one process would not be listened at yet:
     + (r"|the server responded with a status of 503" if IS_PARTED else "")
