@@ -11,7 +11,7 @@ from playwright.async_api import expect
 from tests.page.barriers import no_barrier
 from tests.page.canned import Canned, alarm
 from tests.page.conftest import Phone
-from tests.page.test_parts import opened, sent, until_sent
+from tests.page.test_parts import opened, until_sent
 
 pytestmark = pytest.mark.gate
 OFF_MS = 1_790_000_000_000
@@ -21,11 +21,6 @@ ME: dict[str, Any] = {
 DUTY: dict[str, Any] = {
     "kind": "duty", "me": ME, "signs": "M. R. (Pixel 7)", "ended": None, "people": 2, "on_duty": [ME],
 }  # fmt: skip
-
-
-LATER = """window.late_ms = 0;
-    const now = performance.now.bind(performance);
-    performance.now = () => now() + window.late_ms;"""
 
 
 def left(name: str, title: str, **more: Any) -> dict[str, Any]:
@@ -83,22 +78,6 @@ async def test_it_opens_also_where_the_car_knows_of_the_end_of_the_duty_a_moment
     await phone.drawn()
     gps |= {"off_duty_ms": OFF_MS}
     await expect(phone.page.locator("#sheet-left")).to_contain_text("0 of 1 taken over")
-
-
-@pytest.mark.own_phone
-async def test_what_its_owner_left_later_in_this_duty_opens_nothing(phone: Phone, canned: Canned) -> None:
-    await phone.page.add_init_script(LATER)
-    canned.duty = DUTY
-    gps = left("gps_drift", "GPS drift", off_duty_ms=None)
-    canned.state["alarms"] = [gps]
-    await opened(phone, canned)
-    await phone.drawn()
-    await phone.page.evaluate("window.late_ms = 11000")
-    await phone.drawn()
-    gps |= {"off_duty_ms": OFF_MS}
-    await phone.drawn(20)  # a sheet would be loaded by then
-    await expect(phone.page.locator("#sheet-left")).to_have_count(0)
-    assert sent(canned, "take_alarm") == []
 
 
 async def test_its_row_is_read_whole_beside_its_two_keys(phone: Phone, canned: Canned) -> None:
