@@ -184,6 +184,15 @@ class Phone:
         await self.page.add_locator_handler(acknowledge, press, no_wait_after=True)
         self._handled.append(acknowledge)
 
+    async def release_the_car(self) -> None:
+        """Presses the key and confirms it, and again where the page says that it came too late: a busy machine is."""
+        async with asyncio.timeout(60):
+            while await self.f("release").is_visible():
+                with contextlib.suppress(PlaywrightError):  # it goes where the press before was carried out
+                    await self.f("release").tap(timeout=2000)
+                    await self.f("yes", "#sheet-release").tap(timeout=2000)
+                await self.page.wait_for_timeout(1000)
+
     async def no_snackbar(self) -> None:
         """Waits until no snackbar covers a key, and acknowledges what waits for that."""
         async with asyncio.timeout(20):

@@ -55,8 +55,7 @@ async def test_a_page_signs_what_it_orders_and_a_cleared_browser_begins_anew(pho
     async with fleet(tmp_path) as one:
         address = f"{one.node.address}/?vehicle=ocelot"
         thumb = await armed_by_hand(phone, address)
-        await thumb.drag(1.0)
-        await expect(thumb.slide()).to_have_attribute("data-kind", "go")
+        await thumb.slow_the_car()
         await expect(page.locator(".order li[data-mark=ok]")).to_have_count(4)
         after_s = [float(text[1:-2]) for text in await page.locator(".order li b").all_inner_texts() if "+" in text]
         assert after_s[-1] < 2.0  # from the press to the car's own speed, signed and all
@@ -67,8 +66,7 @@ async def test_a_page_signs_what_it_orders_and_a_cleared_browser_begins_anew(pho
         assert first.startswith("First order of ")
         assert await page.evaluate(OWN_KEY) is False, "kept, and cannot be taken out"
         await phone.acknowledge_all()
-        await phone.f("release").tap()
-        await page.locator("#sheet-release").get_by_role("button", name="Release the car").tap()
+        await phone.release_the_car()
         await expect(phone.f("release")).to_be_hidden()
 
         await page.evaluate(CLEARED)

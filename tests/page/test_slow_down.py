@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import re
 import time
 from collections.abc import Sequence
@@ -67,6 +68,13 @@ class Thumb:
         if end:
             await self.touch("touchMove", end)
         await self.touch("touchEnd")
+
+    async def slow_the_car(self) -> None:
+        """Slides to the end, and again where the page says that it came too late: a busy machine is."""
+        for is_last in (False, False, True):
+            await self.drag(1.0)
+            with contextlib.nullcontext() if is_last else contextlib.suppress(AssertionError):
+                return await expect(self.slide()).to_have_attribute("data-kind", "go", timeout=6000)
 
 
 @pytest_asyncio.fixture(loop_scope="session")
@@ -418,14 +426,12 @@ async def armed_by_hand(phone: Phone, address: str, topic: str = "/catvehicle/cm
 async def test_the_simulated_car_slows_holds_and_is_released(phone: Phone, tmp_path: Path) -> None:
     async with running(*simulate()) as sim, running(*server(tmp_path, sim.address)) as watch:
         thumb = await armed_by_hand(phone, watch.address)
-        await thumb.drag(1.0)
-        await expect(thumb.slide()).to_have_attribute("data-kind", "go")
+        await thumb.slow_the_car()
         await expect(phone.page.locator(".order li[data-mark=ok]")).to_have_count(4)
         await expect(phone.f("legend-car")).to_have_text("slow-down: holding", timeout=20_000)
         await expect(phone.page.locator(".gauge .speed")).to_have_text(re.compile(r"^[−]?0\.\d$"), timeout=20_000)
         await phone.acknowledge_all()
-        await phone.f("release").tap()
-        await phone.page.locator("#sheet-release").get_by_role("button", name="Release the car").tap()
+        await phone.release_the_car()
         await expect(phone.f("release")).to_be_hidden()
         await expect(phone.f("stop")).to_be_visible()
 
@@ -436,7 +442,7 @@ async def test_an_order_is_at_the_car_in_time_and_each_step_later_than_the_one_b
 ) -> None:
     async with running(*simulate()) as sim, running(*server(tmp_path, sim.address)) as watch:
         thumb = await armed_by_hand(phone, watch.address)
-        await thumb.drag(1.0)
+        await thumb.slow_the_car()
         await expect(phone.page.locator(".order li[data-mark=ok]")).to_have_count(4)
         steps = await phone.page.locator(".order li b").all_inner_texts()
         after_s = [float(text[1:-2]) for text in steps if "+" in text]
@@ -449,7 +455,7 @@ async def test_with_another_who_commands_too_it_is_not_confirmed(phone: Phone, t
     competing = simulate("--competing-controller")
     async with running(*competing) as sim, running(*server(tmp_path, sim.address)) as watch:
         thumb = await armed_by_hand(phone, watch.address)
-        await thumb.drag(1.0)
+        await thumb.slow_the_car()
         await expect(phone.f("order-line")).to_have_text("NOT CONFIRMED – use the physical stop")
         await expect(phone.page.locator("#sheet-alarm")).to_be_visible()
         await expect(phone.f("legend-car")).to_have_text("slow-down: not confirmed")
@@ -505,8 +511,7 @@ async def test_a_guard_on_the_car_is_shown_and_what_it_holds_is_released_by_hand
                 await phone.live()
                 await expect(phone.f("slow-guard")).to_contain_text("GUARDED: the guard holds the car", timeout=20_000)
                 await phone.acknowledge_all()
-                await phone.f("release").tap()
-                await phone.page.locator("#sheet-release").get_by_role("button", name="Release the car").tap()
+                await phone.release_the_car()
                 await expect(phone.f("slow-guard")).to_contain_text("slows it when the link is lost")
 
 
