@@ -13,6 +13,7 @@ from server.protocol.messages import FrameKind
 
 OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
 AHEAD_EVERY_S = 0.15  # least time between two states that are sent ahead
+FIRST_AHEAD = 3  # so many states come before the first take: a page uncovers its values after as many
 THIN_AHEAD = 2  # a page that allows no more has a radio that carries little
 THIN_SCAN_EVERY_S = 3.0  # scans of the live car over such a radio: it may be a route that has only become longer
 MOST_AHEAD = 12  # to a page that does not answer: its answers may wait 1.8 s for one that was lost
@@ -36,7 +37,7 @@ class PageOffers:
         self.is_echo_due = False
         self._offered_s = self._echoed_s = float("-inf")
         self._open_seq = 0  # of the newest offer of anything
-        self._ahead = 0  # so many states may be under way; 0: the page takes them one by one
+        self._ahead = FIRST_AHEAD  # so many states may be under way; 0: the page takes them one by one
         self._ahead_s = float("-inf")
         self._scan_s = float("-inf")
         self._sent = 0  # states of this connection
@@ -72,7 +73,8 @@ class PageOffers:
 
     def push_wait_s(self) -> float:
         """How long the next state that is sent ahead has to wait."""
-        return self._ahead_s + AHEAD_EVERY_S - self._now()
+        every_s = OFFER_EVERY_S if self._sent < FIRST_AHEAD else AHEAD_EVERY_S
+        return self._ahead_s + every_s - self._now()
 
     def sent(self, kind: FrameKind) -> None:
         """A frame was sent."""

@@ -24,7 +24,7 @@ from server.protocol.state import ServerState
 from server.replay.manager import ReplayManager
 from server.replay.view_source import ViewSource
 from server.web.fair_wakeup import FairWakeup
-from server.web.page_offers import AHEAD_EVERY_S, MOST_AHEAD, THIN_SCAN_EVERY_S, PageOffers
+from server.web.page_offers import AHEAD_EVERY_S, FIRST_AHEAD, MOST_AHEAD, THIN_SCAN_EVERY_S, PageOffers
 from server.web.page_writer import PageWriter
 
 pytestmark = pytest.mark.virtual_time
@@ -52,7 +52,7 @@ class SlowPage:
         self.round_trip_s = 0.4
         self.byte_s = 0.0  # what the radio carries: a state has STATE bytes on it, anything else SMALL
         self.more: Sequence[str] = ()  # what comes besides states
-        self.most_under_way = 0
+        self.most_under_way = 0  # from its first take on
         self.events_s: list[float] = []  # how long each took
         self.longest_s = 0.0  # that one message was on the air
         self.scans = 0
@@ -70,7 +70,8 @@ class SlowPage:
         if kind == "state":
             self.states.append((now_s, message["number"]))
             self._sent += 1
-            self.most_under_way = max(self.most_under_way, self._sent - self._got)
+            if self._takes:
+                self.most_under_way = max(self.most_under_way, self._sent - self._got)
         elif kind == "offer":
             self.offers.append({**message, "at_s": now_s})
         size = {"state": STATE, "events": len(zlib.compress(text.encode()))}.get(kind, SMALL)
@@ -199,6 +200,15 @@ async def test_a_page_that_stops_answering_gets_as_many_as_it_said_and_one_offer
         page.writer.take({"seq": next(offer["seq"] for offer in reversed(page.offers) if offer["of"])})
         await asyncio.sleep(0.01)
         assert page.states[-1][1] >= 1200, "then it gets the newest"
+
+
+async def test_before_its_first_take_a_page_gets_the_states_that_uncover_its_values_and_no_more() -> None:
+    page = SlowPage(MOST_AHEAD)
+    page.answers = False
+    async with watching(page):
+        await asyncio.sleep(60.0)
+    assert len(page.states) == FIRST_AHEAD
+    assert page.states[-1][0] - page.states[0][0] < 0.15
 
 
 @pytest.mark.parametrize("more", [(), ("scan", "cars")])
