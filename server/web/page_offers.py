@@ -7,6 +7,7 @@ so that nothing waits behind more than these, however little the radio carries.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping
 
 from server.protocol.messages import FrameKind
@@ -42,18 +43,29 @@ class PageOffers:
         self._scan_s = float("-inf")
         self._sent = 0  # states of this connection
         self._received = 0  # of these, as the page stated
+        self._sent_s: deque[float] = deque(maxlen=2 * MOST_AHEAD)  # when the last of them were
+        self.trip_s = 0.0  # the least from a state to the answer; 0: none is known
 
     def taken(self, take: Mapping[str, object]) -> bool:
         """The page takes; whether it took what was offered. One of a former page, without a number, always does."""
         self.took_ms = self._wall_ms()
         self.took = _count(take.get("n"))
         self._ahead = min(_count(take.get("ahead")), MOST_AHEAD)
-        self._received = max(self._received, min(_count(take.get("got")), self._sent))
+        self._receive(min(_count(take.get("got")), self._sent))
         self.is_echo_due = self.is_echo_due or (self._ahead > 0 and self._now() >= self._echoed_s + ECHO_EVERY_S)
         if self.took and not (self.is_open and take.get("seq") == self._open_seq):
             return False
         self.is_open = False
         return True
+
+    def _receive(self, count: int) -> None:
+        if count <= self._received:
+            return
+        self._received = count
+        later = self._sent - count
+        if later < len(self._sent_s):
+            trip_s = self._now() - self._sent_s[-1 - later]
+            self.trip_s = min(self.trip_s or trip_s, trip_s)
 
     @property
     def carries_scan(self) -> bool:
@@ -81,6 +93,7 @@ class PageOffers:
         if kind == "state":
             self._ahead_s = self._now()
             self._sent += 1
+            self._sent_s.append(self._ahead_s)
         elif kind == "scan":
             self._scan_s = self._now()
 

@@ -24,7 +24,7 @@ from server.protocol.state import ServerState
 from server.replay.manager import ReplayManager
 from server.replay.view_source import ViewSource
 from server.web.fair_wakeup import FairWakeup
-from server.web.page_offers import AHEAD_EVERY_S, FIRST_AHEAD, MOST_AHEAD, THIN_SCAN_EVERY_S, PageOffers
+from server.web.page_offers import AHEAD_EVERY_S, MOST_AHEAD, THIN_SCAN_EVERY_S, PageOffers
 from server.web.page_writer import PageWriter
 
 pytestmark = pytest.mark.virtual_time
@@ -207,7 +207,7 @@ async def test_before_its_first_take_a_page_gets_the_states_that_uncover_its_val
     page.answers = False
     async with watching(page):
         await asyncio.sleep(60.0)
-    assert len(page.states) == FIRST_AHEAD
+    assert len(page.states) == 3
     assert page.states[-1][0] - page.states[0][0] < 0.15
 
 
@@ -267,6 +267,33 @@ async def test_over_a_little_more_200_missed_events_come_in_messages_of_less_tha
         await asyncio.sleep(30.0)
     assert page.most_event == 200
     assert page.longest_s < 1.0, "after that, the page dials another connection"
+
+
+@pytest.mark.parametrize("round_trip_s", [0.7, 1.5])
+async def test_a_long_round_trip_does_not_keep_messages_of_missed_events_short(round_trip_s: float) -> None:
+    page = SlowPage(12)
+    page.byte_s, page.round_trip_s = 8 / 500_000, round_trip_s
+    async with watching(page, missed=200):
+        await asyncio.sleep(5 * (round_trip_s + 0.5))
+        assert page.most_event == 200, "10, 20, 40, 80 and 50"
+
+
+async def test_the_round_trip_is_the_least_from_a_state_to_the_take_that_names_it() -> None:
+    offers = PageOffers(time.monotonic, lambda: 5)
+    assert offers.trip_s == 0.0
+    for _ in range(3):
+        offers.sent("state")
+        await asyncio.sleep(0.1)
+    offers.taken({"n": 1, "ahead": 12, "got": 2})
+    assert offers.trip_s == pytest.approx(0.2)
+    await asyncio.sleep(0.3)
+    offers.taken({"n": 2, "ahead": 12, "got": 3})
+    assert offers.trip_s == pytest.approx(0.2)
+    offers.sent("state")
+    await asyncio.sleep(0.05)
+    offers.taken({"n": 3, "ahead": 12, "got": 4})
+    offers.taken({"n": 4, "ahead": 12, "got": 4})
+    assert offers.trip_s == pytest.approx(0.05)
 
 
 def offers_of(now_s: float = 0.0) -> PageOffers:
