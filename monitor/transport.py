@@ -69,10 +69,12 @@ class _Topic:
     __slots__ = (
         "at_s",
         "by_clock",
+        "came",
         "clock",
         "delay_s",
         "excess_s",
         "first",
+        "former_length",
         "is_given",
         "marks",
         "older_s",
@@ -83,7 +85,8 @@ class _Topic:
     )
 
     def __init__(self, queue_length: int) -> None:
-        self.queue_length = queue_length
+        self.queue_length = self.former_length = queue_length
+        self.came = 0  # messages since the queue has this length
         self.throttle_s = 0.0
         self.period_s: float | None = None  # between two messages while all are sent
         self.marks: deque[float] = deque(maxlen=queue_length + 1)  # the mark known when each of the last ones came
@@ -105,6 +108,17 @@ class _Topic:
         self.at_s = self.excess_s = self.first = None
         self.delay_s = self.older_s = 0.0
         self.stamped = 0
+        self.former_length = self.queue_length
+
+    def resize(self, queue_length: int) -> None:
+        """The queue gets another length."""
+        former = self.queue_length
+        # What came under the longer queue still counts: its marks are the older ones.
+        self.marks = deque(self.marks, maxlen=queue_length + 1)
+        if len(self.marks) > former and self.came > self.former_length:
+            # What came under the shorter one leaves the rest of the places empty: what fills them comes later.
+            self.marks.extendleft([self.marks[0]] * (queue_length - former))
+        self.queue_length, self.former_length, self.came = queue_length, former, 0
 
     def follow_period(self, at_s: float) -> None:
         if self.at_s is None or self.throttle_s or at_s < self.at_s:
@@ -183,9 +197,7 @@ class TransportDelay:
             known = self._topics[topic] = _Topic(queue_length)
         known.throttle_s = throttle_s
         if known.queue_length != queue_length:
-            # What came under the longer queue still counts: its marks are the older ones.
-            known.queue_length = queue_length
-            known.marks = deque(known.marks, maxlen=queue_length + 1)
+            known.resize(queue_length)
 
     def receive(self, topic: str, at_s: float, stamp_s: float | None = None) -> float:
         """A message came: how old it may have been [s]."""
@@ -194,6 +206,7 @@ class TransportDelay:
             known = self._topics[topic] = _Topic(1)
         known.follow_period(at_s)
         bound_s = self._bound_s(known, at_s)
+        known.came += 1
         delay_s = bound_s
         if stamp_s is not None:
             delay_s = known.clock.place(stamp_s, at_s, bound_s)

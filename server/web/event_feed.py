@@ -12,17 +12,16 @@ from server.bus.log_runs import Resumed
 AGAIN_S = 1.0
 FIRST_BATCH = 10  # events in one message: some 1 kB, compressed, half a second at 16 kbit/s
 MOST_A_BATCH = 400  # some 120 kB
-QUICK_S = 0.5  # a page that has a batch within this gets twice as many next, which then take a second at most
-SLOW_S = 1.0  # within this, so many more as the first one has; after it, half as many
+BATCH_S = 0.5  # a batch may take so long beyond the round trip: an alarm waits behind it
 NEVER_S = float("inf")
 
 
 class EventFeed:
     """Of one page and vehicle. `on_read` is called when events that were not in memory have been read.
 
-    A page that has missed many gets them in batches that grow while it receives them quickly, so that a slow radio
-    carries small ones between its newest values, and a fast one catches up soon: a message that takes more than a
-    second would look like a connection that fell silent.
+    A page that has missed many gets them in batches of what its radio was measured to carry in `BATCH_S`. So one that
+    carries little gets small ones between its newest values, and every other page catches up soon, however long its
+    round trip is. A message that takes more than a second would look like a connection that fell silent.
     """
 
     def __init__(
@@ -36,6 +35,7 @@ class EventFeed:
         self._vehicle = vehicle
         self._now = now
         self._batch = self._limit = FIRST_BATCH  # the next one, and what was read at most
+        self._late_s = NEVER_S  # of the batch before
         self._sent_s = NEVER_S  # when the batch was sent that is not acknowledged yet
         self._is_catching_up = False  # more events wait than one message takes
         self._on_read = on_read
@@ -62,15 +62,18 @@ class EventFeed:
         self._sent_s = self._now()
         self._is_catching_up = len(events) == self._limit
 
-    def acknowledged(self) -> bool:
-        """The page has them. Returns whether it is catching up: more of them wait."""
-        took_s, is_catching_up = self._now() - self._sent_s, self._is_catching_up
-        self._sent_s, self._is_catching_up = NEVER_S, False
-        if took_s > SLOW_S:
-            self._batch = max(FIRST_BATCH, self._batch // 2)
-        elif is_catching_up:
-            more = self._batch if took_s <= QUICK_S else FIRST_BATCH
-            self._batch = min(MOST_A_BATCH, self._batch + more)
+    def acknowledged(self, trip_s: float) -> bool:
+        """The page has them; a round trip takes it `trip_s` at least. Returns whether it is catching up: more of them
+        wait."""
+        if self._sent_s == NEVER_S:
+            return False
+        late_s = max(0.0, self._now() - self._sent_s - trip_s)
+        # A loss makes one batch late, a radio that carries little all of them; it is twice as many at most.
+        factor = BATCH_S / max(min(late_s, self._late_s), BATCH_S / 2)
+        is_catching_up = self._is_catching_up
+        self._late_s, self._sent_s, self._is_catching_up = late_s, NEVER_S, False
+        if is_catching_up or factor < 1:
+            self._batch = min(MOST_A_BATCH, max(FIRST_BATCH, round(self._batch * factor)))
         return is_catching_up
 
     def after(self, n: int) -> list[dict[str, Any]]:

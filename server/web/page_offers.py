@@ -7,12 +7,14 @@ so that nothing waits behind more than these, however little the radio carries.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping
 
 from server.protocol.messages import FrameKind
 
 OFFER_EVERY_S = 0.05  # least time between two offers to one page: as often as a scan comes
 AHEAD_EVERY_S = 0.15  # least time between two states that are sent ahead
+FIRST_AHEAD = 3  # so many states come before the first take: a page uncovers its values after as many
 THIN_AHEAD = 2  # a page that allows no more has a radio that carries little
 THIN_SCAN_EVERY_S = 3.0  # scans of the live car over such a radio: it may be a route that has only become longer
 MOST_AHEAD = 12  # to a page that does not answer: its answers may wait 1.8 s for one that was lost
@@ -36,23 +38,34 @@ class PageOffers:
         self.is_echo_due = False
         self._offered_s = self._echoed_s = float("-inf")
         self._open_seq = 0  # of the newest offer of anything
-        self._ahead = 0  # so many states may be under way; 0: the page takes them one by one
+        self._ahead = FIRST_AHEAD  # so many states may be under way; 0: the page takes them one by one
         self._ahead_s = float("-inf")
         self._scan_s = float("-inf")
         self._sent = 0  # states of this connection
         self._received = 0  # of these, as the page stated
+        self._sent_s: deque[float] = deque(maxlen=2 * MOST_AHEAD)  # when the last of them were
+        self.trip_s = 0.0  # the least from a state to the answer; 0: none is known
 
     def taken(self, take: Mapping[str, object]) -> bool:
         """The page takes; whether it took what was offered. One of a former page, without a number, always does."""
         self.took_ms = self._wall_ms()
         self.took = _count(take.get("n"))
         self._ahead = min(_count(take.get("ahead")), MOST_AHEAD)
-        self._received = max(self._received, min(_count(take.get("got")), self._sent))
+        self._receive(min(_count(take.get("got")), self._sent))
         self.is_echo_due = self.is_echo_due or (self._ahead > 0 and self._now() >= self._echoed_s + ECHO_EVERY_S)
         if self.took and not (self.is_open and take.get("seq") == self._open_seq):
             return False
         self.is_open = False
         return True
+
+    def _receive(self, count: int) -> None:
+        if count <= self._received:
+            return
+        self._received = count
+        later = self._sent - count
+        if later < len(self._sent_s):
+            trip_s = self._now() - self._sent_s[-1 - later]
+            self.trip_s = min(self.trip_s or trip_s, trip_s)
 
     @property
     def carries_scan(self) -> bool:
@@ -72,13 +85,15 @@ class PageOffers:
 
     def push_wait_s(self) -> float:
         """How long the next state that is sent ahead has to wait."""
-        return self._ahead_s + AHEAD_EVERY_S - self._now()
+        every_s = OFFER_EVERY_S if self._sent < FIRST_AHEAD else AHEAD_EVERY_S
+        return self._ahead_s + every_s - self._now()
 
     def sent(self, kind: FrameKind) -> None:
         """A frame was sent."""
         if kind == "state":
             self._ahead_s = self._now()
             self._sent += 1
+            self._sent_s.append(self._ahead_s)
         elif kind == "scan":
             self._scan_s = self._now()
 

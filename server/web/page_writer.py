@@ -159,7 +159,7 @@ class PageWriter:
 
     def have_events(self) -> None:
         """The page has the events that were sent."""
-        if self._feed.acknowledged():
+        if self._feed.acknowledged(self._offers.trip_s):
             asyncio.get_running_loop().call_later(BATCH_EVERY_S, self.have_events)
             return
         self._are_events_unanswered = False

@@ -96,6 +96,30 @@ def test_a_place_that_holds_the_newest_costs_a_period_beyond_the_shut_of_now() -
     assert link.receive("/gps", 20.43) <= 0.03 + PLACE_PERIODS * 0.14, "that shut is over"
 
 
+def busy(link: TransportDelay, queue_lengths: list[tuple[float, int]], until_s: float) -> list[float]:
+    """The delays of a topic of 50 Hz over a link whose round trips are 0.17 to 0.37 s, under queues from then on."""
+    lengths, delays = dict(queue_lengths), list[float]()
+    for n in range(round(until_s * 50)):
+        at_s = n / 50
+        if at_s in lengths:
+            link.subscribe("/dist", lengths[at_s])
+        if n % 5 == 0:
+            ping(link, at_s - 0.37, at_s - 0.2 * (n % 2))
+        delays.append(link.receive("/dist", at_s))
+    return delays
+
+
+def test_a_queue_that_becomes_longer_holds_nothing_that_came_long_before() -> None:
+    delays = busy(opened(), [(0.0, 1), (10.0, 10)], 12.0)
+    assert max(delays[500:]) <= 0.37 + 0.1 + 11 * 0.02 + 0.001, "the age of the mark, and eleven periods"
+
+
+def test_what_a_longer_queue_held_before_may_still_come_after_a_shorter_one() -> None:
+    link = opened()
+    delays = busy(link, [(0.0, 10), (10.0, 1), (10.1, 10)], 10.2)
+    assert delays[506] > 1.0, "five messages under the shorter one: the longer one may have held eleven"
+
+
 @pytest.mark.parametrize(("waited", "shut_s"), [(SHUT_BYTES - 1, 0.0), (SHUT_BYTES, 0.30)])
 def test_a_connection_that_so_few_bytes_waited_in_was_not_shut(waited: int, shut_s: float) -> None:
     link = opened()

@@ -126,6 +126,23 @@ test('over a good radio that was cut a dial comes every two or three seconds, no
   assert.deepEqual([...new Set(gaps)].map((ms) => Math.round(ms / 1000)).sort(), [2, 5]);
 });
 
+test('no dial is so long that the system seldom repeats its request, however slow the radio was', () => {
+  const { sockets, at, look } = set();
+  look(0, 3900);
+  at(4000);
+  sockets[0]?.onopen();
+  look(4100, 12_100); // it is given up, and dialled again
+  const dialled = [];
+  for (let ms = 12_200; ms < 72_200; ms += 100) {
+    const count = sockets.length;
+    look(ms, ms);
+    if (sockets.length > count) dialled.push(ms);
+  }
+  const gaps = dialled.slice(1).map((ms, i) => ms - Number(dialled[i]));
+  assert.ok(gaps.length > 3);
+  assert.ok(Math.max(...gaps) <= 8200, String(gaps));
+});
+
 test('a page that knew a fast radio connects over one on which a connection takes 4.2 s', () => {
   const { pageSocket, sockets, at, look } = set();
   pageSocket.look(0);

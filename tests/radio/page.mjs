@@ -1,7 +1,7 @@
 // The page's own store over a real network: writes what comes and what it would show, a line each.
 // Usage: node page.mjs TREE ADDRESS KEY; TREE holds the page's modules.
 //   b TIME AGE LATE CUT ALARMS   a fresh frame came: ms since 1970, its true age [ms]; of the link to the car how late [s] and
-//                                whether it is cut, and the alarms
+//                                whether it is cut, and the alarms that are active
 //   d TIME                       it dials
 //   s TIME COVERED SHOWN TRUE    twenty times a second: the age that is shown and the true one [ms]
 import path from 'node:path';
@@ -19,7 +19,7 @@ store.painter.picture = store.painter.look = () => {};
 const age_ms = () => Date.now() - store.frame.server.time_ms; // server and page run on one machine
 store.on('beat', () => {
   const { alarms, link } = store.frame;
-  console.log(`b ${Date.now()} ${age_ms()} ${link.late_s ?? 'NaN'} ${Number(link.cut !== null)} ${alarms.map(({ id }) => id).join(',') || '-'}`);
+  console.log(`b ${Date.now()} ${age_ms()} ${link.late_s ?? 'NaN'} ${Number(link.cut !== null)} ${alarms.filter(({ active }) => active).map(({ id }) => id).join(',') || '-'}`);
 });
 store.vehicle = 'car';
 console.log(`begins ${Date.now()}`);

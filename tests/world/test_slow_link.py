@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 
-from monitor.checks.link_late import LateLimits
+from monitor.checks.link_late import CHECKS, LateLimits
 from monitor.rates import STALE_FLOOR_S
 from monitor.signals import SIGNALS
 from monitor.transport import TransportDelay
+from server.judge.signals import TOPICS
 from server.vehicle.link_load import LEVELS, RESTORE_AFTER_S, RESTORE_BELOW_S, SETTLE_S, LinkLoad
 from tests.monitor.slow_links import Link, Stream, run
 
@@ -168,15 +170,25 @@ def whole_car() -> list[Stream]:
     ]
 
 
+LATE_ALARM = next(check.alarm for check in CHECKS if check.id == "link_late")
+QUEUE_LENGTHS = {topic.signal: topic.queue_length for topic in TOPICS}
+
+
+def queued_car() -> list[Stream]:
+    """The same with queues as they are subscribed to, a mode and a command."""
+    more = [Stream(topic=f"/{name}", hz=20, size=120, signal=name, offset_s=None) for name in ("mode", "command")]
+    return [replace(one, queue_length=QUEUE_LENGTHS.get(one.signal or "", 1)) for one in [*whole_car(), *more]]
+
+
 class Watched:
     """A run over a link whose load follows how late it is."""
 
-    def __init__(self, link: Link, lasts_s: float, seed: int = 1) -> None:
+    def __init__(self, link: Link, lasts_s: float, seed: int = 1, car: Callable[[], list[Stream]] = whole_car) -> None:
         load = LinkLoad()
         self.steps: list[tuple[float, int]] = [(0.0, 0)]
         self.rows: list[tuple[float, float, float]] = []  # time, how late it is stated to be, how late it is
         newest: dict[str, float] = {}
-        for one in run(link, whole_car(), lasts_s=lasts_s, seed=seed, load=load):
+        for one in run(link, car(), lasts_s=lasts_s, seed=seed, load=load):
             if load.step != self.steps[-1][1]:
                 self.steps.append((one.at_s, load.step))
             if one.topic != "/noise":
@@ -190,6 +202,14 @@ class Watched:
         """The share of the time in which the link is called late."""
         found = self.between(from_s, to_s)
         return sum(late_s > LateLimits().late_s for late_s, _ in found) / len(found)
+
+    def longest_late_s(self) -> float:
+        """For how long the link is called late at once."""
+        longest_s, since_s = 0.0, math.inf
+        for at_s, late_s, _ in self.rows:
+            since_s = min(since_s, at_s) if late_s > LateLimits().late_s else math.inf
+            longest_s = max(longest_s, at_s - since_s)
+        return longest_s
 
 
 def even(rate_Bps: Callable[[float], float], *, kernel_bytes: int = 10_000) -> Link:
@@ -240,6 +260,22 @@ def test_a_minute_of_a_fair_radio_is_no_alarm() -> None:
     seen = Watched(Link(rate_Bps=lambda _: 250_000.0, down_s=way_s, up_s=way_s), 60.0)
     assert seen.may_alarm(1.0, 60.0) == 0.0
     assert seen.steps == [(0.0, 0)]
+
+
+@pytest.mark.parametrize(("seed", "jitter_s", "loss"), [(1, 0.08, 0.06), (3, 0.04, 0.02)])
+def test_a_link_that_becomes_a_fair_radio_is_no_alarm(seed: int, jitter_s: float, loss: float) -> None:
+    """With queues of up to ten messages, before round trips that vary."""
+    rng = random.Random(seed)
+
+    def way_s(at_s: float) -> float:
+        return 0.06 + rng.random() * jitter_s + (0.25 if rng.random() < loss else 0.0) if at_s >= 10.0 else 0.01
+
+    link = Link(rate_Bps=lambda _: 250_000.0, down_s=way_s, up_s=way_s)
+    seen = Watched(link, 40.0, seed, queued_car)
+    errors_s = sorted(late_s - true_s for late_s, true_s in seen.between(11.0, 40.0))
+    assert errors_s[0] >= -UNDER_S
+    assert errors_s[len(errors_s) // 2] <= OVER_S
+    assert seen.longest_late_s() < LATE_ALARM.on_delay_s
 
 
 def test_a_slow_link_is_asked_for_less_step_by_step_and_for_more_again_with_patience() -> None:

@@ -2,6 +2,8 @@
 
 /** Of so many dials in a row one gets twice the time, and that of an unknown radio at least: it may be another one than was measured. */
 const DIALS_A_LONG_ONE = 3;
+/** No dial takes longer: the system repeats its request after 4, 6 and 10 s, or after 3, 7 and 15 s, and each dial makes one at once [ms]. */
+const LONGEST_DIAL_MS = 8000;
 /** Least time from one dial to the next [ms]. */
 const FIRST_WAIT_MS = 300;
 const LAST_WAIT_MS = 2000;
@@ -55,7 +57,7 @@ export class Dials {
 
   /** After so long one that does not open is given up. @param {number} dial_ms @param {number} longest_ms */
   limit_ms(dial_ms, longest_ms) {
-    return this.#failed % DIALS_A_LONG_ONE === DIALS_A_LONG_ONE - 1 ? Math.max(2 * dial_ms, longest_ms) : dial_ms;
+    return this.#failed % DIALS_A_LONG_ONE === DIALS_A_LONG_ONE - 1 ? Math.min(LONGEST_DIAL_MS, Math.max(2 * dial_ms, longest_ms)) : dial_ms;
   }
 
   /** @param {number} now_ms */

@@ -52,7 +52,7 @@ class SlowPage:
         self.round_trip_s = 0.4
         self.byte_s = 0.0  # what the radio carries: a state has STATE bytes on it, anything else SMALL
         self.more: Sequence[str] = ()  # what comes besides states
-        self.most_under_way = 0
+        self.most_under_way = 0  # from its first take on
         self.events_s: list[float] = []  # how long each took
         self.longest_s = 0.0  # that one message was on the air
         self.scans = 0
@@ -70,7 +70,8 @@ class SlowPage:
         if kind == "state":
             self.states.append((now_s, message["number"]))
             self._sent += 1
-            self.most_under_way = max(self.most_under_way, self._sent - self._got)
+            if self._takes:
+                self.most_under_way = max(self.most_under_way, self._sent - self._got)
         elif kind == "offer":
             self.offers.append({**message, "at_s": now_s})
         size = {"state": STATE, "events": len(zlib.compress(text.encode()))}.get(kind, SMALL)
@@ -201,6 +202,15 @@ async def test_a_page_that_stops_answering_gets_as_many_as_it_said_and_one_offer
         assert page.states[-1][1] >= 1200, "then it gets the newest"
 
 
+async def test_before_its_first_take_a_page_gets_the_states_that_uncover_its_values_and_no_more() -> None:
+    page = SlowPage(MOST_AHEAD)
+    page.answers = False
+    async with watching(page):
+        await asyncio.sleep(60.0)
+    assert len(page.states) == 3
+    assert page.states[-1][0] - page.states[0][0] < 0.15
+
+
 @pytest.mark.parametrize("more", [(), ("scan", "cars")])
 async def test_a_take_is_answered_with_its_number_twice_a_second_whatever_is_offered(more: Sequence[str]) -> None:
     page = SlowPage(6)
@@ -257,6 +267,33 @@ async def test_over_a_little_more_200_missed_events_come_in_messages_of_less_tha
         await asyncio.sleep(30.0)
     assert page.most_event == 200
     assert page.longest_s < 1.0, "after that, the page dials another connection"
+
+
+@pytest.mark.parametrize("round_trip_s", [0.7, 1.5])
+async def test_a_long_round_trip_does_not_keep_messages_of_missed_events_short(round_trip_s: float) -> None:
+    page = SlowPage(12)
+    page.byte_s, page.round_trip_s = 8 / 500_000, round_trip_s
+    async with watching(page, missed=200):
+        await asyncio.sleep(5 * (round_trip_s + 0.5))
+        assert page.most_event == 200, "10, 20, 40, 80 and 50"
+
+
+async def test_the_round_trip_is_the_least_from_a_state_to_the_take_that_names_it() -> None:
+    offers = PageOffers(time.monotonic, lambda: 5)
+    assert offers.trip_s == 0.0
+    for _ in range(3):
+        offers.sent("state")
+        await asyncio.sleep(0.1)
+    offers.taken({"n": 1, "ahead": 12, "got": 2})
+    assert offers.trip_s == pytest.approx(0.2)
+    await asyncio.sleep(0.3)
+    offers.taken({"n": 2, "ahead": 12, "got": 3})
+    assert offers.trip_s == pytest.approx(0.2)
+    offers.sent("state")
+    await asyncio.sleep(0.05)
+    offers.taken({"n": 3, "ahead": 12, "got": 4})
+    offers.taken({"n": 4, "ahead": 12, "got": 4})
+    assert offers.trip_s == pytest.approx(0.05)
 
 
 def offers_of(now_s: float = 0.0) -> PageOffers:
