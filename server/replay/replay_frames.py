@@ -80,7 +80,10 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
     link["topics_subscribed"] = len(epoch.published)
     if run.drive.recorded.has_alarms:
         silent = silent_at(run_state.planned_stop, run_state.monitor)
-        shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms, silent) for alarm in _recorded_standing(run_state)]
+        shown["alarms"] = [
+            serialize.alarm(alarm, now_s, wall_ms, silent, run_state.off_duty_ms)
+            for alarm in _recorded_standing(run_state)
+        ]
         shown["alarm_load"] = serialize.load(facts.load, run_state.recorded_alarms)
     return shown
 
