@@ -75,6 +75,18 @@ def test_the_page_shows_all_of_it(folder: Path) -> None:
     assert "data:audio/webm;base64," in text
 
 
+def test_a_figure_above_its_benchmark_has_a_sign(folder: Path, tmp_path: Path) -> None:
+    def signed(path: Path) -> list[str]:
+        found = re.findall(r"<dt>([^<]+)<svg[^>]+aria-label=\"above the benchmark\"", path.read_text())
+        return [title.strip() for title in found]
+
+    assert signed(folder / "page.html") == ["Alarms"]
+    assert '<th scope="row" class="b">Alarms in 10 min, mean</th>' in (folder / "page.html").read_text()
+    with open_recording([recorded(tmp_path, [])]) as recording:
+        write_drive_page(recording, tmp_path / "page.html", name="drive")
+    assert signed(tmp_path / "page.html") == []
+
+
 def test_hostile_words_are_text(folder: Path) -> None:
     text = (folder / "page.html").read_text()
     assert EVIL not in text
@@ -180,6 +192,8 @@ def test_a_part_that_is_missing_is_said(tmp_path: Path) -> None:
     with open_recording(in_two_parts(tmp_path)[1:]) as recording:
         write_drive_page(recording, tmp_path / "page.html", name="drive")
     assert "Part 1 of the drive of s1_p2 is not in this report" in words_of(tmp_path / "page.html")
+    bad = re.findall(r'<p class="bad">.*?<b>(.*?)</b>', (tmp_path / "page.html").read_text())
+    assert bad == ["Missing: part 1"]
 
 
 @pytest.mark.parametrize("where", ["car/s1_p3.mcap.writing", "car/s1_p3.mcap.damaged", ".trash/5/car/s1_p3.mcap"])
@@ -208,6 +222,8 @@ def test_a_time_without_a_record_is_never_said_to_be_without_alarms(tmp_path: Pa
     text = words_of(tmp_path / "page.html")
     assert "Alarms, time to acknowledge none in what was recorded" in text
     assert "Missing: part 2 see data lost" in text, "no chain that is intact stands alone"
+    bad = re.findall(r'<p class="bad">.*?<b>(.*?)</b>', (tmp_path / "page.html").read_text())
+    assert bad == ["Missing: part 2"], "the lines of the parts that are intact are no alarm"
     assert "No record here from 22:13:30 to 22:14:08: whether there were alarms is not known." in text
     assert "No record here from 22:13:30 to 22:14:08: Part 2 of the drive of s1 is not in this report" in text
     (one,) = json.loads((tmp_path / "report.json").read_text())["no_record"]
