@@ -199,6 +199,11 @@ class State:
         """Distance driven until now, from positions [m]; None: never had one."""
         return self._derived.track.distance_m
 
+    @property
+    def track_ahead_m(self) -> float:
+        """How far the car is ahead of that, which is smoothed."""
+        return self._derived.track.ahead_m
+
     def snapshot(self, now_s: float) -> Snapshot:
         """What is known at `now_s`, which later messages do not change."""
         self._components.watch(now_s)

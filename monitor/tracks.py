@@ -135,11 +135,18 @@ class Track:
         self._moved: bool | None = None  # by the one before
         self._marked = 0
         self._had_gap = False  # since the newest point
+        self._ahead_m = 0.0
 
     @property
     def distance_m(self) -> float | None:
         """Driven since the first position [m], never shrinking; None before there is one."""
         return self._shown_m
+
+    @property
+    def ahead_m(self) -> float:
+        """How far the newest position is ahead of the smoothed place up to which `distance_m` counts: half of
+        SMOOTH_S of the way. 0 while the car stands, whose positions are never quite still."""
+        return self._ahead_m if self._moves else 0.0
 
     def receive(self, fix: GpsFix, at_s: float, speed_mps: float | None, is_standing: bool | None) -> None:
         """Add a position. `speed_mps` and `is_standing` are by the wheels; None: not fresh."""
@@ -194,6 +201,7 @@ class Track:
 
     def _drive(self, fix: GpsFix, at_s: float, is_jump: bool) -> None:
         _, east_m, north_m = _mean(reversed(self._fixes), at_s - SMOOTH_S, at_s)
+        self._ahead_m = math.hypot(self._fixes[-1][1] - east_m, self._fixes[-1][2] - north_m)
         if self._anchor is None:
             self._anchor = (east_m, north_m)
             self._driven_m = self._shown_m = self._shown_m or 0.0

@@ -17,7 +17,16 @@ import tomli_w
 
 from monitor.runner import Refused
 from server.control import display_name
-from server.control.duty import MOST_DUTIES, MOST_PEOPLE, DutyBoard, DutyEntry, Person, person_name, role_of
+from server.control.duty import (
+    MOST_DUTIES,
+    MOST_FORMER,
+    MOST_PEOPLE,
+    DutyBoard,
+    DutyEntry,
+    Person,
+    person_name,
+    role_of,
+)
 from server.storage import bounded_toml, durable_file
 from server.storage.durable_file import set_aside
 
@@ -85,13 +94,16 @@ def _people(board: DutyBoard) -> dict[str, Any]:
     return {
         "ends_after_h": board.ends_after_h,
         "changed_ms": board.hours_changed_ms,
-        "people": [
-            {"id": one.id, "name": one.name, "role": one.role, "changed_ms": one.changed_ms}
-            | {name: at_ms for name in ("last_ms", "off_ms") if (at_ms := getattr(one, name)) is not None}
-            for one in board.people.values()
-        ],
+        "people": [_row(one) for one in board.people.values()],
+        "gone": [_row(one) for one in board.gone.values()],
         "removed": board.removed,
     }
+
+
+def _row(one: Person) -> dict[str, Any]:
+    row: dict[str, Any] = {"id": one.id, "name": one.name, "role": one.role, "changed_ms": one.changed_ms}
+    row |= {name: at_ms for name in ("last_ms", "off_ms") if (at_ms := getattr(one, name)) is not None}
+    return row | ({"former": list(one.former)} if one.former else {})
 
 
 def _duties(board: DutyBoard) -> dict[str, Any]:
@@ -112,6 +124,9 @@ def _take_people(board: DutyBoard, found: Mapping[str, Any]) -> None:
     for row in found.get("people", [])[:MOST_PEOPLE]:
         person = person_of(str(row.get("id") or secrets.token_hex(4)), row)
         board.people[person.id] = person
+    for row in found.get("gone", [])[: 2 * MOST_PEOPLE]:
+        person = person_of(row["id"], row)
+        board.gone[person.id] = person
 
 
 def _take_duties(board: DutyBoard, found: Mapping[str, Any]) -> None:
@@ -129,6 +144,7 @@ def person_of(id: str, row: Mapping[str, Any]) -> Person:
         role=role_of(row.get("role", "operator")),
         last_ms=None if last_ms is None else time_ms(last_ms),
         off_ms=None if off_ms is None else time_ms(off_ms),
+        former=tuple(person_name(one) for one in row.get("former", ())[:MOST_FORMER]),
         changed_ms=time_ms(row.get("changed_ms", 0)),
     )
 

@@ -112,7 +112,7 @@ class SharedPeople:
     def _take_removed(self, id: str, removed_ms: int) -> None:
         board = self._people.board
         self._had[f"person.{id}"] = removed_ms
-        if board.people.pop(id, None) is not None or id not in board.removed:
+        if id in board.people or id not in board.removed:
             board.forget(id, removed_ms)
             self._changed()
 

@@ -23,7 +23,7 @@ from server.protocol.operator_state import OperatorsState
 MAX_FENCE = 2**53
 MOST_SUPERVISORS = 3  # who are named
 KNOWN_S = 10.0  # the pages state every second who is on duty as supervisor
-MOST_DUTIES = 200  # names of people that are known to be off duty
+MOST_DUTIES = 400  # names of people that are known to be off duty, former names among them
 MOST_NOTED = 64  # pages of which is known who is on duty there
 
 
@@ -200,8 +200,7 @@ class Authorization:
         self._off_ms = dict(list(self._off_ms.items())[-MOST_DUTIES:])
 
     def off_duty_ms(self, signed: str | None) -> int | None:
-        """When the duty of who acted under this name ended; None: on duty, or not known (not a
-        person, renamed, or removed from the list before this session began)."""
+        """When the duty of who acted under this name ended; None: on duty, or not known (not a person)."""
         return self._off_ms.get(display_name.person_of(signed) or "") if signed else None
 
     @property

@@ -17,6 +17,7 @@ from server.control import display_name
 from server.protocol.people import ROLES, DutyRole
 
 MOST_PEOPLE = 50
+MOST_FORMER = 3  # names of a person who was renamed
 LONGEST_NAME = 30
 ENDS_AFTER_H = 12.0
 ENDS_WITHIN_H = (1.0, 24.0)
@@ -48,6 +49,7 @@ class Person:
     role: DutyRole = "operator"
     last_ms: int | None = None
     off_ms: int | None = None  # when their last duty ended
+    former: tuple[str, ...] = ()  # names before, the newest first: what they signed bears them
     changed_ms: int = 0
 
 
@@ -70,6 +72,7 @@ class DutyBoard:
     def __init__(self) -> None:
         self.people: dict[str, Person] = {}
         self.removed: dict[str, int] = {}  # ids of people who were removed, and when: nobody brings them back
+        self.gone: dict[str, Person] = {}  # of those, as they were: what they acknowledged has no owner on duty
         self.entries: dict[str, DutyEntry] = {}  # by device
         self.ends_after_h = ENDS_AFTER_H
         self.hours_changed_ms = 0
@@ -87,7 +90,9 @@ class DutyBoard:
         person = self.person(id)
         new_name = person.name if name is None else self._free_name(name, but=id)
         new_role = person.role if role is None else role_of(role)
-        changed = self.people[id] = replace(person, name=new_name, role=new_role, changed_ms=now_ms)
+        former = tuple(one for one in dict.fromkeys((person.name, *person.former)) if one != new_name)[:MOST_FORMER]
+        changed = replace(person, name=new_name, role=new_role, former=former, changed_ms=now_ms)
+        self.people[id] = changed
         return changed
 
     def remove(self, id: str, now_ms: int) -> Person:
@@ -95,12 +100,17 @@ class DutyBoard:
         entry = self.duty_of(id)
         if entry is not None:
             raise Refused(f"{person.name} is on duty at {entry.device_name}: they must sign off first.")
-        del self.people[id]
         self.forget(id, now_ms)
         return person
 
     def forget(self, id: str, at_ms: int) -> None:
-        """Nobody brings this person back; of the removed so many are kept."""
+        """This person is not in the list any more, nor on duty, and nobody brings them back; of the removed so many
+        are kept."""
+        if (entry := self.duty_of(id)) is not None:  # as another web node removed them
+            why = "Who was on duty here was removed from the list of people: nobody is on duty here now."
+            self._end(entry, why, max(at_ms, entry.changed_ms + 1))
+        if (person := self.people.pop(id, None)) is not None:
+            self.gone = dict([*self.gone.items(), (id, person)][-2 * MOST_PEOPLE :])
         self.removed = dict([*self.removed.items(), (id, at_ms)][-2 * MOST_PEOPLE :])
 
     def person(self, id: str) -> Person:
@@ -196,13 +206,18 @@ class DutyBoard:
         return due
 
     def stated(self, now_ms: int) -> dict[str, int | None]:
-        """By name: who is on duty (None), and when the duty of others ended lately."""
+        """By name: who is on duty (None), and when the duty of others ended lately; of people who were renamed by each
+        of their names, and of people who were removed too. A name counts for who bears it now."""
         on = {one.person for one in self.duties()}
-        return {
-            one.name: None if one.id in on else one.off_ms
-            for one in self.people.values()
-            if one.id in on or (one.off_ms is not None and now_ms - one.off_ms < OFF_STATED_MS)
-        }
+        people = [*self.people.values(), *reversed(self.gone.values())]
+        borne = {one.name for one in self.people.values()}
+        stated: dict[str, int | None] = {}
+        for one in people:
+            if one.id in on or (one.off_ms is not None and now_ms - one.off_ms < OFF_STATED_MS):
+                own = (name for name in (one.name, *one.former) if name not in borne or self.people.get(one.id) is one)
+                for name in own:
+                    stated.setdefault(name, None if one.id in on else one.off_ms)
+        return stated
 
     def next_ms(self) -> int | None:
         """When the next duty ends by itself; None: nobody is on duty."""

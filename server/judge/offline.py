@@ -20,7 +20,7 @@ from server.judge.drive import Drive, MessageSource, Row, SettingsEpoch
 from server.judge.pipeline import TICK_S
 from server.judge.reception_stats import Reception
 from server.judge.recorded_answers import answered
-from server.judge.recorded_events import ChosenPhone, NewSettings, Pause, SlowDownEvent, StopChange
+from server.judge.recorded_events import ChosenPhone, NewSettings, OwnerChange, Pause, SlowDownEvent, StopChange
 from server.judge.run_state import RunState
 from server.judge.unit_watch import UnitWatch
 from server.judge.units import Unit
@@ -276,6 +276,8 @@ class OfflineRun:
                 run_state.pause(event, now_s)
             case StopChange():
                 run_state.planned_stop = event.stop
+            case OwnerChange():
+                run_state.note_owner(event)
             case SlowDownEvent():
                 run_state.slow_down = run_state.slow_down.after(event, now_s)
             case PhoneReport():

@@ -200,6 +200,14 @@ class StopChange:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OwnerChange:
+    """The duty of who had acknowledged alarms ended; None: they are on duty again."""
+
+    owner: str  # as they signed
+    off_duty_ms: int | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NewSettings:
     """The settings from here on, as the file of all of them."""
 
@@ -213,7 +221,7 @@ class ChosenPhone:
     phone: str | None
 
 
-RecordedEvent = Transition | Pause | StopChange | NewSettings | PhoneReport | ChosenPhone | SlowDownEvent
+RecordedEvent = Transition | Pause | StopChange | OwnerChange | NewSettings | PhoneReport | ChosenPhone | SlowDownEvent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

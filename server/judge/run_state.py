@@ -12,7 +12,7 @@ from monitor.state import State
 from monitor.trends import CheckMinute, Trends
 from server.judge.frames import Frames
 from server.judge.reception_stats import Reception
-from server.judge.recorded_events import Pause, RecordedSlowDown
+from server.judge.recorded_events import OwnerChange, Pause, RecordedSlowDown
 from server.judge.stamp_steps import StampSteps
 
 
@@ -39,9 +39,19 @@ class RunState:
     paused_s: float | None = None
     paused_by: str | None = None
     planned_stop: PlannedStop | None = None
+    owners_off: dict[str, int] = field(default_factory=dict)  # by name: when their duty ended
     stamps: StampSteps = field(default_factory=StampSteps)
     slow_down: RecordedSlowDown = field(default_factory=RecordedSlowDown)
     frames: Frames | None = None  # where transforms move; None: those of the drive count throughout
+
+    def off_duty_ms(self, signed: str | None) -> int | None:
+        """When the duty of who acted under this name ended, as the live page showed it; None: on duty, or not known."""
+        return self.owners_off.get(signed or "")
+
+    def note_owner(self, event: OwnerChange) -> None:
+        self.owners_off.pop(event.owner, None)
+        if event.off_duty_ms is not None:
+            self.owners_off[event.owner] = event.off_duty_ms
 
     def pause(self, event: Pause, now_s: float) -> None:
         """Monitoring was paused then, or went on."""

@@ -156,6 +156,9 @@ class EventDetails(TypedDict, total=False):
     fixed: Annotated[int, doc("items that had failed first")]
     recurring: Annotated[list[RecurringItem], doc("of a signed departure check: its items that have an interval")]
     hash: Annotated[str, doc("SHA-256 of the list and its results [hex]; with an item: of what it asks")]
+    # Of the owner of acknowledged alarms.
+    owner: Annotated[str, doc("under whose name alarms were acknowledged")]
+    off_duty_ms: Annotated[int | None, doc("when their duty ended; null: they are on duty again")]
     # Of the rest.
     address: str
     settings: Annotated[dict[str, Any], doc("all that are in force, as monitoring begins")]

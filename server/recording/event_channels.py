@@ -13,13 +13,22 @@ from monitor.planned_stop import PlannedStop, reason_of
 from server.judge import recorded_events
 from server.judge.logged_transition import number_of, text_of, transition_of
 from server.judge.phone_report import phone_report
-from server.judge.recorded_events import ChosenPhone, NewSettings, Pause, RecordedEvent, RecordedEvents, StopChange
+from server.judge.recorded_events import (
+    ChosenPhone,
+    NewSettings,
+    OwnerChange,
+    Pause,
+    RecordedEvent,
+    RecordedEvents,
+    StopChange,
+)
 from server.protocol.commands import Position
 from server.recording.read.read import Recording
 from server.recording.standing import read_standing
 
 ALARMS, PHONE, SETTINGS = "/catgraph/alarms", "/catgraph/phone", "/catgraph/settings"
 MOST_SETTINGS = 200  # changes of the settings: each is a file to read
+MOST_NAME = 200  # characters of who acknowledged
 MOST = 50_000  # rows of one channel: a day of a phone; a file that holds more is not of our making
 
 
@@ -81,6 +90,10 @@ def _of_event(row: Mapping[str, Any], at_s: float, start_s: float) -> RecordedEv
         since_s = number_of(row.get("since_ms"), number_of(row.get("at_ms"), 0.0)) / 1000 - start_s
         stop = PlannedStop(reason=reason_of(row.get("reason")), since_s=since_s, by=text_of(row.get("by")))
         return StopChange(stop=stop if change == "planned_stop" else None)
+    if change == "owner":
+        off_duty_ms = row.get("off_duty_ms")
+        owner = str(row.get("owner"))[:MOST_NAME]
+        return OwnerChange(owner=owner, off_duty_ms=off_duty_ms if type(off_duty_ms) is int else None)
     if change == "ride":
         phone = row.get("phone")
         return ChosenPhone(phone=phone if isinstance(phone, str) else None)

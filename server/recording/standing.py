@@ -79,6 +79,8 @@ class Stood:
             begins = event.get("holder") is not None
         elif change == "duty":
             mode, begins = f"duty {event.get('person')}"[:80], event.get("act") == "on"
+        elif change == "owner":
+            mode, begins = f"owner {event.get('owner')}"[:120], event.get("off_duty_ms") is not None
         if begins:
             self._modes[mode] = [event]
         else:

@@ -79,8 +79,9 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
     link["cut"] = link["since_ms"] = link["problem"] = None
     link["topics_subscribed"] = len(epoch.published)
     if run.drive.recorded.has_alarms:
-        silent = silent_at(run_state.planned_stop, run_state.monitor)
-        shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms, silent) for alarm in _recorded_standing(run_state)]
+        silent, off_ms = silent_at(run_state.planned_stop, run_state.monitor), run_state.off_duty_ms
+        standing_then = _recorded_standing(run_state)
+        shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms, silent, off_ms) for alarm in standing_then]
         shown["alarm_load"] = serialize.load(facts.load, run_state.recorded_alarms)
     return shown
 

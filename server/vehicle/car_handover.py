@@ -31,6 +31,8 @@ from server.vehicle.handover_lines import (
 from server.vehicle.judgement import Judgement
 from server.vehicle.pause import CarPlannedStop, Pause
 
+MOST_OWNERS = 100  # of which it is known that they are off duty
+
 
 class CarHandover:
     """Of one vehicle; its session is the only writer. Times are on the session's monotonic clock, in seconds."""
@@ -58,6 +60,9 @@ class CarHandover:
         self._note = note
         self._handover = Handover()
         self._since_ms = 0  # when it was offered; the same in every state, by which pages distinguish offers
+        self._owners_off: dict[
+            str, int
+        ] = {}  # owners of acknowledged alarms, and when their duty ended, as logged last
 
     def tick(self, now_s: float) -> bool:
         """Time passes, or control changed; whether the offer ended by it."""
@@ -66,6 +71,18 @@ class CarHandover:
         if ended is not None:
             self._log_step("ended", ended, None)
         return ended is not None
+
+    def watch_owners(self) -> None:
+        """Log that an owner of acknowledged alarms is off duty, and on duty again: a replay knows it by that."""
+        acknowledged = [one for one in self._judgement.monitor.standing() if one.state is AlarmState.ACKED]
+        for owner in sorted({one.acknowledged_by or "" for one in acknowledged} - {""}):
+            off_ms, logged_ms = self._authorization.off_duty_ms(owner), self._owners_off.pop(owner, None)
+            if off_ms is not None:
+                self._owners_off = dict([*self._owners_off.items(), (owner, off_ms)][-MOST_OWNERS:])
+            if off_ms != logged_ms:
+                titles = ", ".join(one.spec.title for one in acknowledged if one.acknowledged_by == owner)
+                does = "is off duty and" if off_ms is not None else "is on duty again, and"
+                self._note("owner", f"{owner} {does} has acknowledged: {titles}.", owner=owner, off_duty_ms=off_ms)
 
     def obey(
         self, command: handover_commands.HandoverCommand, caller: Caller, now_s: float, wall_ms: int

@@ -244,9 +244,11 @@ class Marks:
         """At the start: the marks of the drive that went on when the server ended, and those before, from the log."""
         began = _drive_began(bus, vehicle)
         for event in logged(bus, vehicle):
-            row, before = row_of(event), self._known.get(event.get("mark", ""))
-            if before is not None and (row is None or event["change"] == "mark_removed"):
-                self._known[event["mark"]] = replace(before, is_removed=True)
+            if not isinstance(mark := event.get("mark"), str):
+                continue  # damaged: it names no mark
+            row, before = row_of(event), self._known.get(mark)
+            if before is not None and event["change"] == "mark_removed":
+                self._known[mark] = replace(before, is_removed=True)
             elif row is not None:
                 drive = before.drive if before is not None else self._drive if event["n"] > began else 0
                 self._known[row["mark"]] = _Known(row, drive)

@@ -93,7 +93,7 @@ class Facts:
     decelerate: SlowDownState
     mode: ModeState
     operators: OperatorsState
-    off_duty_ms: Callable[[str | None], int | None] = lambda _: None  # of a recording it is not known
+    off_duty_ms: Callable[[str | None], int | None] = lambda _: None
     marks: int = 0  # of this drive
     questions: Sequence[Question] = ()
     of_unknown_age: Collection[str] = ()  # topics whose only message may have been kept for us

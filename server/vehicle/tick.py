@@ -114,6 +114,7 @@ class Tick:
         judgement.judge(now_s)
         self._attempts.attempt("driving", partial(self._parts.driving.tick, now_s))
         self._attempts.attempt("attention", partial(self.watch_attention, now_s))
+        self._attempts.attempt("owners", self._parts.handover.watch_owners)
         if put:
             if not publisher.is_due:
                 publisher.put()

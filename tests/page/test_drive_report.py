@@ -128,7 +128,11 @@ async def test_the_logbook_and_two_drives_along_the_way(saved: Phone) -> None:
         await expect(compare.locator(".cw-plots")).to_contain_text(unknown)
     await expect(compare.locator(".cw-side .lb-check")).to_contain_text("as many in both")
     await compare.get_by_role("slider").press("End")
-    await expect(compare.locator(".lb-figures")).to_contain_text("1.19")
+    await expect(compare.locator(".lb-figures")).to_contain_text("1.20")
+    await expect(compare.locator(".lb-figures div", has_text="Interventions A")).to_contain_text(re.compile(r"A1B 1"))
+    for side, line in (("A", "solid line"), ("B", "dotted line")):
+        shown = compare.locator(".cw-choose", has=page.get_by_label(f"Drive {side}")).locator("span small")
+        await expect(shown).to_contain_text(re.compile(rf"1\.2\d km · .* · {line}"))
     await no_barrier(page, "two drives", ".compareway-board")
     await fits_all(page, "two drives", ".compareway-board")
     async with page.expect_download() as saving:

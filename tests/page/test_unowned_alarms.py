@@ -80,6 +80,18 @@ async def test_it_opens_also_where_the_car_knows_of_the_end_of_the_duty_a_moment
     await expect(phone.page.locator("#sheet-left")).to_contain_text("0 of 1 taken over")
 
 
+async def test_a_gap_of_the_server_closes_it_and_it_comes_back(phone: Phone, canned: Canned) -> None:
+    canned.duty = DUTY
+    canned.state["alarms"] = [left("gps_drift", "GPS drift")]
+    await opened(phone, canned)
+    sheet = phone.page.locator("#sheet-left")
+    await expect(sheet).to_contain_text("0 of 1 taken over")
+    canned.silent = True
+    await expect(sheet).to_have_count(0)
+    canned.silent = False
+    await expect(sheet).to_contain_text("0 of 1 taken over")
+
+
 async def test_its_row_is_read_whole_beside_its_two_keys(phone: Phone, canned: Canned) -> None:
     await phone.page.set_viewport_size({"width": 360, "height": 740})
     canned.state["alarms"] = [left("gps_drift", "GPS drift at standstill")]

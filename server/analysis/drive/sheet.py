@@ -40,7 +40,6 @@ def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str
         **{name: found[name] for name in ("title", "weather", "remarks", "tags")},
         "chain": [*_chain(found["chain"]), *_parts_missing(found)],
         "parts": sheet_things.parts(found),
-        "chain_is_bad": bool(found["parts_missing"]) or any(one["is_broken"] for one in found["chain"]),
         "figures": _figures(found),
         "people": None if found["people"] is None else _people(found["people"]),
         "departure": _departure(found["departure"]),
@@ -97,20 +96,20 @@ def _about(found: Mapping[str, Any]) -> str:
     return f"{car}, {begin:%-d %b %Y}, {day_time(found['start_ms'])} to {day_time(found['end_ms'])} UTC{part}"
 
 
-def _chain(chain: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
-    """State and head of each file; of many, those that are broken and how many are not."""
+def _chain(chain: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, bool]]:
+    """State and head of each file, and whether it is broken; of many, those that are and how many are not."""
     if len(chain) <= MOST_CHAINS:
-        return [(_state(one), _head(one)) for one in chain]
-    broken = [(f"{one['recording']}: {_state(one)}", _head(one)) for one in chain if one["is_broken"]]
+        return [(_state(one), _head(one), bool(one["is_broken"])) for one in chain]
+    broken = [(f"{one['recording']}: {_state(one)}", _head(one), True) for one in chain if one["is_broken"]]
     intact = sum(one["state"] == "intact" and not one["is_broken"] for one in chain)
-    return [(f"{intact} of {len(chain)} parts intact", "heads below"), *broken[:MOST_CHAINS]]
+    return [(f"{intact} of {len(chain)} parts intact", "heads below", False), *broken[:MOST_CHAINS]]
 
 
-def _parts_missing(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _parts_missing(found: Mapping[str, Any]) -> list[tuple[str, str, bool]]:
     """Beside chains that are intact: what is not there has none."""
     numbers = [str(number) for one in found["no_record"] for number in one["parts"]]
     which = ", ".join(numbers[:MOST_CHAINS]) + (" …" if len(numbers) > MOST_CHAINS else "")
-    return [(f"Missing: part{'s' if len(numbers) > 1 else ''} {which}", "see data lost")] if numbers else []
+    return [(f"Missing: part{'s' if len(numbers) > 1 else ''} {which}", "see data lost", True)] if numbers else []
 
 
 def _state(one: Mapping[str, Any]) -> str:
@@ -123,8 +122,8 @@ def _head(one: Mapping[str, Any]) -> str:
     return "" if not head else f"head {head[:4]} {head[4:8]} {head[8:12]} {head[12:16]}"
 
 
-def _figures(found: Mapping[str, Any]) -> list[tuple[str, str | None, str, str]]:
-    """Title, value (None: not known), unit, what stands below."""
+def _figures(found: Mapping[str, Any]) -> list[tuple[str, str | None, str, str, bool]]:
+    """Title, value (None: not known), unit, what stands below, whether it is above its benchmark."""
     f, load = found["figures"], found["load"]
     metres, modes = f["distance_m"], f["modes"]
     km = None if metres is None else metres / 1000
@@ -135,19 +134,21 @@ def _figures(found: Mapping[str, Any]) -> list[tuple[str, str | None, str, str]]
         "" if f[name] is None else f"{f[name]:.2f} {unit}"
         for name, unit in (("interventions_per_autonomous_km", "per autonomous km"), ("alarms_per_km", "per km"))
     )
-    in_10_min = f"{load['in_10_min']:.1f} in 10 min" if load else ""
+    in_10_min = f"{load['in_10_min']:.1f} in 10 min, benchmark 1" if load else ""
+    is_above = bool(load) and load["in_10_min"] > BEARABLE_IN_10_MIN
     marks = found["marks"] or []
     voices, photos = sum(one["voice"] for one in marks), sum(one["photo"] for one in marks)
     p50, p90 = f["acknowledged_p50_s"], f["acknowledged_p90_s"]
+    gaps = report_text.counted(f["blind"], "gap")
     waited = f"p90 {p90:.1f} s" if p90 is not None else "none was acknowledged" if f["alarms"] else ""
     return [
-        ("Distance", _km(km), "km", _clock(f["driven_s"])),
-        ("Autonomous", _km(auto_m / 1000) if is_known else None, "km", share),
-        ("Interventions", _whole(f["interventions"]), "", per_km),
-        ("Alarms", _whole(f["alarms"]), "", ", ".join(filter(None, (alarms_per_km, in_10_min)))),
-        ("To acknowledge", None if p50 is None else f"{p50:.1f}", "s", waited),
-        ("Marks", _whole(f["marks"]), "", f"{voices} with voice, {photos} with photo" if marks else ""),
-        ("Data lost", f"{f['blind_s']:.1f}", "s", f"in {report_text.counted(f['blind'], 'gap')}{_not_recorded(found)}"),
+        ("Distance", _km(km), "km", _clock(f["driven_s"]), False),
+        ("Autonomous", _km(auto_m / 1000) if is_known else None, "km", share, False),
+        ("Interventions", _whole(f["interventions"]), "", per_km, False),
+        ("Alarms", _whole(f["alarms"]), "", ", ".join(filter(None, (alarms_per_km, in_10_min))), is_above),
+        ("To acknowledge", None if p50 is None else f"{p50:.1f}", "s", waited, False),
+        ("Marks", _whole(f["marks"]), "", f"{voices} with voice, {photos} with photo" if marks else "", False),
+        ("Data lost", f"{f['blind_s']:.1f}", "s", f"in {gaps}{_not_recorded(found)}", False),
     ]
 
 

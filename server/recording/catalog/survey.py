@@ -97,7 +97,7 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
         "length_s": round(recording.duration_s, 3),
         "messages": recording.count,
         "topics": len(recording.topics),
-        "distance_m": None if snapshot.track_m is None else round(snapshot.track_m, 1),
+        "distance_m": None if state.track_m is None else round(state.track_m + state.track_ahead_m, 1),
         "top_speed_mps": None if motion.top_mps is None else round(motion.top_mps, 2),
         "speed_mps": [] if motion.top_mps is None else motion.trace.rounded(),
         "alarms": {name: counts.get(name, 0) for name in PRIORITIES} if has_alarms else None,

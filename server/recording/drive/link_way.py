@@ -28,7 +28,7 @@ def link_along(facts: DriveFacts) -> list[LinkStretch]:
     length_m = facts.motion.distance_m
     if length_m is None or length_m < LEAST_M:
         return []
-    step_m = next((step for step in STEPS_M if length_m / step <= STRETCHES), STEPS_M[-1])
+    step_m = next((step for step in STEPS_M if length_m / step - STRETCHES <= 0.01), STEPS_M[-1])
     ends = [float(step_m * number) for number in range(1, int(length_m / step_m) + 1)]
     if not ends or length_m - ends[-1] > 0.01 * step_m:
         ends.append(length_m)

@@ -163,12 +163,13 @@ class Motion(Observer):
 
     def signals_changed(self, changed: Collection[str], state: State, now_s: float) -> None:
         """The distance as the operator saw it."""
-        if "position" in changed and (track_m := state.track_m) is not None:
+        if "position" in changed and state.track_m is not None:
+            track_m = state.track_m + state.track_ahead_m  # to where the car is: what is smoothed ends before it
             last_s, last_m = self._last_track or (now_s, track_m)
             if any(last_s <= from_s and to_s <= now_s for from_s, to_s in self._gaps):
                 self._left_out_m += track_m - last_m
             self._last_track = now_s, track_m
-            self._by_position.add(now_s, track_m - self._left_out_m)
+            self._by_position.add(now_s, max([track_m - self._left_out_m, *self._by_position.values[-1:]]))
 
     def _drive(self, speed_mps: float, now_s: float) -> None:
         if not abs(speed_mps) < FASTEST_MPS:

@@ -96,7 +96,9 @@ function leftBehind(store, say) {
       isOpening = false;
       if (mustWait() || !mayAsk(store)) return;
       notice.isShown = true;
-      new LeftSheet(store);
+      new LeftSheet(store, () => {
+        notice.isShown = false;
+      });
     }).catch(() => {
       isOpening = false;
       notice.isShown = true;

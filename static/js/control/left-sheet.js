@@ -20,10 +20,11 @@ export class LeftSheet {
   #meant = new Meant();
   #lines = '';
 
-  /** @param {Store} store */
-  constructor(store) {
+  /** @param {Store} store @param {() => void} onSilent it was closed because nothing came from the server: nobody has read it */
+  constructor(store, onSilent) {
     void styled('people');
     this.store = store;
+    this.onSilent = onSilent;
     this.count = html('span', { class: 'sub' });
     this.list = html('ul', { class: 'read-back', 'aria-label': 'Alarms without an owner on duty' });
     this.#meant.element = this.list;
@@ -45,8 +46,12 @@ export class LeftSheet {
 
   #draw() {
     const { frame, duty } = this.store;
-    if (!this.sheet.open) return;
-    const lines = frame && duty?.me && !this.store.isSilent ? leftLines(frame.alarms, duty.me, this.#taken) : [];
+    if (!this.sheet.open) return undefined;
+    if (this.store.isSilent) {
+      this.onSilent();
+      return closeSheet(this.sheet);
+    }
+    const lines = frame && duty?.me ? leftLines(frame.alarms, duty.me, this.#taken) : [];
     if (lines.length === 0) return closeSheet(this.sheet); // they ended, or somebody else took them
     const left = lines.filter(({ read }) => !read).length;
     setText(this.count, `${lines.length - left} of ${lines.length} taken over`);

@@ -1094,6 +1094,10 @@ export interface LogEvent {
   recurring?: Array<RecurringItem>;
   /** SHA-256 of the list and its results [hex]; with an item: of what it asks */
   hash?: string;
+  /** under whose name alarms were acknowledged */
+  owner?: string;
+  /** when their duty ended; null: they are on duty again */
+  off_duty_ms?: number | null;
   address?: string;
   /** all that are in force, as monitoring begins */
   settings?: Record<string, any>;

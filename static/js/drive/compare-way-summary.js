@@ -32,7 +32,7 @@ export function alarmsOf({ events, are_alarms_known, are_events_cut }) {
 }
 
 /** The same. @param {Course} course */
-function interventionsOf({ events, are_interventions_known, are_events_cut }) {
+export function interventionsOf({ events, are_interventions_known, are_events_cut }) {
   return are_interventions_known && !are_events_cut ? events.filter(({ kind }) => kind === 'intervention') : null;
 }
 

@@ -1,7 +1,7 @@
 // Two drives compared along the way or over time: speed, steering, what happened, B − A, one cursor through all.
 
 import { csvOf } from './compare-way-csv.js';
-import { alarmsOf, summaryOf } from './compare-way-summary.js';
+import { alarmsOf, interventionsOf, summaryOf } from './compare-way-summary.js';
 import { aligned, difference, differences } from './compare-way-model.js';
 import { axisOf, bothPlot, differencePlot, eventsPlot, speedPlot, waysMap } from './compare-way-plots.js';
 import { dayOf, figure, openBoard, options, select } from './drive-board.js';
@@ -31,6 +31,8 @@ class CompareWay {
   #rows = [];
   /** @type {Map<string, Course>} */
   #courses = new Map();
+  /** @type {Map<string, Drive>} */
+  #drives = new Map();
   /** @type {ReturnType<typeof waysMap>} */
   #map = null;
   #turn = 0;
@@ -40,6 +42,7 @@ class CompareWay {
     this.title = html('h2', { tabindex: -1 }, 'Compare');
     this.a = select('Drive A');
     this.b = select('Drive B');
+    this.names = { a: html('span', {}), b: html('span', {}) };
     this.keys = /** @type {[By, string][]} */ ([['way', 'By distance'], ['time', 'By time']]).map(([by, name]) => {
       const key = html('button', { type: 'button', 'aria-pressed': String(by === this.#by), 'data-by': by }, name);
       listen(key, 'click', () => this.#turnTo(by));
@@ -47,12 +50,12 @@ class CompareWay {
     });
     this.csv = html('button', { type: 'button', class: 'cw-csv', 'data-f': 'compare-csv', disabled: true }, icon('download'), 'CSV');
     this.state = html('p', { class: 'state', role: 'status' }, 'Loading the drives…');
-    this.figures = html('dl', { class: 'lb-figures' });
+    this.figures = html('dl', { class: 'lb-figures cw-figures' });
     this.cursor = html('div', { class: 'cw-cursor' });
     this.slider = /** @type {HTMLInputElement} */ (html('input', { type: 'range', min: 0, max: 0, step: 1, value: 0, 'aria-label': 'Cursor' }));
     this.plots = html('div', { class: 'cw-plots' });
     this.side = html('div', { class: 'cw-side' });
-    const head = html('div', { class: 'cw-head' }, choose('A', this.a), choose('B', this.b), html('div', { class: 'cw-how' }, html('div', { class: 'cw-by', role: 'group', 'aria-label': 'Compared' }, ...this.keys), this.csv));
+    const head = html('div', { class: 'cw-head' }, choose('A', this.a, this.names.a), choose('B', this.b, this.names.b), html('div', { class: 'cw-how' }, html('div', { class: 'cw-by', role: 'group', 'aria-label': 'Compared' }, ...this.keys), this.csv));
     const view = html('div', { class: 'view lb-view', tabindex: 0, role: 'region', 'aria-label': 'Two drives' }, head, this.state, this.figures, html('div', { class: 'lb-columns cw-columns' }, this.plots, this.side));
     const watch = new ResizeObserver(() => this.#draw());
     openBoard({ kind: 'compareway', label: 'Compare two drives', title: this.title, ends: [], view, store, onClose: () => watch.disconnect() });
@@ -72,7 +75,8 @@ class CompareWay {
   async #begin(vehicle, first) {
     try {
       const { drives } = /** @type {import('../core/protocol-types.js').LogbookAnswer} */ (await request(`/api/logbook?${new URLSearchParams(vehicle ? { vehicle } : {})}`));
-      const choices = drives.map((one) => /** @type {[string, string]} */ ([one.id, nameOf(one)]));
+      const choices = drives.map((one) => /** @type {[string, string]} */ ([one.id, nameOf(one).join(' · ')]));
+      this.#drives = new Map(drives.map((one) => [one.id, one]));
       const a = drives.find(({ id, recordings = [] /* of an older agent */ }) => id === first || (first !== null && recordings.includes(first))) ?? drives[0];
       const b = drives.find(({ id }) => id !== a?.id);
       options(this.a, choices, a?.id ?? '');
@@ -88,6 +92,8 @@ class CompareWay {
     const turn = this.#turn += 1;
     const [a, b] = [this.a.value, this.b.value];
     this.#forget();
+    this.#name(this.names.a, a, 'solid line');
+    this.#name(this.names.b, b, 'dotted line');
     if (!this.#courses.has(a) || !this.#courses.has(b)) setWords(this.state, 'Loading the drives…');
     try {
       for (const id of new Set([a, b])) if (!this.#courses.has(id)) this.#courses.set(id, await request(`/api/recordings/${encodeURIComponent(id)}/course`));
@@ -95,6 +101,14 @@ class CompareWay {
     } catch (error) {
       if (turn === this.#turn) setWords(this.state, sentenceOf(error));
     }
+  }
+
+  /** The chosen drive in two lines, of which none is cut as the text of a select is. @param {HTMLElement} place @param {string} id @param {string} how it is drawn */
+  #name(place, id, how) {
+    const drive = this.#drives.get(id);
+    if (!drive) return;
+    const [day, ...more] = nameOf(drive);
+    place.replaceChildren(html('b', {}, ...words(day ?? '')), html('small', {}, ...words([...more, how].join(' · '))));
   }
 
   /** No figure of the drives before stands under the names of the new ones. */
@@ -185,14 +199,15 @@ class CompareWay {
     const number = (/** @type {number | null | undefined} */ value, digits = 1) => (value === null || value === undefined ? null : fixed(value, digits));
     const other = (/** @type {string | null} */ value, unit = '') => `B ${value === null ? 'not known' : `${value}${unit}`}`;
     const delta = difference(row, 'speed');
-    const alarms = (/** @type {Course} */ course) => number(alarmsOf(course)?.length, 0);
+    const count = (/** @type {import('../core/protocol-types.js').CourseEvent[] | null} */ events) => number(events?.length, 0);
     this.figures.replaceChildren(
       figure('At', this.#axisWords(row.x).split(' ')[0] ?? null, this.#axisWords(row.x).split(' ')[1] ?? '', `A ${duration(row.a.t)}${row.b ? `, B ${duration(row.b.t)}` : ''}`),
       figure('Speed A', number(row.a.speed), 'm/s', `${other(number(row.b?.speed))}${delta === null ? '' : `, ${signed(delta)}`}`),
       figure('Steering A', number(row.a.steering, 0), '%', other(number(row.b?.steering, 0), ' %')),
       figure('Aside', number(row.aside), 'm', 'B from A'),
-      figure('Time A', duration(a.length_s), '', `B ${duration(b.length_s)}`),
-      figure('Alarms A', alarms(a), '', other(alarms(b))));
+      figure('Alarms A', count(alarmsOf(a)), '', other(count(alarmsOf(b)))),
+      figure('Interventions A', count(interventionsOf(a)), '', other(count(interventionsOf(b)))),
+      figure('Time A', duration(a.length_s), '', `B ${duration(b.length_s)}`)); // the last one, for which a phone has no room: the names of the drives have it
     this.slider.setAttribute('aria-valuetext', `${this.#axisWords(row.x)}, A ${number(row.a.speed) ?? 'not known'} m/s`);
   }
 
@@ -216,11 +231,13 @@ function summaryList(lines) {
     ...(line.a === null && line.b === null ? [] : [html('b', {}, `A ${number(line, line.a)}, B ${number(line, line.b)}`)]), html('small', {}, ...words(line.words))))));
 }
 
-/** @param {Drive} one */
+/** Its day first. @param {Drive} one */
 function nameOf({ started_ms, title, distance_m, driven_s, parts }) {
-  const way = distance_m === null ? '' : ` · ${fixed(distance_m / 1000, 2)} km`;
-  return `${dayOf(started_ms)}${title ? ` · ${title}` : ''}${way} · ${duration(driven_s)}${parts > 1 ? ` · ${parts} parts` : ''}`;
+  return [dayOf(started_ms), title ?? '', distance_m === null ? '' : `${fixed(distance_m / 1000, 2)} km`, duration(driven_s), parts > 1 ? `${parts} parts` : ''].filter(Boolean);
 }
 
-/** @param {string} name @param {HTMLElement} choice */
-const choose = (name, choice) => html('div', { class: 'cw-choose' }, html('b', { 'aria-hidden': 'true' }, name), choice);
+/** The choice lies unseen over the name of what is chosen. @param {string} name @param {HTMLElement} choice @param {HTMLElement} shown */
+function choose(name, choice, shown) {
+  setAttribute(shown, 'aria-hidden', true);
+  return html('div', { class: 'cw-choose' }, html('b', { 'aria-hidden': 'true' }, name), shown, icon('next', 's'), choice);
+}

@@ -175,6 +175,20 @@ async def test_a_duty_ends_by_itself_and_all_pages_are_told(tmp_path: Path) -> N
     assert "ended" in (tmp_path / "people/duty.toml").read_text()
 
 
+async def test_former_names_and_who_was_removed_survive_a_restart(tmp_path: Path) -> None:
+    clock = Clock()
+    people = People(tmp_path, wall_ms=clock)
+    ann, ben = await people.add("A. K.", "operator"), await people.add("B. K.", "operator")
+    await people.change(ann, name="Anna K.", role=None)
+    await people.sign_on("phone", "Pixel 7", ann, None, moves=False)
+    await people.sign_on("desk", "Desk", ben, None, moves=False)
+    await people.sign_off("desk")
+    await people.remove(ben)
+    again = People(tmp_path, wall_ms=clock)
+    assert again.complaint is None
+    assert again.sent(None)["duties"] == {"Anna K.": None, "A. K.": None, "B. K.": clock()}
+
+
 @pytest.mark.parametrize("name", ["people.toml", "duty.toml"])
 @pytest.mark.parametrize(
     "content",

@@ -71,6 +71,28 @@ async def test_a_removed_person_is_not_brought_back() -> None:
     assert one.people.board.people == {} == two.people.board.people
 
 
+async def test_who_is_removed_at_one_node_while_on_duty_at_the_other_is_off_duty_at_once() -> None:
+    one, two = Node(), Node()
+    ann = await one.people.add("A. K.", "operator")
+    one.ms = 2000
+    await one.people.change(ann, name="Anna K.", role=None)
+    two.hear(one)
+    two.ms = 3000
+    await two.people.sign_on("phone", "Pixel", ann, None, moves=False)
+    assert two.people.sent("phone")["duties"] == {"Anna K.": None, "A. K.": None}
+    one.ms = 4000
+    await one.people.remove(ann)
+    two.hear(one)
+    assert two.people.sent("phone") == {
+        "person": None,
+        "supervisors": [],
+        "duties": {"Anna K.": 4000, "A. K.": 4000},
+    }
+    ended = two.people.duty_of("phone", "Pixel")["ended"]
+    assert ended is not None
+    assert "was removed from the list" in ended["text"]
+
+
 @pytest.mark.parametrize(
     ("key", "value"),
     [

@@ -165,3 +165,23 @@ def test_each_status_states_who_is_on_duty_and_when_the_duty_of_others_ended(boa
     board.advance(5000 + 12 * HOUR_MS)
     assert board.stated(5000 + 12 * HOUR_MS) == {"A. K.": 5000 + 12 * HOUR_MS, "M. R.": 4000}
     assert board.stated(4000 + OFF_STATED_MS) == {"A. K.": 5000 + 12 * HOUR_MS}
+
+
+def test_who_was_renamed_or_removed_is_off_duty_under_each_name(board: DutyBoard) -> None:
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    board.change("ak", name="Anna K.", role=None, now_ms=2000)
+    assert board.stated(2000) == {"Anna K.": None, "A. K.": None}
+    board.sign_off("phone", 3000)
+    assert board.stated(3000) == {"Anna K.": 3000, "A. K.": 3000}
+    board.remove("ak", 4000)
+    assert board.stated(4000) == {"Anna K.": 3000, "A. K.": 3000}
+    assert board.stated(3000 + OFF_STATED_MS) == {}
+    board.add("other", "A. K.", "operator", 5000)
+    board.sign_on("desk", "Desk", "other", None, 6000)
+    assert board.stated(6000) == {"A. K.": None, "Anna K.": 3000}  # a name is that of who bears it now
+
+
+def test_of_former_names_the_last_ones_are_known(board: DutyBoard) -> None:
+    for number, name in enumerate(("B", "C", "A. K.", "D", "E")):
+        board.change("ak", name=name, role=None, now_ms=1000 + number)
+    assert board.people["ak"].former == ("D", "A. K.", "C")

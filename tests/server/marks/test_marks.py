@@ -143,3 +143,16 @@ def test_what_the_button_said_before_is_known_after_a_restart() -> None:
     events = world.past_events("car", change="mark_refused")
     assert len(events) == 1
     assert world.journal.last("car") == before + 1
+
+
+def test_a_damaged_event_of_the_log_loses_no_mark() -> None:
+    world = World()
+    marks = world.marks()
+    for mark in ("a", "b"):
+        placed(marks, mark, words=mark)
+    before = marks.rows()
+    for damaged in (["a"], {"a": 1}, None, 7, "no id: §"):
+        for change in ("mark", "mark_changed", "mark_removed"):
+            world.note(change, "", mark=damaged, marked_ms=NOW_MS)
+    world.note("mark_changed", "", mark="a", marked_ms="soon")  # of a known mark: it stays as it was
+    assert world.marks().rows() == before

@@ -189,6 +189,27 @@ def test_a_planned_stop_that_began_before_the_part_is_in_force_in_it(tmp_path: P
     playback.close()
 
 
+def test_who_acknowledged_is_off_duty_at_the_moments_at_which_the_live_page_said_so(tmp_path: Path) -> None:
+    owner = "A. K. (Pixel 7)"
+
+    def owned(at_s: float, off_s: float | None) -> tuple[float, str, dict[str, Any]]:
+        off_ms = None if off_s is None else BEGAN_MS + round(off_s * 1000)
+        return at_s, "alarms", event(at_s, "owner", alarm=None, owner=owner, off_duty_ms=off_ms)
+
+    acknowledged = event(-9.0, "acknowledged", alarm="gps_drift", state="ACKED", by=owner)
+    began = owned(-3.0, -4.0)[2]
+    rows = [owned(5.0, None), owned(9.0, 8.5), (12.0, "alarms", event(12.0, "owner", alarm=None, owner=7))]
+    playback = opened(record(tmp_path / "a.mcap", rows, standing=json.dumps([acknowledged, began])))
+
+    def off_ms(at_s: float) -> Any:
+        return next(one["off_duty_ms"] for one in at(playback, at_s)["alarms"] if one["id"] == "gps_drift")
+
+    assert [off_ms(at_s) for at_s in (1.0, 6.0, 10.0, 13.0, 2.0)] == [
+        BEGAN_MS - 4000, None, BEGAN_MS + 8500, BEGAN_MS + 8500, BEGAN_MS - 4000,
+    ]  # fmt: skip
+    playback.close()
+
+
 def test_the_phone_is_where_it_was(tmp_path: Path) -> None:
     fix = {
         "lat_deg": 32.23, "lon_deg": -110.95, "accuracy_m": 5.0, "at_ms": 1.0, "age_s": 0.2,

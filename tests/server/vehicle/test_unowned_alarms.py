@@ -59,6 +59,20 @@ async def test_it_says_since_when_its_owner_is_off_duty() -> None:
     assert listed(car)[2] is None
 
 
+async def test_the_log_says_when_an_owner_goes_off_duty_and_comes_back() -> None:
+    car = await left()
+    await car.obeyed(SEEN | ANN | AK | BOTH, "present")
+    car.tick(0.5)
+    events = [
+        (event["text"], event["owner"], event["off_duty_ms"])
+        for event in reversed(car.bus.past_events("ocelot", change="owner"))
+    ]
+    assert events == [
+        ("A. K. (Ann) is off duty and has acknowledged: Test warning.", "A. K. (Ann)", OFF_MS),
+        ("A. K. (Ann) is on duty again, and has acknowledged: Test warning.", "A. K. (Ann)", None),
+    ]
+
+
 async def test_the_page_of_another_car_says_it_too() -> None:
     car = await acknowledged()
     car.say(BEN | MR | LEFT)

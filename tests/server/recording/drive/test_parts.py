@@ -43,6 +43,7 @@ def test_the_figures_of_the_parts_are_added_up(paths: list[Path], drive: DriveFa
     whole = figures_of(drive)
     one, other = (figures_of(read(path)) for path in paths)
     assert whole["driven_s"] == 180.0
+    assert whole["distance_m"] == pytest.approx(1800, abs=3.0), "at the end of neither part is any of the way missing"
     for name in ("distance_m", "driven_s", "blind_s"):
         assert whole[name] == pytest.approx(one[name] + other[name], abs=3.0), name
     assert (one["alarms"], one["slow_downs"], other["alarms"], other["slow_downs"]) == (3, 2, 1, 0)
