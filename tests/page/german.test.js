@@ -4,9 +4,18 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 Object.defineProperty(globalThis, 'navigator', { value: { language: 'de-DE' }, configurable: true });
+const { NumberFormat } = Intl;
+let built = 0;
+Intl.NumberFormat = /** @type {any} */ (class extends NumberFormat {
+  /** @param {ConstructorParameters<typeof NumberFormat>} given */
+  constructor(...given) {
+    super(...given);
+    built += 1;
+  }
+});
 const { age, distanceWords, fixed, pieces, signed } = await import('../../static/js/core/format.js');
 const { chooseSpeedUnit, inUnits, speedWords } = await import('../../static/js/core/units.js');
-const { decimalOf } = await import('../../static/js/core/decimal.js');
+const { decimalOf, KNOWN, markOf } = await import('../../static/js/core/decimal.js');
 const { endText, textOf } = await import('../../static/js/settings/settings-layout.js');
 const { unseenWords } = await import('../../static/js/core/unseen.js');
 const { rateWords } = await import('../../static/js/replay/replay-layout.js');
@@ -20,6 +29,13 @@ test('live values, ages and distances have a comma', () => {
   assert.deepEqual([age(0.5, 2), age(3.44), age(125)], ['0,50', '3,4', '2:05']);
   assert.deepEqual([distanceWords(10.4), distanceWords(4200)], [['10,4', 'm'], ['4,2', 'km']]);
   assert.deepEqual([unseenWords(2.71), rateWords(0.25)], ['≤ 2,8 m unseen', '×0,25']);
+});
+
+test('the mark of a usual language is known without the long start of Intl, and is what Intl says', () => {
+  assert.equal(fixed(4.25), '4,3');
+  assert.equal(built, 0, 'a number was drawn without it');
+  for (const [language, mark] of Object.entries(KNOWN)) assert.equal(new NumberFormat(language).formatToParts(1.5).find(({ type }) => type === 'decimal')?.value, mark, language);
+  assert.deepEqual([markOf('fr'), markOf('de-CH'), markOf('no language'), built], [',', '.', '.', 2]);
 });
 
 test('so have the sentences of the server; addresses, versions and times do not', () => {

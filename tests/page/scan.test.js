@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { INVALID, NO_RETURN, NOTHING_IN_RANGE, TOO_CLOSE, readScan } from '../../static/js/scan/scan-frame.js';
-import { NOT_IN_VIEW, beamWords, behind, clearOf, coversAny, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringWords, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
+import { NOT_IN_VIEW, beamWords, behind, clearOf, clearPlace, coversAny, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringWords, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
 import { edgesOf, endOf } from '../../static/js/scan/scan-corridor.js';
 import { beside, follow, nearestShown, nearestTo } from '../../static/js/scan/scan-pick.js';
 import { ScanMark } from '../../static/js/scan/scan-mark.js';
@@ -261,6 +261,15 @@ test('words that would cover a return are found', () => {
   assert.ok(coversAny(box, [0, 0, 10, 3.9], scale)); // its square of 5 px reaches into the box
   assert.ok(!coversAny(box, [10, -7, 12.5, 7, 10, 3], scale));
   assert.ok(!coversAny(box, [], scale));
+});
+
+test('the number of a ring stands in the first place without a return and without words', () => {
+  const scale = { cx: 200, cy: 300, k: 10 };
+  const [first, second] = [{ left: 100, top: 190, width: 20, height: 20 }, { left: 250, top: 190, width: 20, height: 20 }];
+  assert.deepEqual(clearPlace([first, second], [], [], scale), { index: 0, box: first });
+  assert.deepEqual(clearPlace([first, second], [], [10, 9], scale), { index: 1, box: second }); // a return at 110, 200
+  assert.deepEqual(clearPlace([first, second], [second], [10, 9], scale), { index: 1, box: { ...second, top: 170 } });
+  assert.deepEqual(clearPlace([first], [], [10, 9], scale), { index: -1, box: null });
 });
 
 test('the distance beside the ring of the nearest object stands whole on the plot, above or below the ring where neither side has room', () => {

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import AsyncIterator
+from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -18,6 +20,12 @@ COLD_S, WARM_S = 0.8, 0.6
 COLD_BYTES = 100_000
 SETTLES_MS = 3000  # a window of this browser loads two hundred files of its own when it opens
 ACCESS_POINT = {"offline": False, "latency": 5, "downloadThroughput": 20e6 / 8, "uploadThroughput": 20e6 / 8}
+TRACED = [
+    "devtools.timeline",
+    "blink.user_timing",
+    *(f"disabled-by-default-devtools.timeline{of}" for of in ("", ".stack")),
+]
+PAINTED_US = 50_000  # the picture with the first values is complete by then
 # Live values stand on Home: the time of the page's own clock when they first did.
 WATCH = """() => {
   const look = () => {
@@ -86,6 +94,40 @@ async def test_the_page_is_small(browser: Browser, watch: Process) -> None:
     assert cold[1] <= COLD_BYTES
     assert warm[1] <= 0.4 * cold[1], "what has not changed is not sent again"
     assert cold[0] <= 10 * COLD_S  # whatever else this machine does
+
+
+async def test_no_script_forces_a_style_or_layout_before_the_first_values(
+    browser: Browser, watch: Process, tmp_path: Path
+) -> None:
+    """Each costs a slow phone 50 ms, and is done again once the values are written."""
+    trace = tmp_path / "trace.json"
+    page = await browser.new_page(**PHONE)
+    try:
+        await page.add_init_script(f"({WATCH})()")
+        await browser.start_tracing(page=page, path=trace, categories=TRACED)
+        await page.goto(watch.address, wait_until="commit")
+        await page.wait_for_function("() => window.thereAt")
+        await page.wait_for_timeout(200)  # until it is painted
+        there_us = 1000 * await page.evaluate("window.thereAt")
+        await browser.stop_tracing()
+    finally:
+        await page.close()
+    events = json.loads(trace.read_text(encoding="utf-8"))["traceEvents"]
+    begun = max(event["ts"] for event in events if event["name"] == "navigationStart")
+    forced = {
+        (event["name"], frames[0]["functionName"], frames[0]["url"].rpartition("/")[2], frames[0]["lineNumber"])
+        for event in events
+        if event["name"] in ("UpdateLayoutTree", "Layout") and begun <= event["ts"] < begun + there_us + PAINTED_US
+        if (frames := stack_of(event)) and watch.address in frames[0]["url"]
+    }
+    assert not forced
+
+
+def stack_of(event: dict[str, Any]) -> list[dict[str, Any]]:
+    """The script that asked for a size while the page was not laid out."""
+    told = event.get("args", {})
+    frames: list[dict[str, Any]] = told.get("beginData", told).get("stackTrace", [])
+    return frames
 
 
 @pytest.mark.soak

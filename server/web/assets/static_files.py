@@ -43,6 +43,7 @@ class Packed:
     etag: str
 
 
+@lru_cache(maxsize=32)
 def packed(body: bytes) -> Packed:
     """Any text, compressed as far as gzip can, and without a date, so that the same text is the same bytes."""
     digest = hashlib.sha256(body).hexdigest()[:20]

@@ -262,6 +262,20 @@ export function clearOf(taken, box) {
   return by === undefined ? null : { ...box, top: box.top + by * box.height };
 }
 
+/**
+ * The first of these boxes that covers neither words nor a return, in its place or moved by clearOf; index -1: none does.
+ * @param {Box[]} boxes
+ * @param {Box[]} taken by words
+ * @param {ArrayLike<number>} points as in coversAny
+ * @param {{cx: number, cy: number, k: number}} scale
+ * @returns {{index: number, box: Box | null}}
+ */
+export function clearPlace(boxes, taken, points, scale) {
+  const found = boxes.map((one) => clearOf(taken, one));
+  const index = found.findIndex((box) => box !== null && !coversAny(box, points, scale));
+  return { index, box: found[index] ?? null };
+}
+
 /** What the distance beside the ring of the nearest object takes, and half of its width [px]. */
 const RING_WORDS_PX = { beside: 120, half: 44 };
 

@@ -2,11 +2,15 @@
 
 import { edgesOf, endOf } from './scan-corridor.js';
 import { bearingOf, rangeOf } from './scan-frame.js';
-import { clearOf, codeWords, coversAny, namedSectors, plotScale, pointsOf, ringWords, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
+import { clearOf, clearPlace, codeWords, namedSectors, plotScale, pointsOf, ringWords, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
 import { Hatching, ScanGrid, fit, penOf } from './scan-grid.js';
 import { fixed } from '../core/format.js';
 
 const NAMES_SHOWN = 4;
+/** Where the number of a ring stands, left of ahead [rad]. */
+const RING_TURN = 0.33;
+/** Or there, if returns are at that place: over a number they hide it, and it must hide none. */
+const OTHER_TURNS = [-0.33, 0.72, -0.72, 1.1, -1.1];
 
 /**
  * @typedef {import('./scan-corridor.js').Point} Point
@@ -43,8 +47,10 @@ export class ScanPlot {
   #width = 0;
   /** Where words stand already. @type {Box[]} */
   #taken = [];
-  /** The returns, which words of a line keep clear of. @type {{scale: Scale, points: Float32Array} | null} */
+  /** The returns, which words of a line and the rings' numbers keep clear of. @type {{scale: Scale, points: Float32Array} | null} */
   #dots = null;
+  /** Where the number of a ring stood: it stays there while no return comes there. @type {Map<number, number>} */
+  #turns = new Map();
 
   /** @param {Surface} canvas */
   constructor(canvas) {
@@ -130,11 +136,11 @@ export class ScanPlot {
     g.setLineDash([]);
     if (stopping_m !== null && stopping_m > 0 && stopping_m <= end_m) {
       const [left, right] = this.#across(g, scale, corridor, stopping_m, colour.ink, 5, 5);
-      if (left && right && left[1] > 0) this.#beside(g, `stop ${fixed(stopping_m)} m`, [['right', Math.max(100, left[0] - 7)], ['left', Math.min(scale.width - 92, right[0] + 12)]], left[1], colour.ink, 400);
+      if (left && right && left[1] > 0) this.#clear(g, `stop ${fixed(stopping_m)} m`, [[Math.max(100, left[0] - 7), left[1], 'right', 14, 400], [Math.min(scale.width - 92, right[0] + 12), left[1], 'left', 14, 400]], colour.ink);
     }
     if (limit_m !== null && limit_m > 0 && limit_m <= end_m) {
       const [, right] = this.#across(g, scale, corridor, limit_m, colour.you, 3, 0);
-      if (right && right[1] > 0) this.#beside(g, `limit ${fixed(limit_m)} m`, [['left', Math.min(scale.width - 92, right[0] + 12)]], right[1], colour.you, 700);
+      if (right && right[1] > 0) this.#clear(g, `limit ${fixed(limit_m)} m`, [[Math.min(scale.width - 92, right[0] + 12), right[1], 'left', 14, 700]], colour.you);
     }
   }
 
@@ -159,8 +165,13 @@ export class ScanPlot {
 
   /** @param {Pen} g @param {Scale} scale @param {number} reach_m */
   #rings(g, { at }, reach_m) {
-    const a = (19 * Math.PI) / 180;
-    for (const r of ringsOf(reach_m)) this.#words(g, String(r), ...at(r * Math.cos(a), r * Math.sin(a)), this.#colour.ink2, 'center');
+    for (const r of ringsOf(reach_m)) {
+      const place = (/** @type {number} */ turn) => at(r * Math.cos(turn), r * Math.sin(turn));
+      const turns = [this.#turns.get(r) ?? RING_TURN, RING_TURN, ...OTHER_TURNS].filter((turn) => Math.abs(place(turn)[0] - this.#width / 2) < this.#width / 2 - 12);
+      const index = this.#clear(g, String(r), turns.map((turn) => [...place(turn), 'center', 14, 400]), this.#colour.ink2);
+      if (index >= 0) this.#turns.set(r, turns[index] ?? RING_TURN);
+      else this.#words(g, String(r), ...place(RING_TURN), this.#colour.ink2, 'center');
+    }
   }
 
   /** @param {Pen} g @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {number} reach_m @param {import('./scan-layout.js').Sector[]} sectors @param {number} width */
@@ -255,15 +266,14 @@ export class ScanPlot {
     this.#write(g, text, plate, css);
   }
 
-  /** Words of a line beside it, in the first place where they cover neither words nor a return; else not: the numbers beside the plot have them. @param {Pen} g @param {string} text @param {[CanvasTextAlign, number][]} places @param {number} y @param {string} css @param {number} weight */
-  #beside(g, text, places, y, css, weight) {
-    for (const [align, x] of places) {
-      const plate = clearOf(this.#taken, this.#plate(g, text, x, y, align, 14, weight));
-      if (!plate || !this.#dots || coversAny(plate, this.#dots.points, this.#dots.scale)) continue;
-      this.#taken.push(plate);
-      this.#write(g, text, plate, css);
-      return;
-    }
+  /** Words in the first place where they cover neither words nor a return; else not: the numbers beside the plot have them. @param {Pen} g @param {string} text @param {Where[]} places @param {string} css @returns {number} which place; -1: none */
+  #clear(g, text, places, css) {
+    if (!this.#dots) return -1;
+    const { index, box } = clearPlace(places.map((where) => this.#plate(g, text, ...where)), this.#taken, this.#dots.points, this.#dots.scale);
+    if (!box) return -1;
+    this.#taken.push(box);
+    this.#write(g, text, box, css);
+    return index;
   }
 
   /** The plate of these words. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {CanvasTextAlign} align @param {number} size @param {number} weight @returns {Box} */

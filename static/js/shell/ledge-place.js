@@ -1,25 +1,27 @@
 // The place above the rail where the Mark key comes: kept free from the first picture on, so that nothing moves under a finger.
 
 import { listen, need, setAttribute, show } from '../core/dom.js';
-import { scale } from '../core/scale.js';
 
 /** Tabs that show the car. */
 const LIVE = ['home', 'map', 'scan'];
-/** A lower phone has not room for everything [px]. */
-const LOW_PX = 700;
-/** On a lower one the list of alarms, or a check, needs the room; an open sheet does on any phone [px]. */
-const LIST_PX = 800;
-/** On a phone on its side, or over its keyboard, a notice needs it [px]. */
-const LEAST_PX = 520;
+/** A lower phone has not room for everything. */
+const LOW = 'height < 43.75em';
+/** On a lower one the list of alarms, or a check, needs the room; an open sheet does on any phone. */
+const SHORT = 'height < 50em';
+/** On a phone on its side, or over its keyboard, a notice needs it. */
+const LEAST = 'height < 32.5em';
+const NARROW = 'width < 43.75em';
+
+/** Asked in this way it costs no layout of the page, which innerWidth and innerHeight do. @param {string} size */
+const is = (size) => matchMedia(`(${size})`).matches;
 
 /** On a low phone the steps of a slow-down and a warning leave no room: they come first; on its side a warning alone does. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */
 function isCramped(monitor, store) {
-  const [width, height] = [innerWidth / scale(), innerHeight / scale()];
-  const isNarrow = width < LOW_PX;
-  if (isNarrow && (monitor.dataset['sheet'] !== undefined || (height < LIST_PX && monitor.dataset['over'] === 'headed'))) return true;
+  if ((monitor.dataset['sheet'] !== undefined || (monitor.dataset['over'] === 'headed' && is(SHORT))) && is(NARROW)) return true;
+  if (!document.body.hasAttribute('data-snack')) return false;
   const state = store.frame?.decelerate?.state;
   const isSlowing = state === 'ordered' || state === 'holding';
-  return document.body.hasAttribute('data-snack') && (isSlowing ? height < (isNarrow ? LOW_PX : LEAST_PX) : isNarrow && height < LEAST_PX);
+  return is(NARROW) ? is(isSlowing ? LOW : LEAST) : isSlowing && is(LEAST);
 }
 
 /** What is marked is the live drive: in a replay there is no such place. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */

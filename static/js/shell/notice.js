@@ -15,9 +15,8 @@ function makeRoom(root) {
   const { style } = document.documentElement;
   const place = () => {
     const tops = [...document.querySelectorAll('#monitor > :is(.ledge, .rail, .scrub)')].map((one) => one.getBoundingClientRect()).filter(({ height }) => height).map(({ top }) => top);
-    style.setProperty('--dock', `${Math.ceil(innerHeight - Math.min(innerHeight, ...tops))}px`);
-    style.setProperty('--snack', `${root.offsetHeight}px`);
-    style.setProperty('--view', `${view.offsetHeight}px`);
+    const sizes = { dock: Math.ceil(innerHeight - Math.min(innerHeight, ...tops)), snack: root.offsetHeight, view: view.offsetHeight };
+    for (const [name, size] of Object.entries(sizes)) style.setProperty(`--${name}`, `${size}px`); // read before: what is written in between would cost a style of the whole page each
   };
   const seen = new ResizeObserver(place);
   for (const one of [root, view, ...document.querySelectorAll('#monitor > :is(.ledge, .rail)')]) seen.observe(one);

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import gzip
 from pathlib import Path
+from unittest.mock import patch
 
 from server.app.config import Config
-from server.web.assets.static_files import _read
+from server.web.assets.static_files import _read, packed
 from tests.http import http_client
 from tests.server.conftest import serving
 
@@ -56,3 +57,10 @@ def test_a_changed_file_goes_out_changed(tmp_path: Path) -> None:
     second = _read(path, path.stat().st_mtime_ns + 1)
     assert second.plain != first.plain
     assert second.etag != first.etag
+
+
+def test_a_page_that_is_rendered_as_before_is_not_compressed_again() -> None:
+    body = b"<!doctype html><title>rendered for each request</title>"
+    first = packed(bytes(body))
+    with patch("gzip.compress", side_effect=AssertionError("compressed again")):
+        assert packed(bytes(bytearray(body))) == first
