@@ -74,7 +74,7 @@ class Item:
 
     @property
     def is_recurring(self) -> bool:
-        """It is not due at each departure: the logbook says when it is overdue."""
+        """It is not due at each departure: the logbook shows when it is overdue."""
         return self.every_days is not None or self.every_km is not None
 
     @property
@@ -82,7 +82,7 @@ class Item:
         return KINDS[self.kind].group
 
     def fingerprint(self) -> str:
-        """SHA-256 of what it asks, in hex: a result counts for that, and for no other item of the same id."""
+        """SHA-256 of what it requires, in hex: a result counts for that, and for no other item of the same id."""
         return hashlib.sha256(orjson.dumps([self.id, self.title, self.kind, self.of, self.need])).hexdigest()
 
     def as_row(self) -> dict[str, Any]:

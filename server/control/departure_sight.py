@@ -47,7 +47,7 @@ class Peak:
 
 
 def judge(item: Item, seen: Seen) -> tuple[DepartureResult, str]:
-    """What an automatic item finds now: done or failed; open: it cannot be judged. And the value, in words."""
+    """What an automatic item finds now: done or failed; open: it cannot be judged. And the value as text."""
     need = item.need or 0.0
     match item.kind:
         case "recorder":
@@ -55,8 +55,8 @@ def judge(item: Item, seen: Seen) -> tuple[DepartureResult, str]:
                 return "done", "records"
             return "failed", seen.recorder or "not recording"
         case "sound":
-            words = "on no phone" if not seen.phones else f"on {seen.phones} phone{'s' if seen.phones > 1 else ''}"
-            return ("done" if seen.phones >= need else "failed"), words
+            text = "on no phone" if not seen.phones else f"on {seen.phones} phone{'s' if seen.phones > 1 else ''}"
+            return ("done" if seen.phones >= need else "failed"), text
         case "disk":
             if seen.room_gb is None:
                 return "open", "known once it records"
@@ -73,7 +73,7 @@ def judge(item: Item, seen: Seen) -> tuple[DepartureResult, str]:
             return ("done" if rate >= need else "failed"), f"{rate:.1f} Hz"
         case "clock":
             if seen.ahead_s is None:
-                return "open", "the car does not tell its time"
+                return "open", "the car does not send its time"
             return ("done" if abs(seen.ahead_s) <= need else "failed"), f"differs {abs(seen.ahead_s):.2f} s"
     return "open", ""
 

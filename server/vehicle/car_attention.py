@@ -42,7 +42,7 @@ class CarAttention:
     def hear(self, caller: Caller, now_s: float) -> None:
         """A page of this car, or one that announces its alarms, is there."""
         if caller.page is not None:
-            self._attention.hear(_operator(caller), now_s)
+            self._attention.mark_present(_operator(caller), now_s)
 
     def obey(self, command: handover_commands.ItemCommand, caller: Caller, now_s: float) -> None:
         """Raises Refused."""

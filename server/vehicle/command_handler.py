@@ -133,9 +133,9 @@ class CommandHandler:
                 parts.publisher.put()
                 return {"ok": True}
             case "announces":  # of a page that shows another car; no page can send it itself
-                word, caller = commands.PresentWord.model_validate({**message, "kind": "present"}), Caller.of(message)
-                parts.authorization.hear_elsewhere(word, caller, self._now())
-                if not word.leaves:
+                status, caller = commands.PresentWord.model_validate({**message, "kind": "present"}), Caller.of(message)
+                parts.authorization.update_status_elsewhere(status, caller, self._now())
+                if not status.leaves:
                     parts.attention.hear(caller, self._now())
                 return {"ok": True}
             case "signals":
@@ -178,10 +178,10 @@ class CommandHandler:
         except Exception:
             log.exception("command not recorded: vehicle=%s", self._vehicle)
 
-    def _present(self, word: commands.PresentWord, caller: Caller) -> Answer:
-        if not word.leaves:
+    def _present(self, status: commands.PresentWord, caller: Caller) -> Answer:
+        if not status.leaves:
             self._parts.attention.hear(caller, self._now())
-        if self._parts.authorization.hear(word, caller, self._now()):
+        if self._parts.authorization.update_status(status, caller, self._now()):
             self._parts.publisher.put_soon()
         return {"ok": True}
 
@@ -216,7 +216,7 @@ class CommandHandler:
             case handover_commands.TakeAlarm():
                 parts.handover.take_alarm(command, caller, now_s)
             case commands.TakeControl():
-                parts.authorization.obey(command, caller, now_s)
+                parts.authorization.execute(command, caller, now_s)
                 self._actions.attention_changed()  # the queue shows who asks for control
             case handover_commands.OfHandover():
                 was = parts.handover.obey(command, caller, now_s, self._wall_ms())
@@ -235,7 +235,7 @@ class CommandHandler:
             case drive_commands.OfMark():
                 parts.marks.obey(command, by=by, source="http" if caller.page is None else "page")
             case drive_commands.OfSlowing():
-                parts.slow_down.obey(command, by=by)
+                parts.slow_down.execute(command, by=by)
                 self._actions.slow_down_ordered()
             case commands.Position():
                 self._receive_position(command, now_s, by=by)

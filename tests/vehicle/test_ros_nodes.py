@@ -20,7 +20,7 @@ from tests.vehicle.ros_nodes import Car
 
 pytestmark = [pytest.mark.slow, pytest.mark.world(n=2), pytest.mark.timeout(120), pytest.mark.field]
 FAST_MPS2 = 4.6  # so that the tests need not wait long for standstill
-DRIVING = {"controller": [3.0, 0.1], "speed": "obeys"}
+DRIVING = {"controller": [3.0, 0.1], "speed": "follows"}
 
 
 @pytest.fixture(scope="module", params=[1, 2], ids=["ros1", "ros2"])

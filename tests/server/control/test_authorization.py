@@ -1,4 +1,4 @@
-"""The gate of a vehicle's orders: pages, programs and this machine's own console, and what the log says of it."""
+"""The authorization of a vehicle's commands: pages, programs, this machine's console, and its log lines."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ class Vehicle:
 
     def see(self, *pages: Caller, now_s: float, **more: Any) -> None:
         for page in pages:
-            word = commands.read(READY | more)
-            assert isinstance(word, commands.PresentWord)
-            self.gate.hear(word, page, now_s)
+            status = commands.read(READY | more)
+            assert isinstance(status, commands.PresentWord)
+            self.gate.update_status(status, page, now_s)
 
     def do(self, page: Caller, what: str, now_s: float, **more: Any) -> int | None:
         command = commands.read({"kind": "control", "do": what} | more)
         assert isinstance(command, commands.TakeControl)
-        return self.gate.obey(command, page, now_s)
+        return self.gate.execute(command, page, now_s)
 
     def shown(self, now_s: float) -> dict[str, Any]:
         found: dict[str, Any] = self.gate.as_json(now_s, 1_700_000_000_000)["control"]

@@ -1,4 +1,4 @@
-"""The departure check: what turns by itself, what is seen, what a person says, and the signature; in virtual time."""
+"""The departure check: what turns by itself, what is seen, what a person enters, and the signature; in virtual time."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def item(kind: DepartureKind = "manual", of: str = "", need: float | None = None
         (item("disk"), replace(READY, room_gb=None), ("open", "known once it records")),
         (item("clock"), READY, ("done", "differs 0.02 s")),
         (item("clock"), replace(READY, ahead_s=-0.84), ("failed", "differs 0.84 s")),
-        (item("clock"), replace(READY, ahead_s=None), ("open", "the car does not tell its time")),
+        (item("clock"), replace(READY, ahead_s=None), ("open", "the car does not send its time")),
     ],
     ids=lambda value: value.kind if isinstance(value, Item) else value[1] if isinstance(value, tuple) else "",
 )  # fmt: skip
@@ -274,7 +274,7 @@ def test_results_do_not_pass_to_other_items_of_a_list_that_is_changed_while_it_i
     walk.check.reopen()
     walk.see(READY)
     assert walk.result(tyres)[0] == "open"
-    assert walk.result(brake)[0] == "done", "how it is fixed is not what it asks"
+    assert walk.result(brake)[0] == "done", "how it is fixed is not what it requires"
     walk.say(tyres, "done")
     assert walk.result(tyres)[0] == "done"
 

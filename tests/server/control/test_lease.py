@@ -175,9 +175,9 @@ def kept_alive(control: Control, until_s: float, holder: Operator = ANN) -> list
 
 def test_silence_grants_after_10_s_and_not_before() -> None:
     control = held()
-    asked = control.request(BEN, 0.0)
-    assert asked is not None
-    assert (asked.change, asked.text, asked.holder) == ("requested", "Ben requests control from Ann.", ANN)
+    requested = control.request(BEN, 0.0)
+    assert requested is not None
+    assert (requested.change, requested.text, requested.holder) == ("requested", "Ben requests control from Ann.", ANN)
     assert control.request(BEN, 1.0) is None  # once
     assert kept_alive(control, ANSWER_S - 0.1) == []
     (act,) = control.advance(ANSWER_S, everybody)
@@ -291,13 +291,13 @@ class AnyCourse(RuleBasedStateMachine):
     def time_passes(self, seconds: float) -> None:
         self.now_s += seconds
         before = self.control.holder
-        asked = [request.of for request in self.control.requests if self.is_here(request.of)]
+        requested = [request.of for request in self.control.requests if self.is_here(request.of)]
         acts = self.control.advance(self.now_s, self.is_here)
         assert not acts or acts[-1].holder == self.control.holder
         for act in acts:
             self.note(act)
             assert act.change in ("lapsed", "granted")
-            assert act.change != "granted" or act.holder == asked[0]
+            assert act.change != "granted" or act.holder == requested[0]
         if before is not None and self.control.holder == before:
             assert self.now_s - self.seen_s[before] <= LEASE_S
 
@@ -336,7 +336,7 @@ class AnyCourse(RuleBasedStateMachine):
         assert self.control.holder == one
 
     @rule(one=people)
-    def asks(self, one: Operator) -> None:
+    def requests(self, one: Operator) -> None:
         was = self.control.holder
         self.note(self.control.request(one, self.now_s))
         assert self.control.holder == (one if was is None else was)

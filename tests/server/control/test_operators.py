@@ -26,7 +26,7 @@ SEEN = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready", 
 
 
 async def be_seen(one: Viewer) -> None:
-    """As a page says it once a second."""
+    """As a page reports it once a second."""
     with contextlib.suppress(websockets.ConnectionClosed):
         while True:
             await one.send(SEEN)
@@ -113,7 +113,7 @@ async def test_what_a_page_says_of_who_it_is_counts_for_nothing(server: str) -> 
 async def test_nonsense_about_presence_is_answered(server: str) -> None:
     async with operator(server, "Ann", "page-ann") as ann:
         await ann.send(SEEN | {"sound": "deafening"})
-        await ann.until(lambda: any(said["kind"] == "problem" and "sound" in said["reason"] for said in ann.other))
+        await ann.until(lambda: any(one["kind"] == "problem" and "sound" in one["reason"] for one in ann.other))
         assert (await ann.state())["reach"]["can"] == 1
 
 
@@ -209,7 +209,7 @@ async def test_a_program_is_refused_while_a_page_is_in_control_and_told_by_whom(
                 assert taken["ok"], taken
                 refused = await outside.post("/api/pause", headers=program)
                 assert (refused.status_code, refused.json()["detail"]) == (409, "Pixel 7 is in control.")
-                assert refused.json()["held_by"] == "Pixel 7"  # as the list of devices has it, whatever the page says
+                assert refused.json()["held_by"] == "Pixel 7"  # as the list of devices has it, whatever the page claims
                 by_page = await browser.post("/api/pause", headers={"X-Catgraph-Fence": str(taken["fence"])})
                 assert by_page.status_code == 200
                 old = await browser.post("/api/resume", headers={"X-Catgraph-Fence": str(taken["fence"] - 1)})

@@ -24,7 +24,7 @@ def at_fault(*names: str) -> dict[str, Alarm]:
 
 
 class Car:
-    """A count-down with its log; `look` says which rule slows the car now."""
+    """A count-down with its log; `look` returns the rule that slows the car now."""
 
     def __init__(self) -> None:
         self.log: list[dict[str, Any]] = []

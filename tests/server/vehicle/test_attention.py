@@ -72,7 +72,7 @@ async def test_two_people_take_hand_over_and_release_and_the_log_says_who() -> N
     await car.obeyed(ANN, "offer_item", to="page-b", vehicle="ocelot")
     assert car.item["assigned"]["name"] == "Ann"
     assert car.item["offered"] == {"by": "Ann", "name": "Ben", "page": "page-b", "since_ms": WALL_MS + 1000}
-    assert await car.refused(ANN, "answer_item", accept=True) == "You are not asked to take over."
+    assert await car.refused(ANN, "answer_item", accept=True) == "You have no offer to take over."
     await car.obeyed(BEN, "answer_item", accept=True)
     assert (car.item["assigned"]["name"], car.item["offered"]) == ("Ben", None)
     assert await car.refused(ANN, "release_item") == "This car is assigned to Ben."
