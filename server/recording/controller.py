@@ -186,7 +186,7 @@ class SessionRecording:
         """Something of ours, on one of our channels."""
         self._parts.own(channel, said)
 
-    def asked(self, message: Mapping[str, Any], *, by: str, reason: str | None = None) -> None:
+    def note_command(self, message: Mapping[str, Any], *, by: str, reason: str | None = None) -> None:
         """Record a page's command and the reason of a refusal. Phone positions have their own channel."""
         said = {name: value for name, value in message.items() if name not in ("id", "by")}
         if isinstance(said.get("address"), str):

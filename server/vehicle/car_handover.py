@@ -23,9 +23,9 @@ from server.vehicle.handover_lines import (
     alarm_lines,
     departure_line,
     driving_line,
+    in_car_line,
     limit_lines,
     mode_lines,
-    rides_line,
     stop_lines,
 )
 from server.vehicle.judgement import Judgement
@@ -67,7 +67,7 @@ class CarHandover:
             self._log_step("ended", ended, None)
         return ended is not None
 
-    def obey(
+    def execute(
         self, command: handover_commands.HandoverCommand, caller: Caller, now_s: float, wall_ms: int
     ) -> Operator | None:
         """Who was in control until now, where control changed by it; None: it did not. Raises Refused."""
@@ -75,7 +75,7 @@ class CarHandover:
         self.tick(now_s)
         by, handover = caller.operator, self._handover
         if by is None:
-            raise Refused("Only a page hands control over: a program cannot show that somebody is watching.")
+            raise Refused("Only a page can hand control over: a program cannot show that somebody is watching.")
         match command:
             case handover_commands.OfferControl():
                 to = self._authorization.find(command.to, now_s)
@@ -143,7 +143,7 @@ class CarHandover:
         return [
             *alarm_lines(standing),
             *limit_lines(self._settings.as_json()),
-            rides_line(
+            in_car_line(
                 self._authorization.people(now_s), compared["label"] if compared is not None and is_riding else None
             ),
             driving_line(self._driving.frame(now_s, wall_ms)),

@@ -136,7 +136,7 @@ class CommandHandler:
                 status, caller = commands.PresentWord.model_validate({**message, "kind": "present"}), Caller.of(message)
                 parts.authorization.update_status_elsewhere(status, caller, self._now())
                 if not status.leaves:
-                    parts.attention.hear(caller, self._now())
+                    parts.attention.mark_present(caller, self._now())
                 return {"ok": True}
             case "signals":
                 topics = parts.connection.subscriptions
@@ -174,13 +174,13 @@ class CommandHandler:
     def _record(self, message: Mapping[str, Any], *, by: str, reason: str | None = None) -> None:
         """Record a command that was executed or refused; the reply does not depend on it."""
         try:
-            self._parts.recording.asked(message, by=by, reason=reason)
+            self._parts.recording.note_command(message, by=by, reason=reason)
         except Exception:
             log.exception("command not recorded: vehicle=%s", self._vehicle)
 
     def _present(self, status: commands.PresentWord, caller: Caller) -> Answer:
         if not status.leaves:
-            self._parts.attention.hear(caller, self._now())
+            self._parts.attention.mark_present(caller, self._now())
         if self._parts.authorization.update_status(status, caller, self._now()):
             self._parts.publisher.put_soon()
         return {"ok": True}
@@ -217,15 +217,15 @@ class CommandHandler:
                 parts.handover.take_alarm(command, caller, now_s)
             case commands.TakeControl():
                 parts.authorization.execute(command, caller, now_s)
-                self._actions.attention_changed()  # the queue shows who asks for control
+                self._actions.attention_changed()  # the queue shows who requests control
             case handover_commands.OfHandover():
-                was = parts.handover.obey(command, caller, now_s, self._wall_ms())
+                was = parts.handover.execute(command, caller, now_s, self._wall_ms())
                 parts.publisher.put()
                 return was
             case drive_commands.OfDeparture():
-                await parts.departure.obey(command, caller, self._wall_ms(), self._storage)
+                await parts.departure.execute(command, caller, self._wall_ms(), self._storage)
             case handover_commands.OfItem():
-                parts.attention.obey(command, caller, now_s)
+                parts.attention.execute(command, caller, now_s)
                 self._actions.attention_changed()
                 return None  # the state has nothing of it
             case commands.Ride():
@@ -265,7 +265,7 @@ class CommandHandler:
 
     def _plan_stop(self, command: drive_commands.PlannedStopCommand, now_s: float, *, by: str) -> None:
         speed_mps, phase = departure_seen.speed_of(self._parts, now_s), self._parts.connection.phase
-        self._parts.planned_stop.obey(command, now_s, by=by, phase=phase, speed_mps=speed_mps)
+        self._parts.planned_stop.execute(command, now_s, by=by, phase=phase, speed_mps=speed_mps)
         self._actions.attention_changed()  # the summary of the car shows it
 
     def _receive_position(self, command: commands.Position, now_s: float, *, by: str) -> None:

@@ -118,7 +118,7 @@ class Doubtful:
 
     def came_new(self, topic: str, one: Held, is_same: Callable[[Any, Any], bool]) -> tuple[Held, ...]:
         """What is held of a topic and to be recorded, once: something new came of it. Another content, long after the
-        answers, says nothing of those."""
+        answers, is no evidence about those."""
         doubt, held = self._doubts.get(topic), self.settled(topic)
         if doubt is None or not doubt.is_kept:
             return held

@@ -69,7 +69,7 @@ class CarPlannedStop:
         """None: there is none."""
         return self._stop
 
-    def obey(
+    def execute(
         self,
         command: drive_commands.PlannedStopCommand,
         now_s: float,

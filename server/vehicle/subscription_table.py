@@ -83,18 +83,18 @@ class SubscriptionTable:
         carrying = {topic: sources for topic, sources in by_topic.items() if any(one.carries for one in sources)}
         beside = {**{topic: (one,) for topic, one in watched.items()}, **by_topic}
         wanted = wanted_topics.judged(
-            carrying, self.load, without=too_large, asked=known.asked, fit=known.fit, compression=compression
+            carrying, self.load, without=too_large, requested=known.requested, fit=known.fit, compression=compression
         )
         wanted |= wanted_topics.compared(
             beside, self.load, undecided=watched, without={*carrying, *too_large}, is_recorded=self.also != "none",
-            asked=known.asked, fit=known.fit, compression=compression,
+            requested=known.requested, fit=known.fit, compression=compression,
         )  # fmt: skip
         self.judged = len(wanted)
         if offered is not None:
             has_button = car_marks.is_button(car_marks.TOPIC, offered.get(car_marks.TOPIC))
             without = {*wanted, *too_large, *([car_marks.TOPIC] if has_button else ())}
             self.recorded = wanted_topics.recorded(
-                offered, self.load, without=without, held=self.probation.held, also=self.also, asked=known.asked
+                offered, self.load, without=without, held=self.probation.held, also=self.also, requested=known.requested
             )
             wanted |= wanted_topics.rows_of(self.recorded, fit=known.fit, compression=compression)
             if has_button:
@@ -205,7 +205,7 @@ class SubscriptionTable:
 
     def given(self, topic: str) -> None:
         """A sample from before came again on a topic."""
-        self.probation.heard(topic)
+        self.probation.received(topic)
         self._delivery.given(topic)
 
     def renew_quiet(self) -> None:

@@ -155,7 +155,7 @@ class Tick:
             late_s = transport.late_s(now_s)
             why = f"The link is slow, {late_s:.1f} s late" if late_s > RESTORE_BELOW_S else "The link is fast enough"
             self._parts.event_log.note(
-                "reduced", f"{why}. {topics.table.load.level.words}.", step=topics.table.load.step
+                "reduced", f"{why}. {topics.table.load.level.text}.", step=topics.table.load.step
             )
 
     def watch_recording(self, now_s: float) -> None:

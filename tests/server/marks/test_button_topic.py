@@ -63,7 +63,7 @@ def test_a_quiet_row_that_is_renewed_is_no_first_subscription() -> None:
         topics.now_s += 8 * BY_NAME_AGAIN_S
         topics.table.renew_by_name()
         assert topics.table.button == Asked(topics.now_s, is_renewal=True), "a publisher that came late is found"
-    topics.delivery.heard(TOPIC, topics.now_s)
+    topics.delivery.received(TOPIC, topics.now_s)
     found = topics.table.button
     topics.now_s += 100.0
     topics.table.renew_by_name()

@@ -75,7 +75,7 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         assert state["link"]["topics_subscribed"] == 2, "what is heard for the recorder alone counts for nobody else"
         received = state["session"]["received"]
         recorded_only = [bridge.graph.find(topic) for topic in ("/custom", "/rosout_like")]
-        async with asyncio.timeout(10):  # definitions are asked for first
+        async with asyncio.timeout(10):  # definitions are requested first
             while not all(topic is not None and topic.subscribers for topic in recorded_only):
                 await asyncio.sleep(0.02)
         for n in range(5):
@@ -324,8 +324,8 @@ def test_which_topics_are_recorded_besides(also: Any, expected: dict[str, str], 
         "/untyped": "",
         "/catgraph/alarms": "std_msgs/msg/String",
     }
-    asked = {"geometry_msgs/msg/Twist", "x/A", "sensor_msgs/msg/PointCloud2", "std_msgs/msg/String"}
-    assert choose(offered, without={"/vel"}, also=also, asked=asked) == (expected, left_out)
+    requested = {"geometry_msgs/msg/Twist", "x/A", "sensor_msgs/msg/PointCloud2", "std_msgs/msg/String"}
+    assert choose(offered, without={"/vel"}, also=also, requested=requested) == (expected, left_out)
 
 
 @pytest.mark.world(n=4)

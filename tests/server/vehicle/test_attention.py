@@ -62,7 +62,7 @@ async def test_it_stays_while_an_alarm_is_active_or_unacknowledged() -> None:
 async def test_two_people_take_hand_over_and_release_and_the_log_says_who() -> None:
     car = needing()
     for page in (ANN, BEN):
-        car.say(page)
+        car.report(page)
     await car.obeyed(ANN, "take_item")
     assert car.item is not None
     assert car.item["assigned"] == {"name": "Ann", "page": "page-a", "since_ms": WALL_MS + 1000}
@@ -115,11 +115,11 @@ async def test_nobody_takes_it_and_it_is_escalated_once() -> None:
 async def test_a_page_that_falls_silent_loses_it_after_10_s() -> None:
     car = needing()
     await car.obeyed(ANN, "take_item")
-    car.tick(100.0, heard=(ANN,))
+    car.tick(100.0, reporting=(ANN,))
     assert [event["act"] for event in car.log] == ["taken"]
-    car.tick(9.0, heard=(BEN,))
+    car.tick(9.0, reporting=(BEN,))
     assert [event["act"] for event in car.log] == ["taken"]
-    car.tick(2.0, heard=(BEN,))
+    car.tick(2.0, reporting=(BEN,))
     assert [(event["act"], event["by"], event["holder"], event["before"]) for event in car.log[1:]] == [
         ("unassigned", None, None, "Ann")
     ]
@@ -223,7 +223,7 @@ async def test_a_summary_stays_within_its_bound_whoever_is_there() -> None:
     widest = "\N{GRINNING FACE}" * 40
     pages = [{"by": widest, "who": f"phone {number}", "page": f"{number:040d}"} for number in range(60)]
     for page in pages:
-        car.say(page)
+        car.report(page)
     assert (await car.ask(pages[0], "present", visible=True, sound="ready", awake="ready"))["ok"]
     await car.obeyed(pages[0], "control", do="take")
     await car.obeyed(pages[0], "take_item")

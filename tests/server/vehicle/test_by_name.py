@@ -1,4 +1,4 @@
-"""A bridge without rosapi: each signal has one topic, chosen from those of which messages come, or is asked for."""
+"""A bridge without rosapi: each signal has one topic, chosen from those with messages, or by the operator."""
 
 from __future__ import annotations
 

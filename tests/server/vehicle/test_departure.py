@@ -59,7 +59,7 @@ async def signed() -> Attended:
     log._wall_ms = lambda wall_ms=log._wall_ms: wall_ms() + 7  # what happened is logged a moment later
     car.tick(2.5)  # nobody would hear an alarm
     await car.obeyed(ANN, "present", visible=True, sound="ready", awake="ready")
-    car.tick(1.5, heard=(ANN,))
+    car.tick(1.5, reporting=(ANN,))
     press_brake(car, 31.0)
     await car.obeyed(ANN | AK, "set_departure_item", item="doors", result="done")
     await car.obeyed(ANN, "set_departure_item", item="tyres", result="failed", note="worn")
@@ -224,18 +224,20 @@ async def test_a_file_that_cannot_be_used_is_set_aside_before_the_list_is_kept(
 
 
 async def test_a_list_that_takes_long_to_keep_comes_into_force_though_nobody_waits(tmp_path: Path) -> None:
-    path, storage, disk, said = tmp_path / "car.departure.toml", StorageThread(), threading.Event(), list[str]()
-    car = CarDeparture(ActiveSettings(SettingsFile(None)), DepartureFile(path), lambda _, text, **__: said.append(text))
+    path, storage, disk, texts = tmp_path / "car.departure.toml", StorageThread(), threading.Event(), list[str]()
+    car = CarDeparture(
+        ActiveSettings(SettingsFile(None)), DepartureFile(path), lambda _, text, **__: texts.append(text)
+    )
     storage.submit(lambda: disk.wait(10) and None)
     commands = [SetDepartureList(kind="set_departure_list", items=LIST[:number]) for number in (2, 3)]
-    first, second = [asyncio.create_task(car.obey(one, Caller(name="Ann"), 0, storage)) for one in commands]
+    first, second = [asyncio.create_task(car.execute(one, Caller(name="Ann"), 0, storage)) for one in commands]
     await asyncio.sleep(0)
     first.cancel()
     disk.set()
     await asyncio.wait_for(second, 10)
     storage.close()
     assert first.cancelled()
-    assert said == [f"The list of the departure check has {number} items now." for number in (2, 3)]
+    assert texts == [f"The list of the departure check has {number} items now." for number in (2, 3)]
     kept = DepartureFile(path).items
     assert kept is not None
     assert [one.id for one in kept] == [row["id"] for row in car.answer()["items"]] == ["doors", "tyres", "sound"]

@@ -1,4 +1,4 @@
-"""The log's file is held, damaged or gone: judging goes on, events reach the pages, and the operator is told."""
+"""The log's file is held, damaged or gone: judging goes on, events reach the pages, and the operator is informed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The phone from its page to the judge: what a page may say, on whose clock it counts, and whole rides with a phone."""
+"""The phone from its page to the judge: what a page may send, which clock counts, and whole drives with a phone."""
 
 from __future__ import annotations
 
@@ -85,19 +85,19 @@ def test_anything_else_is_refused_with_a_sentence(command: dict[str, Any], sente
 # -- on whose clock it counts ------------------------------------------------------------------------------------------
 
 
-def heard(wall_ms: float, **more: Any) -> PhoneReport:
+def report_of(wall_ms: float, **more: Any) -> PhoneReport:
     command = commands.read(with_fix(**more))
     assert isinstance(command, commands.Position)
     return phone_report(command, now_s=1000.0, wall_ms=wall_ms)
 
 
 @pytest.mark.parametrize("at_ms", [0, 1_700_000_000_000, 1_790_000_000_000, 9_000_000_000_000])
-def test_the_phone_s_own_clock_has_no_say(at_ms: float) -> None:
-    word = heard(WALL_MS + 150, at_ms=at_ms, age_s=0.3, held_s=0.05)
-    assert word.measured_s == pytest.approx(1000.0 - 0.3 - 0.05)  # half of the 0.1 s there and back
-    assert word.uncertain_s == pytest.approx(0.05)
-    assert word.fix is not None
-    assert word.fix.at_ms == at_ms
+def test_the_phone_s_own_clock_does_not_count(at_ms: float) -> None:
+    report = report_of(WALL_MS + 150, at_ms=at_ms, age_s=0.3, held_s=0.05)
+    assert report.measured_s == pytest.approx(1000.0 - 0.3 - 0.05)  # half of the 0.1 s there and back
+    assert report.uncertain_s == pytest.approx(0.05)
+    assert report.fix is not None
+    assert report.fix.at_ms == at_ms
 
 
 @pytest.mark.parametrize(
@@ -111,9 +111,9 @@ def test_the_phone_s_own_clock_has_no_say(at_ms: float) -> None:
     ],
 )
 def test_how_long_the_way_may_have_taken(wall_ms: float, held_s: float, uncertain_s: float) -> None:
-    word = heard(wall_ms, held_s=held_s)
-    assert word.uncertain_s == pytest.approx(uncertain_s)
-    assert math.isfinite(word.measured_s)
+    report = report_of(wall_ms, held_s=held_s)
+    assert report.uncertain_s == pytest.approx(uncertain_s)
+    assert math.isfinite(report.measured_s)
 
 
 def test_a_reason_needs_no_clock() -> None:
@@ -210,7 +210,7 @@ async def test_what_does_not_fit_or_is_not_wanted_is_refused(bridge: RosBridge) 
         assert (await one.state())["phone"] is None
 
 
-# -- whole rides, in virtual time --------------------------------------------------------------------------------------
+# -- whole drives, in virtual time -------------------------------------------------------------------------------------
 
 
 def raised(found: Ride) -> list[tuple[str, float]]:

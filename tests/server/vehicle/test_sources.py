@@ -1,4 +1,4 @@
-"""Topics that compete for a signal on a live car: compared, asked for, answered, and not swapped unasked."""
+"""Topics that compete for a signal on a live car: compared, put as a question, and not swapped without an answer."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ async def test_two_cars_on_one_bridge_are_not_mixed() -> None:
 
     async with car(topics, publish) as (_, base), viewer(base) as one:
         state = await one.state(lambda s: bool(s["questions"]))
-        assert [asked["words"] for asked in state["questions"]] == ["Two cars: /agv1 and /agv2: which is this?"]
+        assert [question["words"] for question in state["questions"]] == ["Two cars: /agv1 and /agv2: which is this?"]
         assert {signal["topic"] for signal in state["signals"].values()} == {None}
         await one.ask(kind="set", topics={"speed": "/agv1/odom"})
         state = await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")

@@ -36,7 +36,7 @@ async def test_a_server_that_stood_still_says_so_and_does_not_accuse_the_car(tmp
                     await asyncio.sleep(0.1)
             await asyncio.sleep(1.5)
             after = (await log())[before:]
-        said = [event["text"] for event in after if event["change"] == "stalled"]
-        assert len(said) == 1, after
-        assert re.fullmatch(r"The server stalled for [23]\.\d s: nothing was evaluated meanwhile\.", said[0])
+        texts = [event["text"] for event in after if event["change"] == "stalled"]
+        assert len(texts) == 1, after
+        assert re.fullmatch(r"The server stalled for [23]\.\d s: nothing was evaluated meanwhile\.", texts[0])
         assert [event["title"] for event in after if event["alarm"]] == []

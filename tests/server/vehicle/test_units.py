@@ -1,4 +1,4 @@
-"""The unit of a signal, live: it is asked for, and the answer holds at once and for this car alone."""
+"""The unit of a signal, live: a question requests it, and the answer applies at once and to this car alone."""
 
 from __future__ import annotations
 

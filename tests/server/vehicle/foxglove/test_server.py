@@ -39,7 +39,7 @@ class Answers:
     """The marks of a link."""
 
     def __init__(self) -> None:
-        self.asked: list[str] = []
+        self.requested: list[str] = []
         self.answered_s: list[tuple[float, float]] = []
 
     def open(self, at_s: float) -> None: ...
@@ -50,7 +50,7 @@ class Answers:
         self.answered_s.append((sent_s, at_s))
 
     def subscribe(self, topic: str, queue_length: int, throttle_s: float = 0.0) -> None:
-        self.asked.append(topic)
+        self.requested.append(topic)
 
 
 @asynccontextmanager
@@ -230,7 +230,7 @@ async def test_pings_are_answered_behind_the_messages() -> None:
         car.offer("/odom", ODOMETRY, "cdr")
         async with linked(car.address, ear, "/odom", marks=marks) as source:
             await subscribed(source, "/odom")
-            assert marks.asked == ["/odom"]
+            assert marks.requested == ["/odom"]
             await until(lambda: marks.answered_s)
             before = len(marks.answered_s)
             while len(marks.answered_s) < before + 3:
