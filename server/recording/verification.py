@@ -36,7 +36,7 @@ class Verification:
 
     @property
     def short(self) -> str:
-        """A few words; never *Intact* where a recording beside it objects."""
+        """A short text; never *Intact* where a recording beside it objects."""
         if self.file.state == "intact" and self.beside.problems:
             return "Does not match the recording beside it"
         return self.file.short

@@ -83,7 +83,7 @@ class FolderListing:
             self._shape = shape
 
     def look(self, path: Path, known: Entry | None) -> Entry | None:
-        """What can be said of a file without reading it, and what is known of it if it is still the same."""
+        """What is known of a file without reading it, and what was read of it if it is still the same."""
         try:
             stats = [file.stat() for file in files_of(path)]
         except OSError:

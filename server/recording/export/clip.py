@@ -147,21 +147,21 @@ def _copy(recording: Recording, file: PartFile, window: Window, before: _Before,
 
     first_ns, last_ns = span_ns(recording)
     begin_ns, end_ns = max(window.from_ns, first_ns), min(window.to_ns, last_ns)
-    said = {row["intervention"]: row for row in described_late(recording)}
-    held: set[str] = set()  # interventions of the minute of which something was said later
+    described = {row["intervention"]: row for row in described_late(recording)}
+    held: set[str] = set()  # interventions of the minute that were described later
     _add_marks(recording, file, window)
     for raw in before.latest.values():
-        add(raw, begin_ns)  # what held then; when it was said stands in the message where it has a stamp
+        add(raw, begin_ns)  # what was in force then; the message has its own time where it has a stamp
     for raw in _within(recording, window, progress):
         if raw.channel.topic == _MARKS:
             continue
-        if raw.channel.topic == _ALARMS and said:
-            held.update(name for name in said if name.encode() in raw.data)
+        if raw.channel.topic == _ALARMS and described:
+            held.update(name for name in described if name.encode() in raw.data)
         add(raw, raw.time_ns)
         outcome.entries += 1
         if outcome.entries % _HELD == 0:
             file.flush()
-    for row in (said[name] for name in said if name in held):
+    for row in (described[name] for name in described if name in held):
         file.add(file.channel(_ALARMS, own_schema("alarms")), end_ns, orjson.dumps(described_event(row)))
     if not outcome.entries:
         raise NothingRecorded(f"Nothing was recorded from {_clock(window.from_ns)} to {_clock(window.to_ns)} UTC.")

@@ -45,7 +45,7 @@ class PartFile:
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._sequence: dict[int, int] = {}
         self._newest_ns = 0
-        self.failed: OSError | None = None  # what the disk said of keeping it; the next flush raises it
+        self.failed: OSError | None = None  # the error of the disk; the next flush raises it
         self._closing = threading.Lock()
         self._is_named = False  # the disk knows that the file is there
         make_folder(path.parent)
@@ -110,7 +110,7 @@ class PartFile:
         self._writer.add_metadata(METADATA, self._metadata)  # between two chunks: the current one is not written yet
 
     def flush(self) -> None:
-        """Hands all that was added to the system: a kill does not lose it any more."""
+        """Pass all that was added to the system: a kill does not lose it any more."""
         if self.failed is not None:
             raise self.failed
         self._writer.flush()

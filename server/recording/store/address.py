@@ -74,7 +74,7 @@ def store_address(
     endpoint = endpoint or environment.get("AWS_ENDPOINT_URL_S3") or environment.get("AWS_ENDPOINT_URL") or None
     region = region or environment.get("AWS_REGION") or environment.get("AWS_DEFAULT_REGION") or USUAL_REGION
     if not _REGION.fullmatch(region):
-        raise BadStore("The region of the store is a word such as eu-central-1.")
+        raise BadStore("The region of the store is a name such as eu-central-1.")
     return StoreAddress(
         bucket=bucket,
         prefix=prefix,

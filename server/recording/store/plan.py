@@ -60,7 +60,7 @@ class Plan:
         *,
         wall_ms: Callable[[], int],
     ) -> None:
-        """`why_not` says why the whole file is not sent now; None: it is."""
+        """`why_not` returns why the whole file is not sent now; None: it is."""
         self._catalog = catalog
         self._uploads = uploads
         self._situation = situation

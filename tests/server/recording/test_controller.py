@@ -46,8 +46,8 @@ def files(data: Path) -> list[str]:
     return sorted(path.name for path in (data / "recordings").rglob("*.mcap*") if path.suffix != ".json")
 
 
-def said_so_far(path: Path) -> Mapping[str, str]:
-    """What the file says of itself that is being written."""
+def metadata_so_far(path: Path) -> Mapping[str, str]:
+    """The metadata of the file that is being written."""
     with path.open("rb") as file:
         walk = Walk(file, path.stat().st_size)
         for _ in walk.chunks():
@@ -72,7 +72,7 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         assert state["recording"]["left_out"] == ["/camera"]
         assert state["recording"]["left_out_count"] == 1
         assert state["recording"]["reason"] is None
-        assert state["link"]["topics_subscribed"] == 2, "what is heard for the recorder alone counts for nobody else"
+        assert state["link"]["topics_subscribed"] == 2, "what is received for the recorder alone counts for nobody else"
         received = state["session"]["received"]
         recorded_only = [bridge.graph.find(topic) for topic in ("/custom", "/rosout_like")]
         async with asyncio.timeout(10):  # definitions are requested first
@@ -87,7 +87,7 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         name = state["recording"]["name"]
         (writing,) = (tmp_path / "recordings").rglob("*.writing")
         async with asyncio.timeout(SOON_S):  # a kill leaves what is in the file by now
-            while said_so_far(writing).get("left_out") != "/camera":
+            while metadata_so_far(writing).get("left_out") != "/camera":
                 await asyncio.sleep(0.1)
         assert (await one.ask(kind="set", values={"speed_limit.max_mps": 12.0}))["ok"]
         assert (await one.ask(kind="pause"))["ok"]
@@ -120,10 +120,10 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         assert metadata["address"] == bridge.address  # type: ignore[attr-defined]
         assert (metadata["part"], metadata["ended"], metadata["why"]) == ("1", "closed", "Monitoring was stopped.")
         assert (metadata["left_out"], metadata["left_out_count"]) == ("/camera", "1")
-        changes = [said["change"] for _, said in recording.own("/catgraph/alarms")]
+        changes = [entry["change"] for _, entry in recording.own("/catgraph/alarms")]
         assert [c for c in changes if c in ("started", "connected", "paused")] == ["started", "connected", "paused"]
         assert "settings" in changes[changes.index("connected") : changes.index("paused")]
-        assert all(said["n"] > 0 for _, said in recording.own("/catgraph/alarms"))
+        assert all(entry["n"] > 0 for _, entry in recording.own("/catgraph/alarms"))
         operator = [(s["kind"], s["by"], s["ok"]) for _, s in recording.own("/catgraph/operator")]
         assert operator == [("set", "Ann", True), ("pause", "Ann", True), ("record", "Ann", False)]
         assert [(s["by"], s["why"]) for _, s in recording.own("/catgraph/phone")] == [("Ann", "denied")]
@@ -175,15 +175,15 @@ async def test_a_second_part_tells_which_alarms_stand_when_it_begins(bridge: Ros
     with open_recording([tmp_path / "recordings" / "car" / first]) as recording:
         assert read_standing(recording.metadata) == []
         (raised,) = (
-            said
-            for _, said in recording.own("/catgraph/alarms")
-            if (said["alarm"], said["change"]) == ("speed_limit", "raised")
+            entry
+            for _, entry in recording.own("/catgraph/alarms")
+            if (entry["alarm"], entry["change"]) == ("speed_limit", "raised")
         )
     with open_recording([tmp_path / "recordings" / "car" / second]) as recording:
         stood = {event["alarm"]: event for event in read_standing(recording.metadata)}
         assert stood["speed_limit"]["occurrence"] == raised["occurrence"]
-        numbers = {said["n"] for _, said in recording.own("/catgraph/alarms")}
-        assert not numbers & {event["n"] for event in stood.values()}, "none is told twice"
+        numbers = {entry["n"] for _, entry in recording.own("/catgraph/alarms")}
+        assert not numbers & {event["n"] for event in stood.values()}, "none is recorded twice"
         recorded = read_recorded_log(recording)
         assert recorded is not None
         assert [e.raised_s for e in recorded.episodes if e.alarm_id == "speed_limit"] == [0.0]

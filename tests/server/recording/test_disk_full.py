@@ -1,4 +1,4 @@
-"""A small disk that fills up, and one that can only be read: said clearly, and nothing that was kept is lost.
+"""A small disk that fills up, and one that can only be read: reported clearly, and nothing that was kept is lost.
 
 The disks are real: mounted for the test, which needs a user who may.
 """
@@ -125,7 +125,7 @@ async def test_a_disk_that_can_only_be_read_is_said_and_monitoring_goes_on(disk:
             assert refused["reason"] == "Recording cannot begin: the folder for recordings is read-only."
             state = await one.state(lambda s: any(a["id"] == "recording_stopped" for a in s["alarms"]))
             assert state["session"]["phase"] == "monitoring"
-            # A busy machine may be late with one state; a car that is no longer heard is never fresh again.
+            # A busy machine may be late with one state; a car that is no longer received is never fresh again.
             state = await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
             count = state["signals"]["speed"]["count"]
             await one.state(lambda s: s["signals"]["speed"]["count"] > count + 10)

@@ -30,7 +30,7 @@ def names(folder: Path) -> list[str]:
 
 def alarms(path: Path) -> list[int]:
     with open_recording([path]) as recording:
-        return [said["n"] for _, said in recording.own("/catgraph/alarms")]
+        return [entry["n"] for _, entry in recording.own("/catgraph/alarms")]
 
 
 @pytest.mark.parametrize("version", [1, 2])

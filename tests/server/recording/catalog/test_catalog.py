@@ -477,10 +477,10 @@ def test_no_id_leads_out_of_the_folder(id: str) -> None:
     one = Catalog(Path("/proc/none"), None, wall_ms=lambda: 0, now=time.monotonic)
     assert one.path(id) is None
     assert one.row(id) is None
-    for wish in (one.delete, one.restore, one.destroy):
+    for act in (one.delete, one.restore, one.destroy):
         if id:
             with pytest.raises(NotThere):
-                wish(id)
+                act(id)
     one._entries._database.close()
 
 

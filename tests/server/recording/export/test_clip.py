@@ -41,7 +41,7 @@ ROWS: list[Row] = [
     (0.0, "/map", TEXT, {"data": "the map"}),
     *((0.1 * n, "/n", INT, {"data": n}) for n in range(200)),
 ]
-SAID: list[Own] = [
+ENTRIES: list[Own] = [
     in_force(0.0, TOML),
     logged(1.0, 1, "raised", state="UNACKED"),
     logged(2.0, 2, "raised", "gps_fix", state="UNACKED"),
@@ -61,7 +61,7 @@ def drive(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     folder = tmp_path_factory.mktemp("drive")
     write = write_ros1 if request.param == 1 else write_ros2
     source = write(folder / ("in.bag" if request.param == 1 else "in"), Drive(messages=ROWS, latched={"/map"}))
-    return as_ours(source, folder / "ours.mcap", SAID, address="ws://car:9090")
+    return as_ours(source, folder / "ours.mcap", ENTRIES, address="ws://car:9090")
 
 
 def test_it_holds_what_came_then_as_it_was(drive: Path, tmp_path: Path) -> None:

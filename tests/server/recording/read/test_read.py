@@ -155,12 +155,12 @@ def test_what_cannot_be_read_with_the_asked_file_is_named(tmp_path: Path) -> Non
     one, two = write_ros1(tmp_path / "1.bag", SHORT), write_ros2(tmp_path / "2", SHORT)
     spoilt = tmp_path / "3.mcap"
     spoilt.write_bytes(b"spoilt")
-    for asked, other, version in ((one, two, 1), (two, one, 2), (spoilt, two, 1)):
-        with open_recording([one, two, spoilt], asked=asked) as recording:
+    for named, other, version in ((one, two, 1), (two, one, 2), (spoilt, two, 1)):
+        with open_recording([one, two, spoilt], asked=named) as recording:
             assert (recording.ros_version, recording.topics["/n"].count) == (version, 9)
             damaged, mixed = recording.damage
             assert damaged.startswith("3.mcap ")
-            assert mixed == f"{other.name} is of another version of ROS and cannot be read with {asked.name}"
+            assert mixed == f"{other.name} is of another version of ROS and cannot be read with {named.name}"
     with pytest.raises(RecordingUnreadable):
         open_recording([spoilt], asked=spoilt)
 
