@@ -1,6 +1,6 @@
-"""Who looks after a car that needs a person: at most one page has its item in the attention queue.
+"""The assignment of a car that needs a person: at most one page has its item in the attention queue.
 
-The item begins when the car needs a person and ends when it does not any more; then its assignment is forgotten. Pure:
+The item begins when the car needs a person and ends when it no longer does; its assignment ends with it. Pure:
 time is an argument, which must not go back.
 """
 
@@ -229,7 +229,7 @@ class Attention:
 
 
 def escalated_to(supervisors: Sequence[str] | None) -> str:
-    """To whom an item goes on, for a sentence."""
+    """To whom an item is escalated, as the end of a sentence."""
     if supervisors is None:
         return "escalated to the supervisor"
     if not supervisors:

@@ -1,11 +1,11 @@
 """The clock of a recording: the time of day at its beginning, and from then on the time that passes; and its history.
 
-The server's clock may be set while a recording is written. Its messages and entries go on as before, whatever the time
-of day is then, and entries that carry a time of day are corrected.
+The server's clock may be set while a recording is written. The times of its messages and entries continue as before,
+whatever the time of day is then, and entries that carry a time of day are corrected.
 
 A page knows the time of day of the server as it was when the page received it last. What waited on a phone while the
-server's clock was set therefore has a time of the clock before. The history knows which time of day a moment had, over
-all steps of the server's clock, and the clock of the recording that covers it.
+server's clock was set therefore has a time of the clock before. The history has the time of day of each moment,
+over all steps of the server's clock, and the clock of the recording that covers it.
 """
 
 from __future__ import annotations

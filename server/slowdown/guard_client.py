@@ -20,7 +20,7 @@ LONGEST_WHY = 120
 
 
 class GuardClient:
-    """One vehicle's guard, as this server knows it."""
+    """The client of one vehicle's guard: its state as last received, and the heartbeats to it."""
 
     PERIOD_S = 0.2
 

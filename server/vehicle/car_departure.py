@@ -73,7 +73,7 @@ class CarDeparture:
 
     def dialled(self, wall_ms: int, *, resumed: bool, by: str | None) -> None:
         """A car is monitored from now on. What was begun for the drive before does not count for this one; what was
-        begun while no car was monitored does. `resumed`: the drive goes on after a restart of the server."""
+        begun while no car was monitored does. `resumed`: the drive continues after a restart of the server."""
         if self._is_of_drive and not resumed:
             self._moves_since_s, self._is_without_logged = None, False
             if self.is_begun:

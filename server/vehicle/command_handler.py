@@ -97,7 +97,7 @@ class CommandHandler:
             return refusal
         self._record(message, by=by)
         answer: Answer = {"ok": True}
-        if was is not None and was.person is not None:  # for the web node, which knows who is on duty there
+        if was is not None and was.person is not None:  # for the web node, which has who is on duty there
             answer["handed_over"] = {"device": was.person.device, "to": by}
         if isinstance(command, (commands.Set, commands.Import)):  # another version of the settings
             answer["version"] = parts.settings.settings.version

@@ -19,8 +19,8 @@ from typing import Any
 ANSWERED_WITHIN_S = 0.3  # and a round trip: of what comes later it is not known whether the subscription gave it
 SILENCES = (0, 2, 4)  # before each probe, in times of that; so many answers show that a sample is kept
 SETTLED_AFTER_S = 5.0  # without something new
-QUIET_PERIODS = 5  # a topic that is silent for so long does not go on
-GOES_ON_S = 0.5  # another content that comes so soon after the answers is of a topic that goes on
+QUIET_PERIODS = 5  # a topic that is silent for so long does not continue
+GOES_ON_S = 0.5  # another content that comes so soon after the answers is of a topic that continues
 MOST_HELD, MOST_HELD_BYTES = 500, 8_000_000
 
 

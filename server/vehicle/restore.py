@@ -40,7 +40,7 @@ class RestoredState:
     paused_s: float | None = None  # since when its monitoring was paused
     paused_by: str | None = None
     planned_stop: PlannedStop | None = None
-    settings_version: int = 0  # the highest that the log knows
+    settings_version: int = 0  # the highest in the log
     order: Mapping[str, Any] | None = None  # the event of the slow-down that stood when the server ended
     transitions: tuple[Transition, ...] = ()  # of each alarm since it was last at rest, oldest first
     stood: tuple[Mapping[str, Any], ...] = ()  # the newest event of each alarm that was not at rest

@@ -54,7 +54,7 @@ ROS_GONE_S = 2.5  # one unanswered question may be lost; three are a sign
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """What only the session knows; `…_s` without `for` are moments of its monotonic clock."""
+    """What only the session has; `…_s` without `for` are moments of its monotonic clock."""
 
     vehicle: str
     now_s: float

@@ -188,7 +188,7 @@ class Tick:
             self.summary.put()
 
     def watch_slow_down(self, now_s: float) -> None:
-        """What slows the car learns what the judge knows, and the other way round."""
+        """Pass the facts of the judge to the slow-down, and those of the slow-down to the judge."""
         parts, topics, slow_down = self._parts, self._parts.connection.subscriptions, self._parts.slow_down
         monitor = parts.judgement.monitor
         link, sources = parts.connection.link, topics.signals.sources

@@ -47,8 +47,8 @@ LEARN_TRIES = 3  # of rosapi's call for all definitions, which may take it long
 def fit_for_cbor(types: Collection[str], texts: Mapping[str, str], version: RosVersion | None) -> set[str]:
     """Of `types`, as the bridge spells them, those that arrive as CBOR. It parses texts: not for the event loop.
 
-    `texts`: the bridge's definitions by type; where it has none, those of the distribution count. A type nobody knows
-    is not fit; without a version it must fit both.
+    `texts`: the bridge's definitions by type; where it has none, those of the distribution count. A type without
+    a definition is not fit; without a version it must fit both.
     """
     versions: tuple[RosVersion, ...] = (version,) if version is not None else (1, 2)
     return {type for type in types if all(_is_fit(type, texts.get(type), each) for each in versions)}

@@ -126,7 +126,7 @@ class Trash:
                 raise Refused("It is being recorded now: stop recording first.")
             entry = self._listing.need(id)
             now_ms = max(self._wall_ms(), 1)
-            while (self._folder / TRASH / str(now_ms)).exists():  # what was deleted lies alone: see discovery
+            while (self._folder / TRASH / str(now_ms)).exists():  # a folder for each: see discovery
                 now_ms += 1
             moved = replace(entry, path=f"{TRASH}/{now_ms}/{entry.path}", trashed_ms=now_ms)
             self._move(entry, moved)

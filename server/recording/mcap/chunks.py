@@ -1,7 +1,7 @@
 """Walks through an MCAP file from its beginning, as far as it is whole: chunk by chunk, without its index.
 
-Where no record can be read, the walk goes on behind the next record of the hash chain, and what is between counts as
-damaged. Without one behind that place the file ends there.
+Where no record can be read, the walk continues behind the next record of the hash chain, and what is between counts as
+damaged. Without a record of the chain behind that place the file ends there.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ class CutBag1(Bag1):
 
 
 class _Record(NamedTuple):
-    """The header of one record, and where its data lies."""
+    """The header of one record, and the place of its data."""
 
     op: int
     fields: dict[bytes, bytes]

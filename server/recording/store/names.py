@@ -55,7 +55,7 @@ def annotations_key(vehicle: str, id: str) -> str:
 
 
 def part_count(size: int) -> int:
-    """Into how many objects a file of so many bytes goes."""
+    """The number of objects for a file of `size` bytes."""
     return max(1, -(-size // PART_BYTES))
 
 

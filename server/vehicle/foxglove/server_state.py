@@ -55,7 +55,7 @@ class Answers:
 class Subscribed:
     """What is wanted of a server, topic by topic, and under which numbers it is subscribed to.
 
-    Over all openings; the table is kept. `send(frame)` sends now; `sent(topic, number)` goes before each.
+    Over all openings; the table is kept. `send(frame)` sends now; `sent(topic, number)` is called before each.
     """
 
     def __init__(self, send: Callable[[bytes], None], sent: Callable[[str, int], None]) -> None:

@@ -144,7 +144,7 @@ async def test_a_planned_stop_outlasts_a_restart_and_motion_ends_it(bridge: RosB
             again = state["session"]["planned_stop"]
             assert (again["reason"], again["by"], again["is_speed_known"]) == ("charging", "Ann", True)
             assert abs(again["since_ms"] - began["since_ms"]) <= 2
-            text = "the planned stop goes on: charging or refuelling"
+            text = "the planned stop continues: charging or refuelling"
             await one.until(lambda: any(text in event["text"] for event in one.events))
             speeds["now"] = 1.0
             await one.state(lambda s: s["session"]["planned_stop"] is None)
