@@ -23,9 +23,9 @@ from server.vehicle.handover_lines import (
     alarm_lines,
     departure_line,
     driving_line,
-    in_car_line,
     limit_lines,
     mode_lines,
+    rides_line,
     stop_lines,
 )
 from server.vehicle.judgement import Judgement
@@ -143,7 +143,7 @@ class CarHandover:
         return [
             *alarm_lines(standing),
             *limit_lines(self._settings.as_json()),
-            in_car_line(
+            rides_line(
                 self._authorization.people(now_s), compared["label"] if compared is not None and is_riding else None
             ),
             driving_line(self._driving.frame(now_s, wall_ms)),
