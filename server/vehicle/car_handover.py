@@ -67,7 +67,7 @@ class CarHandover:
             self._log_step("ended", ended, None)
         return ended is not None
 
-    def execute(
+    def obey(
         self, command: handover_commands.HandoverCommand, caller: Caller, now_s: float, wall_ms: int
     ) -> Operator | None:
         """Who was in control until now, where control changed by it; None: it did not. Raises Refused."""
