@@ -175,12 +175,12 @@ async def test_a_program_has_it_while_it_takes_it_again() -> None:
 
 async def test_only_a_page_that_is_seen_is_asked() -> None:
     car = needing()
-    car.say(ANN)
+    car.report(ANN)
     await car.obeyed(ANN, "take_item")
     assert await car.refused(ANN, "offer_item", to="page-b") == "That page is closed or not visible."
-    car.say({**BEN, "visible": False})
+    car.report({**BEN, "visible": False})
     assert await car.refused(ANN, "offer_item", to="page-b") == "That page is closed or not visible."
-    car.say(BEN)
+    car.report(BEN)
     await car.obeyed(ANN, "offer_item", to="page-b")
 
 
@@ -232,7 +232,7 @@ async def test_a_summary_stays_within_its_bound_whoever_is_there() -> None:
     car.tick(0.5)
     person = {"name": "A" + widest[:29], "role": "operator"}
     await car.obeyed(pages[0] | {"person": person}, "acknowledge", alarm="test_warning", occurrence=1)
-    car.say(pages[1] | {"duties": {person["name"]: WALL_MS}})
+    car.report(pages[1] | {"duties": {person["name"]: WALL_MS}})
     car.say_what = '"' * 10_000
     car.tick(0.5)
     frame = car.bus.newest(ALL, "ocelot")
@@ -242,6 +242,6 @@ async def test_a_summary_stays_within_its_bound_whoever_is_there() -> None:
     assert 1 < len(car.summary["people"]) < MOST_PEOPLE
     assert len(str(frame.payload).encode()) <= LONGEST_SUMMARY
     for number in range(60):
-        car.say({"by": f"P{number}", "who": f"phone {number}", "page": f"page-{number}"})
+        car.report({"by": f"P{number}", "who": f"phone {number}", "page": f"page-{number}"})
     car.tick(0.5)
     assert len(car.summary["people"]) == MOST_PEOPLE

@@ -61,7 +61,7 @@ async def test_it_says_since_when_its_owner_is_off_duty() -> None:
 
 async def test_the_page_of_another_car_says_it_too() -> None:
     car = await acknowledged()
-    car.say(BEN | MR | LEFT)
+    car.report(BEN | MR | LEFT)
     assert listed(car)[2] == OFF_MS
 
 
