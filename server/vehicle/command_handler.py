@@ -28,7 +28,7 @@ from server.vehicle.settings_change import SettingsChange
 
 log = logging.getLogger("catgraph.session")
 
-# Nothing of the car changes by these, so one that is not on the disk was not obeyed.
+# Nothing of the car changes by these, so one that is not on the disk was not executed.
 RECORDS = (drive_commands.OfMark, drive_commands.OfDeparture, drive_commands.DescribeIntervention)
 OTHER_CAR = "This was meant for {meant}, and this is {this}: nothing was sent to either."
 
@@ -71,9 +71,9 @@ class CommandHandler:
     async def _carry_out(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         caller = Caller.of(message)
         with acting_as(caller.name, caller.person):
-            return await self._obey(message, caller)
+            return await self._execute(message, caller)
 
-    async def _obey(self, message: Mapping[str, Any], caller: Caller) -> Mapping[str, Any]:
+    async def _execute(self, message: Mapping[str, Any], caller: Caller) -> Mapping[str, Any]:
         parts, by = self._parts, caller.name
         try:
             command = commands.read(dict(message))
@@ -233,7 +233,7 @@ class CommandHandler:
             case drive_commands.DescribeIntervention():
                 parts.driving.describe(command, by=by)
             case drive_commands.OfMark():
-                parts.marks.obey(command, by=by, source="http" if caller.page is None else "page")
+                parts.marks.execute(command, by=by, source="http" if caller.page is None else "page")
             case drive_commands.OfSlowing():
                 parts.slow_down.execute(command, by=by)
                 self._actions.slow_down_ordered()

@@ -50,7 +50,7 @@ class SubscriptionTable:
         self.transforms: frozenset[str] = frozenset()  # topics that say where the sensors are
         self.needs_moving = self._has_moving = False  # whether those that move may place a sensor: each one counts
         self.judged = 0  # topics that are subscribed to for their signals
-        self.button: car_marks.Asked | None = None  # how the car's button was subscribed to
+        self.button: car_marks.ButtonSubscription | None = None  # how the car's button was subscribed to
 
     @property
     def rows(self) -> tuple[Subscription, ...]:
@@ -63,7 +63,7 @@ class SubscriptionTable:
     def opened(self) -> None:
         """The connection opens, and the link sends its rows."""
         self._by_name_s, self._by_name_pause_s = self._now(), BY_NAME_AGAIN_S
-        self.button = car_marks.Asked(self._now())
+        self.button = car_marks.ButtonSubscription(self._now())
         self.probation.opened(self._now())
 
     def subscribe(
@@ -226,7 +226,7 @@ class SubscriptionTable:
             if row.topic not in wanted:
                 link.unsubscribe(row.topic)
         if wanted.get(car_marks.TOPIC) not in (None, *self.rows):
-            self.button = car_marks.Asked(self._now())
+            self.button = car_marks.ButtonSubscription(self._now())
         for subscription in wanted.values():
             link.subscribe(subscription)
         self._delivery.follow(judged, recorded, now_s=self._now())
@@ -239,7 +239,7 @@ class SubscriptionTable:
 
     def _note_button(self, topic: str, *, is_quiet: bool) -> None:
         if topic == car_marks.TOPIC:
-            self.button = car_marks.Asked(self._now(), is_renewal=is_quiet)
+            self.button = car_marks.ButtonSubscription(self._now(), is_renewal=is_quiet)
 
     def _renew(self, topic: str, *, is_quiet: bool = False) -> None:
         self._note_button(topic, is_quiet=is_quiet)

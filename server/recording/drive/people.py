@@ -73,7 +73,7 @@ def names_of(people: Sequence[PersonInDrive]) -> list[str]:
 
 
 def controllers(events: Sequence[Event]) -> bool:
-    """Whether the log says anything of control."""
+    """Whether the log has anything on control."""
     return any(True for _ in of_change(events, "control"))
 
 

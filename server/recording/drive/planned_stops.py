@@ -15,11 +15,11 @@ MOST = 500
 class PlannedStopInDrive:
     """One. `from_ms` may be before the drive began; `to_ms` None: it did not end in it."""
 
-    reason: str  # in words
+    reason: str  # as text
     by: str
     from_ms: int
     to_ms: int | None = None
-    ended: str = ""  # what was said of its end
+    ended: str = ""  # the text of its end
     ended_by: str = ""  # "": it ended by itself
 
 
