@@ -69,7 +69,7 @@ def test_the_time_between_two_parts_is_said_and_neither_driven_nor_lost(drive: D
 def test_what_begins_in_one_part_goes_on_in_the_next(log: DriveLog) -> None:
     assert [(one.alarm, one.to_acknowledge_s) for one in log.alarms[2:]] == [("gps_drift", 32.5), ("speed_limit", None)]
     described = {one.intervention: one.what for one in log.interventions}
-    assert described["i1"] == "described later"
+    assert described["i1"] == "told later"
     assert list(described) == ["i1", "i2"]
     assert [row["mark"] for row in log.marks] == ["m1", "m3", "m9"]
     assert log.departure.state == "signed"
@@ -156,21 +156,21 @@ def part(session: str, number: int | None, from_s: float = 0.0, to_s: float = 1.
     return DrivePart(id=id, session=session, number=number, from_s=from_s, to_s=to_s, metadata=metadata)
 
 
-def sentences(parts: list[DrivePart], beside: Beside | None = None) -> list[str]:
+def texts(parts: list[DrivePart], beside: Beside | None = None) -> list[str]:
     found = missing(parts) if beside is None else missing(parts, beside)
     return [one.sentence(lambda at_s: f"{at_s:g}").partition(" of the drive")[0] for one in found]
 
 
 def test_a_part_that_is_not_there_is_named_with_its_time() -> None:
-    assert sentences([part("a", 1), part("a", 2, 5.0, 9.0), part("b", 1, 9.5, 20.0)]) == []
-    assert sentences([part("a", 2, clip_of="x"), part("", 5)]) == []
+    assert texts([part("a", 1), part("a", 2, 5.0, 9.0), part("b", 1, 9.5, 20.0)]) == []
+    assert texts([part("a", 2, clip_of="x"), part("", 5)]) == []
     later = [part("a", 1, 0, 10), part("a", 3, 30, 40), part("a", 6, 70, 80), part("b", 4, 100, 110)]
-    assert sentences(later) == [
+    assert texts(later) == [
         "No record here from 10 to 30: Part 2",
         "No record here from 40 to 70: Parts 4, 5",
         "No record here from 80 to 100: Parts 1, 2, 3",
     ]
-    assert sentences([part("a", 3, 30, 40)]) == ["No record here until 30: Parts 1, 2"]
+    assert texts([part("a", 3, 30, 40)]) == ["No record here until 30: Parts 1, 2"]
     (whole,) = missing([part("a", 2, 30, 40)])
     assert "Part 1 of the drive of a_p2 is not in this report" in whole.sentence(str)
 
@@ -178,20 +178,16 @@ def test_a_part_that_is_not_there_is_named_with_its_time() -> None:
 def test_the_last_part_is_named_by_what_is_beside_it() -> None:
     own = [part("a", 1, 0, 10), part("a", 2, 20, 30)]
     known = frozenset({"a", "a_p2", "a_p3", "b_p9"})
-    assert sentences(own, Beside(known=known)) == ["No record here from 30 on: Part 3"]
-    assert sentences(own, Beside(known=known, next_s={"a": 75.0, "b": 90.0})) == [
-        "No record here from 30 to 75: Part 3"
-    ]
+    assert texts(own, Beside(known=known)) == ["No record here from 30 on: Part 3"]
+    assert texts(own, Beside(known=known, next_s={"a": 75.0, "b": 90.0})) == ["No record here from 30 to 75: Part 3"]
     both = [*own, part("b", 1, 60, 70)]
-    assert sentences(both, Beside(known=known - {"b_p9"})) == ["No record here from 30 to 60: Part 3"], (
-        "one reason for it"
-    )
+    assert texts(both, Beside(known=known - {"b_p9"})) == ["No record here from 30 to 60: Part 3"], "one reason for it"
 
 
 def test_what_is_there_and_not_in_the_report_is_not_called_without_a_record() -> None:
     own = [part("a", 1, 0, 10), part("a", 4, 40, 50)]
     files = frozenset({"a", "a_p2", "a_p3", "a_p4", "a_p5"})
-    assert sentences(own, Beside(known=files, files=files)) == [
+    assert texts(own, Beside(known=files, files=files)) == [
         "Not in this report from 10 to 40: Parts 2, 3",
         "Not in this report from 50 on: Part 5",
     ]
@@ -204,11 +200,11 @@ def test_what_is_there_and_not_in_the_report_is_not_called_without_a_record() ->
 
 def test_a_number_that_no_part_has_is_not_counted_up_to() -> None:
     own = [part("a", 1, 0, 10)]
-    assert sentences(own, Beside(known=frozenset({"a_p99999999"}))) == []
+    assert texts(own, Beside(known=frozenset({"a_p99999999"}))) == []
 
 
 def test_a_lost_link_is_no_time_without_a_record_and_a_stopped_server_is_one() -> None:
-    assert sentences([part("a", 1, 0, 10), part("a", 2, 60, 70)]) == []
+    assert texts([part("a", 1, 0, 10), part("a", 2, 60, 70)]) == []
     (one,) = missing([part("a", 1, 0, 10), part("b", 1, 60, 70)])
     assert one.sentence(lambda at_s: f"{at_s:g}") == "No record here from 10 to 60: nothing was recorded between them."
 
