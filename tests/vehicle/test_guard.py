@@ -185,7 +185,7 @@ def test_a_car_that_rolls_backwards_is_slowed_to_zero_too() -> None:
     assert drive.out[-1][1].speed_mps == 0.0
 
 
-def test_where_no_speed_is_measured_the_ramp_begins_at_what_the_car_was_told() -> None:
+def test_where_no_speed_is_measured_the_ramp_begins_at_the_last_command() -> None:
     guard = Guard()
     guard.heartbeat(0.0, 1)
     assert guard.controller(0.1, 5.0, 0.2) == Command(5.0, 0.2)

@@ -134,7 +134,7 @@ def test_a_killed_node_starts_again_and_takes_no_command_from_before(car: Car) -
     car.until_state("slowing")
 
 
-def test_the_node_ends_when_it_is_asked_to_and_without_a_traceback(car: Car) -> None:
+def test_the_node_ends_on_request_and_without_a_traceback(car: Car) -> None:
     for by in (signal.SIGTERM, signal.SIGINT):
         car.start()
         assert car.guard is not None

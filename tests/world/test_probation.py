@@ -79,7 +79,7 @@ def test_one_that_makes_all_others_late_is_found_and_left_and_the_others_are_rec
     """A ROS 2 bridge that encodes 40 MB each second sends everything else a second late, and answers each ping."""
     clock = [0.0]
     definitions, delivery = TypeDefinitions(lambda _: None, lambda: None), Delivery()
-    definitions.asked = definitions.may_be_large = {"std_msgs/msg/UInt8MultiArray"}
+    definitions.requested = definitions.may_be_large = {"std_msgs/msg/UInt8MultiArray"}
     table = SubscriptionTable(None, definitions, delivery, now=lambda: clock[0])
     table.also = "all"
     offered = {f"/{name}": "std_msgs/msg/UInt8MultiArray" for name in ("a", "cloud", "z")}

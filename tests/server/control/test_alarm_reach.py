@@ -18,7 +18,7 @@ def one(name: str, page: str = "", who: str = "") -> Operator:
     return Operator(page=page or f"page-{name}", who=who or f"device-{name}", name=name)
 
 
-def test_of_a_server_that_nobody_looks_at_nobody_hears_anything() -> None:
+def test_a_server_without_pages_reaches_nobody() -> None:
     assert AlarmReach().facts(0.0) == ReachFacts(can=0, of=0, why="")
 
 
@@ -59,7 +59,7 @@ def test_two_of_three_operators() -> None:
     assert reach.facts(3.5) == ReachFacts(can=1, of=3, why="2 × no contact")
 
 
-def test_two_pages_of_one_device_are_one_operator_who_hears_by_either() -> None:
+def test_two_pages_of_one_device_are_one_operator_reached_by_either() -> None:
     reach = AlarmReach()
     reach.update_status(one("Ann", "page-1"), replace(READY, is_visible=False), 0.0)
     reach.update_status(one("Ann", "page-2"), READY, 0.0)
@@ -79,7 +79,7 @@ def test_who_sleeps_counts_for_five_minutes_and_who_leaves_does_not() -> None:
     assert reach.facts(FORGOTTEN_S + 0.1).of == 0
 
 
-def test_no_more_than_so_many_pages_are_kept_and_those_heard_last_stay() -> None:
+def test_no_more_than_so_many_pages_are_kept_and_the_newest_stay() -> None:
     reach = AlarmReach()
     for number in range(MOST + 5):
         reach.update_status(one(f"{number:03}"), READY, number / 100)
@@ -87,7 +87,7 @@ def test_no_more_than_so_many_pages_are_kept_and_those_heard_last_stay() -> None
     assert reach.all(1.0)[0].of.name == "005"
 
 
-def test_the_state_shows_each_page_and_says_how_many_it_leaves_out() -> None:
+def test_the_state_shows_each_page_and_how_many_it_leaves_out() -> None:
     reach = AlarmReach()
     reach.update_status(one("Ann"), replace(READY, sound="refused"), 0.0)
     shown = reach.as_json(0.5)

@@ -82,7 +82,7 @@ def test_a_car_that_needs_nobody_has_no_item(act: Callable[[Attention], ItemAct 
         ("decline", "You have no offer to take over"),
     ],
 )
-def test_what_only_a_holder_or_who_is_asked_may_do(act: str, why: str) -> None:
+def test_what_only_a_holder_or_who_has_an_offer_may_do(act: str, why: str) -> None:
     with pytest.raises(Refused, match=why):
         ACTS[act](begun())
 
@@ -159,7 +159,7 @@ def test_an_offer_ends(how: str) -> None:
         attention.answer(BEN, 4.0, accept=True)
 
 
-def test_who_is_asked_may_simply_take_it() -> None:
+def test_who_has_an_offer_may_simply_take_it() -> None:
     attention = begun()
     attention.take(ANN, 1.0)
     attention.offer(ANN, BEN, 2.0)
@@ -168,7 +168,7 @@ def test_who_is_asked_may_simply_take_it() -> None:
     assert (act.change, act.holder) == ("accepted", BEN)
 
 
-def test_nobody_asks_himself() -> None:
+def test_nobody_makes_an_offer_to_himself() -> None:
     attention = begun()
     attention.take(ANN, 1.0)
     with pytest.raises(Refused, match="This car is assigned to you: ask another person"):
@@ -236,7 +236,7 @@ def test_after_a_stall_a_silent_page_loses_it_and_nothing_is_escalated_at_once()
     assert changes(attention.advance(CRITICAL, 1000.0 + ESCALATES_S)) == ["escalated"]
 
 
-def test_a_page_that_is_heard_keeps_it_for_hours() -> None:
+def test_a_page_that_reports_keeps_it_for_hours() -> None:
     attention = begun()
     attention.take(ANN, 0.0)
     for second in range(1, 7200):

@@ -52,7 +52,7 @@ def test_an_order_of_another_lease_is_refused_even_the_holder_s_own(fence: int) 
 
 
 @pytest.mark.parametrize("fence", [7, None])
-def test_another_page_s_order_is_refused_and_says_who_is_in_control(fence: int | None) -> None:
+def test_another_page_s_order_is_refused_and_names_who_is_in_control(fence: int | None) -> None:
     with pytest.raises(NotInControl) as refused:
         held().admit(BEN, fence)
     assert refused.value.reason == "Ann is in control."
@@ -95,7 +95,7 @@ def test_a_page_that_is_seen_keeps_it_and_a_silent_one_loses_it_after_3_s() -> N
     assert control.lease is None
 
 
-def test_another_page_s_word_renews_nothing() -> None:
+def test_another_page_s_status_renews_nothing() -> None:
     control = held()
     control.present(BEN, 2.9)
     assert changes(control.advance(3.1, everybody)) == ["lapsed"]
@@ -195,7 +195,7 @@ def test_the_holder_keeps_it_and_the_request_is_over() -> None:
         control.keep(ANN, 7, BEN.page)
 
 
-def test_the_holder_hands_it_over_to_who_asked_or_to_another() -> None:
+def test_the_holder_hands_it_over_to_who_requested_it_or_to_another() -> None:
     control = held()
     control.request(BEN, 0.0)
     granted = control.hand_over(ANN, 7, BEN, 1.0)
@@ -219,7 +219,7 @@ def test_a_request_ends_with_the_page_that_made_it_or_when_it_is_taken_back() ->
 
 
 @pytest.mark.parametrize("end", ["lapse", "release"])
-def test_who_asked_has_it_where_the_holder_goes(end: str) -> None:
+def test_who_requested_it_has_it_where_the_holder_leaves(end: str) -> None:
     control = held()
     control.request(BEN, 2.0)
     control.request(CEM, 2.5)

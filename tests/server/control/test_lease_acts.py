@@ -73,7 +73,7 @@ def test_a_lease_is_renewed_with_its_number_and_its_beginning() -> None:
     )
 
 
-def test_it_lapses_at_the_limit_and_says_for_how_long_it_was_silent() -> None:
+def test_it_lapses_at_the_limit_and_names_for_how_long_it_was_silent() -> None:
     control = held()
     assert control.advance(LEASE_S, everybody) == []
     (act,) = control.advance(7.4, everybody)

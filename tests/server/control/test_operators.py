@@ -102,7 +102,7 @@ async def test_this_machine_s_own_console_is_never_refused_and_named(server: str
 
 
 @pytest.mark.virtual_time
-async def test_what_a_page_says_of_who_it_is_counts_for_nothing(server: str) -> None:
+async def test_the_name_that_a_page_claims_does_not_count(server: str) -> None:
     async with operator(server, "Ann", "page-ann") as ann, operator(server, "Ben", "page-ben") as ben:
         assert (await ann.ask(kind="control", do="take"))["ok"]
         answer = await ben.ask(kind="pause", by="Ann", who="local", page="page-ann", console=True)
@@ -132,7 +132,7 @@ async def test_a_page_that_is_closed_is_not_waited_for_and_one_that_breaks_off_i
 
 
 @pytest.mark.virtual_time
-async def test_nobody_hears_alarms_on_a_server_that_nobody_looks_at(bridge: RosBridge, server: str) -> None:
+async def test_alarms_reach_nobody_on_a_server_without_pages(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), http_client(base_url=server) as program:
         async with asyncio.timeout(30):
             while True:
@@ -165,7 +165,7 @@ async def test_a_choice_of_phone_outlasts_connection_and_server(bridge: RosBridg
         assert (await ann.state(lambda s: s["phone"] is None))["phones"] == []
 
 
-async def test_the_recording_says_who_ordered_from_which_page(bridge: RosBridge, tmp_path: Path) -> None:
+async def test_the_recording_holds_who_ordered_from_which_page(bridge: RosBridge, tmp_path: Path) -> None:
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)  # type: ignore[attr-defined]
     async with driving(bridge), serving(config) as base, operator(base, "Ann", "page-ann") as ann:
         await ann.state(lambda s: s["recording"]["state"] == "recording")
@@ -195,7 +195,7 @@ async def test_the_recording_says_who_ordered_from_which_page(bridge: RosBridge,
 # -- where devices are paired ------------------------------------------------------------------------------------------
 
 
-async def test_a_program_is_refused_while_a_page_is_in_control_and_told_by_whom(tmp_path: Path) -> None:
+async def test_a_program_is_refused_while_a_page_is_in_control_with_its_name(tmp_path: Path) -> None:
     async with paired_server(keyed(tmp_path)) as served, served.paired(Role.OPERATOR, "Pixel 7") as browser:
         program = {"Authorization": f"Bearer {OPERATOR_KEY}"}
         async with served.browser() as outside:

@@ -60,7 +60,7 @@ async def listed(base: str) -> list[str]:
         return [row["id"] for row in (await client.get("/api/recordings")).json()["recordings"]]
 
 
-async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator_said(
+async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator_sent(
     bridge: RosBridge, tmp_path: Path
 ) -> None:
     bridge.advertise("/rosout_like", "std_msgs/String")
@@ -257,7 +257,9 @@ async def test_by_hand_it_begins_and_ends_and_stays_ended(bridge: RosBridge, tmp
         assert recording.metadata["why"] == "Recording was stopped by Ann."
 
 
-async def test_where_it_cannot_record_it_says_so_and_monitors_all_the_same(bridge: RosBridge, tmp_path: Path) -> None:
+async def test_where_it_cannot_record_it_reports_that_and_monitors_all_the_same(
+    bridge: RosBridge, tmp_path: Path
+) -> None:
     (tmp_path / "recordings").mkdir()
     (tmp_path / "recordings" / "car").write_text("in the way")
     async with watched(bridge, tmp_path) as (_, one), driving(bridge):
@@ -271,7 +273,7 @@ async def test_where_it_cannot_record_it_says_so_and_monitors_all_the_same(bridg
         assert refused["reason"] == "Recording cannot begin: the folder for recordings is not a folder."
 
 
-async def test_a_server_that_keeps_nothing_says_so(server: str, bridge: RosBridge) -> None:
+async def test_a_server_that_keeps_nothing_reports_that(server: str, bridge: RosBridge) -> None:
     async with viewer(server) as one, driving(bridge):
         state = await one.state(lambda s: s["session"]["phase"] == "monitoring", within_s=SOON_S)
         assert state["recording"]["state"] == "off"

@@ -74,7 +74,7 @@ def test_what_is_not_there_or_no_file(tmp_path: Path) -> None:
     assert "cannot be read" in why_unreadable(tmp_path / ("x" * 256))
 
 
-def test_a_folder_with_several_recordings_asks_which(tmp_path: Path) -> None:
+def test_a_folder_with_several_recordings_needs_a_choice(tmp_path: Path) -> None:
     for name in ("a.bag", "b.bag"):
         write_ros1(tmp_path / name, LONG)
     assert why_unreadable(tmp_path).endswith("holds several recordings (a.bag, b.bag): name the one to read")

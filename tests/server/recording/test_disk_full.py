@@ -111,7 +111,7 @@ def test_what_was_left_waits_for_room_to_be_recovered(disk: Path) -> None:
 
 
 @pytest.mark.parametrize("disk", [200_000_000], indirect=True)
-async def test_a_disk_that_can_only_be_read_is_said_and_monitoring_goes_on(disk: Path, bridge: RosBridge) -> None:
+async def test_a_disk_that_can_only_be_read_is_reported_and_monitoring_continues(disk: Path, bridge: RosBridge) -> None:
     (disk.parent / "settings").mkdir()
     (disk.parent / "settings" / "car.toml").write_text("[limits.recording]\nmin_free_gb = 0.05\n")
     async with driving(bridge), watched(bridge, disk.parent) as (_, one):

@@ -123,7 +123,7 @@ async def test_a_definition_that_the_bridge_gave_counts_from_then_on(tmp_path: P
 
 
 @pytest.mark.field
-async def test_it_is_on_the_disk_within_half_a_second_without_being_asked(tmp_path: Path) -> None:
+async def test_it_is_on_the_disk_within_half_a_second_without_a_request(tmp_path: Path) -> None:
     user = RecorderUser(tmp_path)
     part = user.part()
     user.recorder.begin(part)
@@ -226,7 +226,7 @@ async def test_after_it_stopped_by_itself_nothing_piles_up(tmp_path: Path) -> No
     await user.stop()
 
 
-async def test_a_folder_that_is_none_is_said(tmp_path: Path) -> None:
+async def test_a_folder_that_is_none_is_reported(tmp_path: Path) -> None:
     (tmp_path / "recordings").write_text("a file")
     user = RecorderUser(tmp_path / "recordings")
     user.recorder.begin(replace(user.part(), path=tmp_path / "recordings" / "car" / "a.mcap"))
@@ -265,7 +265,7 @@ async def test_a_fault_of_the_search_for_the_recording_before_stops_none(
     assert "previous" not in read_first_metadata(path)
 
 
-async def test_a_file_that_is_taken_away_while_it_is_written_is_said(
+async def test_a_file_that_is_taken_away_while_it_is_written_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(space, "LOOK_S", 0.1)

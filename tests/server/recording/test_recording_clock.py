@@ -41,7 +41,7 @@ def test_times_go_on_and_entries_follow_them(by_ms: int) -> None:
     assert clocks.clock.entry(fields) == {**kept, "at_ms": before_ms + 800, "fix": {"heard_ms": before_ms + 1000}}
 
 
-def test_what_was_said_before_the_clock_was_set_by_days_stays() -> None:
+def test_times_from_before_the_clock_was_set_by_days_stay() -> None:
     clocks = Clocks()
     old_ms = clocks.wall_ms
     clocks.wall_ms += 3 * DAY_MS

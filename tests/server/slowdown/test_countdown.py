@@ -45,7 +45,7 @@ def counting() -> Car:
     return car
 
 
-def test_it_says_what_will_happen_and_slows_the_car_when_it_is_over() -> None:
+def test_it_announces_what_will_happen_and_slows_the_car_when_it_is_over() -> None:
     car = counting()
     assert car.log == [
         {

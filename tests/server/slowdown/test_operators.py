@@ -98,7 +98,7 @@ async def test_what_was_pressed_too_long_ago_is_refused(late: dict[str, float], 
             assert car.speeds == []
 
 
-async def test_orders_that_hung_in_the_radio_are_refused_and_their_sender_is_told() -> None:
+async def test_orders_that_hung_in_the_radio_are_refused_with_an_answer() -> None:
     """Each of the five, held from just above what it may take to 10 s."""
     number = 999
     orders: dict[str, dict[str, Any]] = {

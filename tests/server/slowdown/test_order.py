@@ -117,7 +117,7 @@ def source(topic: str, type: str | None) -> Source:
         ),
     ],
 )
-def test_the_way_is_known_or_its_problem_said(
+def test_the_target_is_known_or_its_problem_is_reported(
     phase: str, sources: dict[str, Source], offered: dict[str, str] | None, topic: str, problem: str | None
 ) -> None:
     way = target_of(phase=phase, sources=sources, offered=offered)

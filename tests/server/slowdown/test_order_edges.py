@@ -30,7 +30,7 @@ def test_an_order_is_what_was_ordered() -> None:
     assert life.order.by == "Ben"
 
 
-def test_every_refusal_says_why() -> None:
+def test_every_refusal_has_its_reason() -> None:
     life = SlowDown()
     how: dict[str, Any] = {"by": "Ann", "why": "by hand", "deceleration_mps2": 1.5, "now_s": 10.0, "pressed_s": None}
     assert refusal(life.arm, NO_WAY, "Ann") == "Slow-down is not available: No car is connected."

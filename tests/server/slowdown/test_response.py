@@ -75,7 +75,7 @@ def test_the_log_has_each_change_once(snapshots: list[Snapshot], log: list[tuple
     assert Car().judge(*snapshots) == log
 
 
-def test_what_slows_again_and_stops_slowing_again_is_said_again() -> None:
+def test_what_slows_again_and_stops_slowing_again_is_logged_again() -> None:
     car = Car()
     assert [step for step, _ in car.judge(IGNORES, SLOWS, IGNORES)] == ["not_confirmed", "slows", "not_confirmed"]
     assert car.order.slows_s == NOW_S

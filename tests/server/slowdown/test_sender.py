@@ -105,7 +105,7 @@ async def test_what_is_released_while_the_link_is_lost_is_not_taken_up_again() -
         assert len(car.speeds) == sent
 
 
-async def test_without_a_link_it_is_refused_and_said() -> None:
+async def test_without_a_link_it_is_refused_and_logged() -> None:
     async with field() as car:
         await car.armed()
         car.service.start_scenario("bridge-killed", 3.0)

@@ -83,13 +83,13 @@ def test_the_angle_follows_from_kind_and_ratio_and_a_team_may_set_it() -> None:
     assert received(1.6, GENERIC, ratio(GENERIC, own)).tyre_rad == pytest.approx(0.1)
 
 
-def test_settings_of_before_are_read_and_the_kind_of_car_says_the_rest() -> None:
+def test_settings_of_before_are_read_and_the_kind_of_car_decides_the_rest() -> None:
     read = from_toml(FILE_BEFORE, known_profiles=profiles.load())
     assert (read.version, read.values) == (7, {"speed_limit.max_mps": 9.0})
     assert ratio(profiles.load()[read.profile], read) == -0.00536
 
 
-def test_where_the_steering_is_not_known_it_cannot_be_armed_and_says_why() -> None:
+def test_where_the_steering_is_not_known_it_cannot_be_armed_and_names_why() -> None:
     rig = Rig(steering=Steering(percent=3.0))
     rig.slowing.car.is_steering_known = False
     rig.pass_time(0.1)
@@ -143,7 +143,7 @@ def test_an_order_that_stood_over_a_restart_commands_nothing_before_an_angle_is_
     assert set(rig.link.angles) == (set(kept.values()) or {0.1072})
 
 
-def test_the_corridor_is_straight_and_says_so_where_the_steering_is_not_known() -> None:
+def test_the_corridor_is_straight_and_marked_where_the_steering_is_not_known() -> None:
     speed = Twist(speed_mps=4.5, yaw_rate_radps=None)
     limits = AllLimits()
     scan = sweep([(60.0, 0.0, 50.0)])

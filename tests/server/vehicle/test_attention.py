@@ -59,7 +59,7 @@ async def test_it_stays_while_an_alarm_is_active_or_unacknowledged() -> None:
     assert car.item is not None
 
 
-async def test_two_people_take_hand_over_and_release_and_the_log_says_who() -> None:
+async def test_two_people_take_hand_over_and_release_and_the_log_names_them() -> None:
     car = needing()
     for page in (ANN, BEN):
         car.report(page)
@@ -173,7 +173,7 @@ async def test_a_program_has_it_while_it_takes_it_again() -> None:
     assert [event["act"] for event in car.log] == ["taken", "unassigned"]
 
 
-async def test_only_a_page_that_is_seen_is_asked() -> None:
+async def test_only_a_page_that_is_seen_gets_an_offer() -> None:
     car = needing()
     car.report(ANN)
     await car.obeyed(ANN, "take_item")

@@ -35,7 +35,7 @@ class Without:
 
 
 @pytest.mark.virtual_time
-async def test_two_lasers_do_not_mix_and_are_asked_for() -> None:
+async def test_two_lasers_do_not_mix_and_are_a_question() -> None:
     def publish(bridge: RosBridge, at_s: float) -> None:
         bridge.publish("/odom", odometry(2.0 * at_s, 2.0))
         bridge.publish("/scan", of_laser("rear", 20.0))

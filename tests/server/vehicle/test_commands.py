@@ -67,7 +67,7 @@ async def test_a_command_is_handled_and_needs_what_it_declares(bus: LocalBus, ki
     assert "held_by" not in answer
 
 
-def test_a_command_is_served_over_http_where_it_says_so() -> None:
+def test_a_command_is_served_over_http_where_it_is_declared() -> None:
     paths = create_app(Config()).openapi()["paths"]
     served = {kind: command.path or f"/api/{kind}" for kind, command in BY_KIND.items() if command.http}
     assert len(set(served.values())) == len(served) >= 11

@@ -119,7 +119,7 @@ async def test_it_is_refused_while_an_item_is_failed_or_open_and_without_a_check
     assert log(car, "signed") == []
 
 
-async def test_a_restart_finds_what_stood_word_for_word() -> None:
+async def test_a_restart_finds_what_stood_unchanged() -> None:
     car = await signed()
     before = await answer(car)
     again = CarDeparture(ActiveSettings(SettingsFile(None)), DepartureFile(None), lambda *_, **__: None)
@@ -152,7 +152,7 @@ async def test_each_drive_has_a_check_of_its_own() -> None:
     assert (await answer(car))["done"] == 0, "by hand it begins again"
 
 
-async def test_a_drive_without_one_is_said_once() -> None:
+async def test_a_drive_without_one_is_logged_once() -> None:
     car = Attended()
 
     def drive(seconds: float) -> None:
@@ -197,7 +197,7 @@ async def test_the_list_is_edited_kept_and_refused_with_a_sentence(tmp_path: Pat
     [(b"[[item", "This is not TOML"), (b"\xff", "not UTF-8"), (b"[[item]]\nid = 'a'", "Item 1 needs a title")],
     ids=["toml", "utf8", "title"],
 )
-def test_a_file_that_cannot_be_used_is_said_and_left_alone(tmp_path: Path, content: bytes, why: str) -> None:
+def test_a_file_that_cannot_be_used_is_reported_and_left_alone(tmp_path: Path, content: bytes, why: str) -> None:
     path = tmp_path / "car.departure.toml"
     path.write_bytes(content)
     found = DepartureFile(path)

@@ -172,7 +172,7 @@ def gps(lat_deg: float) -> dict[str, Any]:
 
 
 @pytest.mark.virtual_time
-async def test_a_phone_far_from_the_car_is_told_on_every_page(bridge: RosBridge) -> None:
+async def test_a_phone_far_from_the_car_is_shown_on_every_page(bridge: RosBridge) -> None:
     """Page → server → check → alarm on another page, and how the state shows it."""
     bridge.advertise("/gps_fix", "sensor_msgs/NavSatFix")
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
@@ -249,12 +249,12 @@ def test_a_phone_500_m_away_is_beyond_the_gate_although_its_track_correlates_per
 
 
 @pytest.mark.slow
-def test_a_phone_that_is_away_for_a_while_is_told_once_and_its_return_is_not() -> None:
+def test_a_phone_that_is_away_for_a_while_is_reported_once_and_its_return_is_not() -> None:
     found = ride(Rider(offset=lambda t: (500.0, 0.0) if 40.0 < t < 60.0 else (0.0, 0.0)), 120.0)
     assert [(one.alarm, one.change) for one in found.events] == [("phone_car", "raised"), ("phone_car", "cleared")]
 
 
-def test_case_07_a_permission_that_is_taken_away_is_told_with_its_name() -> None:
+def test_case_07_a_permission_that_is_taken_away_is_reported_with_its_name() -> None:
     found = ride(Rider(why=lambda t: "denied" if 20.0 < t < 45.0 else None), 60.0)
     assert [(one.alarm, one.change) for one in found.events] == [
         ("phone_missing", "raised"),
@@ -265,7 +265,7 @@ def test_case_07_a_permission_that_is_taken_away_is_told_with_its_name() -> None
     assert "FAULT: permission" in found.briefs["phone_missing"]
 
 
-def test_without_a_phone_nothing_is_said_of_one() -> None:
+def test_without_a_phone_nothing_is_reported_of_one() -> None:
     found = ride(None, 30.0)
     assert found.events == []
     assert {frozenset(found.briefs[check]) for check in ("phone_car", "phone_tracks", "phone_missing")} == {

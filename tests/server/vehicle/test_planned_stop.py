@@ -148,7 +148,7 @@ async def test_it_ends_by_itself_when_the_car_moves(mps: float, is_ended: bool) 
         assert ends[0]["text"] == f"The planned stop ended: the car moves, {abs(mps):.1f} m/s."
 
 
-async def test_a_speed_that_is_not_known_does_not_end_it_and_is_said() -> None:
+async def test_a_speed_that_is_not_known_does_not_end_it_and_is_reported() -> None:
     car = await stopped()
     assert logged(car)[0]["text"] == (
         "Planned stop: in the workshop. The speed is not known: it does not end by itself until it is."

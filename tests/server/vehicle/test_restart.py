@@ -110,7 +110,7 @@ async def test_a_returned_alarm_and_a_shelf_survive_kill_9(bridge: RosBridge, tm
 
 
 @pytest.mark.virtual_time
-async def test_a_pause_outlasts_a_restart_and_is_said(bridge: RosBridge, tmp_path: Path) -> None:
+async def test_a_pause_outlasts_a_restart_and_is_reported(bridge: RosBridge, tmp_path: Path) -> None:
     address = bridge.address  # type: ignore[attr-defined]
     config = Config(vehicles=(Vehicle(name="car", address=address),), data=tmp_path)
     async with driving(bridge):

@@ -142,7 +142,7 @@ def test_which_planned_stop_was_in_force(changes: list[str], reason: str | None)
         assert past.planned_stop.since_s == pytest.approx(-10.0)
 
 
-def test_which_phone_rides_is_not_read_from_a_recording() -> None:
+def test_which_phone_is_in_the_car_is_not_read_from_a_recording() -> None:
     one = bus()
     note(one, "ride", phone="a")
     assert phone_chosen(one, "car") == "a"

@@ -82,7 +82,7 @@ async def test_events_reach_a_page_before_a_state_is_made(bridge: RosBridge) -> 
 
 
 @pytest.mark.virtual_time
-async def test_a_killed_bridge_is_said_at_once_and_data_flow_again(bridge: RosBridge, server: str) -> None:
+async def test_a_killed_bridge_is_reported_at_once_and_data_flow_again(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), viewer(server) as one:
         await one.state(is_live)
         await bridge.kill()
@@ -94,7 +94,7 @@ async def test_a_killed_bridge_is_said_at_once_and_data_flow_again(bridge: RosBr
 
 
 @pytest.mark.virtual_time
-async def test_a_frozen_bridge_is_said_within_2_s_and_data_flow_again(bridge: RosBridge, server: str) -> None:
+async def test_a_frozen_bridge_is_reported_within_2_s_and_data_flow_again(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), viewer(server) as one:
         await one.state(is_live)
         bridge.freeze()
@@ -107,7 +107,7 @@ async def test_a_frozen_bridge_is_said_within_2_s_and_data_flow_again(bridge: Ro
 
 
 @pytest.mark.virtual_time
-async def test_a_silent_car_is_told_from_a_silent_bridge(bridge: RosBridge, server: str) -> None:
+async def test_a_silent_car_is_distinguished_from_a_silent_bridge(bridge: RosBridge, server: str) -> None:
     async with viewer(server) as one:
         async with driving(bridge):
             await one.state(is_live)
@@ -119,7 +119,7 @@ async def test_a_silent_car_is_told_from_a_silent_bridge(bridge: RosBridge, serv
 
 
 @pytest.mark.virtual_time
-async def test_nothing_after_connecting_is_said_after_5_s(server: str) -> None:
+async def test_nothing_after_connecting_is_reported_after_5_s(server: str) -> None:
     start_s = time.monotonic()
     async with viewer(server) as one:
         state = await one.state(lambda s: s["link"]["cut"] == "bridge-car", within_s=7.0)

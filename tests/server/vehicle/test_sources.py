@@ -77,7 +77,7 @@ def two_lasers(bridge: RosBridge, at_s: float) -> None:
 
 
 @pytest.mark.virtual_time
-async def test_two_lasers_are_asked_for_and_the_answer_makes_the_obstacle_alarm() -> None:
+async def test_two_lasers_are_a_question_and_the_answer_makes_the_obstacle_alarm() -> None:
     topics = {"/odom": ODOM, FRONT: "sensor_msgs/LaserScan", REAR: "sensor_msgs/LaserScan"}
     async with car(topics, two_lasers) as (_, base), viewer(base) as one, http_client() as http:
         state = await one.state(lambda s: bool(s["questions"]))

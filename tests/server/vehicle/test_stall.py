@@ -15,7 +15,7 @@ from tests.page.processes import replay, running, server
 
 
 @pytest.mark.field
-async def test_a_server_that_stood_still_says_so_and_does_not_accuse_the_car(tmp_path: Path) -> None:
+async def test_a_server_that_stood_still_reports_that_and_does_not_blame_the_car(tmp_path: Path) -> None:
     drive = steady(tmp_path / "slow.bag", 4.2)
     async with running(*replay(drive)) as car, running(*server(tmp_path / "data", car.address)) as watch:
         async with httpx.AsyncClient(base_url=watch.address, timeout=20) as client:

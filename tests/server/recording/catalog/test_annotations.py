@@ -76,7 +76,7 @@ LINES = st.text(max_size=60)
 
 @example(title="", note="wet\x1b\rdark", tags=[])  # a letter that becomes a blank at the end of a line
 @given(title=LINES, note=st.text(max_size=200), tags=st.lists(st.text(max_size=MAX_TAG), max_size=MAX_TAGS))
-def test_whatever_is_said_comes_back_as_it_was_kept(
+def test_any_annotation_comes_back_as_it_was_kept(
     tmp_path_factory: pytest.TempPathFactory, title: str, note: str, tags: list[str]
 ) -> None:
     found = changed(Annotations(), title=title, note=note, tags=tags)
@@ -89,7 +89,7 @@ def test_whatever_is_said_comes_back_as_it_was_kept(
     assert annotation_store.read(path) == found
 
 
-def test_nothing_said_leaves_no_file(tmp_path: Path) -> None:
+def test_empty_annotations_leave_no_file(tmp_path: Path) -> None:
     path = tmp_path / "car_1.mcap"
     annotation_store.write(path, Annotations(title="a"))
     annotation_store.write(path, Annotations())
@@ -100,7 +100,7 @@ def test_nothing_said_leaves_no_file(tmp_path: Path) -> None:
     "content",
     [b"", b"{", b"[1]", b"null", b'{"title": 7, "note": [], "tags": "x"}', b"\xff\xfe", b'{"title":"' + b"x" * 300_000],
 )
-def test_a_file_of_somebody_elses_says_nothing(tmp_path: Path, content: bytes) -> None:
+def test_a_file_of_another_program_is_not_read(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "car_1.mcap"
     annotation_store.beside(path).write_bytes(content)
     assert annotation_store.read(path) == Annotations()

@@ -63,7 +63,7 @@ def test_no_file_of_somebody_else_is_lost(tmp_path: Path) -> None:
     assert [one.read_text() for one in sorted(tmp_path.glob("*.other*"))] == ["first", "second", "third"]
 
 
-def test_the_oldest_are_left_out_and_the_log_says_so(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_oldest_are_left_out_and_that_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / "car_20260921T133320Z.mcap"
     marks = [mark(n, "") for n in range(MAX_MARKS)]
     for _ in range(2):

@@ -272,7 +272,7 @@ def test_a_part_with_notes_of_its_own_keeps_them_and_its_row(tmp_path: Path, kin
     assert {file: file.read_bytes() for file in (tmp_path / "r").rglob("*") if file.is_file()} == before
 
 
-def test_what_is_said_of_a_split_bag_is_in_its_report_and_among_its_marks(tmp_path: Path) -> None:
+def test_annotations_of_a_split_bag_are_in_its_report_and_among_its_marks(tmp_path: Path) -> None:
     bag_in(tmp_path / "r" / "drive")
     listed = catalog(tmp_path / "r")
     (row,) = listed.rows().rows
@@ -315,7 +315,7 @@ def test_a_file_for_whose_copy_there_was_no_room_is_read_again(
     assert [row["state"] for row in listed.rows().rows] == ["read"]
 
 
-def test_the_row_says_what_is_left_out_and_what_is_in_a_log(tmp_path: Path) -> None:
+def test_the_row_names_what_is_left_out_and_what_is_in_a_log(tmp_path: Path) -> None:
     path = tmp_path / "r" / "drive.db3"
     path.parent.mkdir()
     database(path, "INSERT INTO topics VALUES (2, '/x', 'a/msg/X', 'cdr_xml')",

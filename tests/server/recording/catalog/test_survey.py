@@ -58,7 +58,7 @@ def test_without_a_position_nothing_is_drawn_and_nothing_is_driven(tmp_path: Pat
     assert found["top_speed_mps"] == 3.0  # backwards is fast too
 
 
-def test_a_clip_is_told_as_one(tmp_path: Path) -> None:
+def test_a_clip_is_marked_as_one(tmp_path: Path) -> None:
     found = survey(record(tmp_path / "car" / "car_1_clip.mcap", clip_of="car_1", started_ms=str(BEGAN_MS - 9000)))
     assert found["is_clip"]
     assert found["clip_of"] == "car_1"
@@ -81,7 +81,7 @@ def test_the_topics_of_the_drives_own_settings_count(tmp_path: Path) -> None:
     assert survey(record(tmp_path / "car" / "car_2.mcap", settings="[[["))["top_speed_mps"] == 5.0
 
 
-def test_one_that_was_never_closed_is_read_to_its_end_and_says_so(tmp_path: Path) -> None:
+def test_one_that_was_never_closed_is_read_to_its_end_and_reported(tmp_path: Path) -> None:
     record(tmp_path / "car" / "car_1.mcap", is_closed=False)
     path = (tmp_path / "car" / "car_1.mcap.writing").rename(tmp_path / "car" / "car_1.mcap")
     found = survey(path)

@@ -121,7 +121,7 @@ def test_the_newest_of_each_item_and_mark_counts(log: DriveLog) -> None:
     assert intervention.before == ((-10.0, 10.0),)  # what has no number is left out
 
 
-def test_who_began_an_intervention_is_as_the_newest_description_says_or_else_the_data() -> None:
+def test_who_began_an_intervention_is_by_the_newest_description_or_else_the_data() -> None:
     one: dict[str, Any] = {"intervention": "i", "at_ms": BEGIN_MS}
     begun = one | {"change": "intervention", "initiated_by": "driver"}
     event = one | {"change": "intervention_described", "what": "A box."}

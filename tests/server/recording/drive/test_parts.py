@@ -55,7 +55,7 @@ def test_the_figures_of_the_parts_are_added_up(paths: list[Path], drive: DriveFa
     assert sum(row["s"] for row in whole["modes"].values()) == 180.0
 
 
-def test_the_time_between_two_parts_is_said_and_neither_driven_nor_lost(drive: DriveFacts) -> None:
+def test_the_time_between_two_parts_is_reported_and_neither_driven_nor_lost(drive: DriveFacts) -> None:
     (gap,) = drive.gaps
     assert gap == pytest.approx((LENGTH_S, SECOND[0]), abs=0.1)
     assert drive.motion.apart_m(*gap) == pytest.approx(300.0, abs=3.0)
@@ -229,7 +229,7 @@ def test_what_is_damaged_within_a_part_is_a_time_without_a_record(tmp_path: Path
     assert one.sentence(lambda at_s: f"{at_s:.0f}") == "No record here from 10 to 20: s1.mcap is damaged there."
 
 
-def test_what_a_damaged_index_says_of_the_time_is_not_believed(tmp_path: Path) -> None:
+def test_the_times_of_a_damaged_index_are_not_trusted(tmp_path: Path) -> None:
     path = recorded(tmp_path, [], name="s1.mcap", length_s=60.0)
     with open_recording([path]) as recording:
         (file,) = recording.files

@@ -96,7 +96,7 @@ def test_at_its_beginning_stands_what_was_already_so(drive: Path, tmp_path: Path
         assert clip.topics["/map"].is_latched
 
 
-def test_it_says_where_it_was_cut_from(drive: Path, tmp_path: Path) -> None:
+def test_it_names_where_it_was_cut_from(drive: Path, tmp_path: Path) -> None:
     cut(drive, tmp_path / "clip.mcap", 11.0)
     with open_recording([tmp_path / "clip.mcap"]) as clip:
         begin_ms = BEGIN_S * 1000
@@ -125,7 +125,7 @@ def test_it_says_where_it_was_cut_from(drive: Path, tmp_path: Path) -> None:
         (21.9, 1, ["The recording ends 5.0 s before the clip should."]),
     ],
 )
-def test_what_of_it_was_not_recorded_is_said(
+def test_what_of_it_was_not_recorded_is_reported(
     drive: Path, tmp_path: Path, at_s: float, count: int, notes: list[str]
 ) -> None:
     outcome = cut(drive, tmp_path / "clip.mcap", at_s)

@@ -178,7 +178,7 @@ NO_TRACK: dict[str, tuple[list[Row], str]] = {
 
 @pytest.mark.parametrize(("rows", "sentence"), NO_TRACK.values(), ids=NO_TRACK)
 @pytest.mark.parametrize("write", [gpx, geojson])
-def test_why_there_is_no_track_is_said(tmp_path: Path, rows: list[Row], sentence: str, write: Any) -> None:
+def test_why_there_is_no_track_is_reported(tmp_path: Path, rows: list[Row], sentence: str, write: Any) -> None:
     with pytest.raises(ExportRefused) as refusal:
         write(made(tmp_path, [SPEED, *rows]), tmp_path)
     assert str(refusal.value) == sentence

@@ -205,7 +205,7 @@ DETAILS = {
 }  # fmt: skip
 
 
-def test_a_definition_is_made_of_what_rosapi_says_of_a_type() -> None:
+def test_a_definition_is_made_of_what_rosapi_returns_for_a_type() -> None:
     text = text_of_details(DETAILS)
     assert text is not None
     book = TypeBook(1)

@@ -190,7 +190,7 @@ def test_what_is_in_the_write_ahead_log_is_read_and_nothing_is_changed(tmp_path:
     assert {file.name: file.read_bytes() for file in path.parent.iterdir()} == before
 
 
-def test_a_torn_log_is_read_to_its_last_whole_transaction_and_said(tmp_path: Path) -> None:
+def test_a_torn_log_is_read_to_its_last_whole_transaction_and_reported(tmp_path: Path) -> None:
     path = left_open(tmp_path)
     log = path.with_name(path.name + "-wal")
     os.truncate(log, log.stat().st_size * 2 // 3)

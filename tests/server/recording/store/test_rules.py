@@ -82,7 +82,7 @@ def test_names_of_parts() -> None:
     assert [place_of(key) for key in ("catalogue/../x.json", "catalogue/a/b/c.json", "files/a/b.json")] == [None] * 3
 
 
-def test_the_pace_is_kept_and_asks_whether_it_may_go_on() -> None:
+def test_the_pace_is_kept_and_checks_whether_it_may_continue() -> None:
     now = 0.0
     checked = []
 

@@ -125,7 +125,7 @@ async def test_a_channel_that_comes_later_and_again_under_another_number_is_subs
     assert [one["twist"]["twist"]["linear"]["x"] for one in came(ear, "/odom")] == [1.0, 2.0, 3.0]
 
 
-async def test_what_cannot_be_read_is_said_once_and_harms_nothing() -> None:
+async def test_what_cannot_be_read_is_reported_once_and_harms_nothing() -> None:
     ear = Ear()
     with peer() as car:
         car.offer_raw("/proto", "foxglove.LocationFix", "protobuf", "protobuf", b"\x0a\x00")
@@ -329,7 +329,7 @@ async def test_a_session_judges_and_records_the_car(tmp_path: Path, version: Any
     [((), None, "capability clientPublish"), (BOTH, ["protobuf"], "its encodings are protobuf")],
 )
 @pytest.mark.slow
-async def test_the_slow_down_says_why_it_cannot_be_armed(
+async def test_the_slow_down_names_why_it_cannot_be_armed(
     capabilities: tuple[Capability, ...], encodings: list[str] | None, why: str
 ) -> None:
     with peer(capabilities, encodings) as car:

@@ -293,7 +293,7 @@ def test_times_that_no_bag_can_hold(tmp_path: Path, time_ns: int, fits: bool) ->
     bag.close()
 
 
-def test_a_standard_type_told_by_a_bridge_has_its_true_sum(tmp_path: Path) -> None:
+def test_a_standard_type_from_a_bridge_has_its_true_sum(tmp_path: Path) -> None:
     """A bridge tells fields and no constants, and without them the sum would be another."""
     definition = (
         "std_msgs/Header header\nsensor_msgs/NavSatStatus status\nfloat64 latitude\nfloat64 longitude\n"
