@@ -45,7 +45,7 @@ def listed(car: Attended) -> tuple[Any, ...]:
     return alarm["state"], alarm["acknowledged_by"], alarm["off_duty_ms"]
 
 
-async def test_it_shows_since_when_its_owner_is_off_duty() -> None:
+async def test_it_says_since_when_its_owner_is_off_duty() -> None:
     car = await acknowledged()
     car.tick(0.5)
     assert listed(car) == ("ACKED", "A. K. (Ann)", None)
@@ -59,7 +59,7 @@ async def test_it_shows_since_when_its_owner_is_off_duty() -> None:
     assert listed(car)[2] is None
 
 
-async def test_the_page_of_another_car_shows_it_too() -> None:
+async def test_the_page_of_another_car_says_it_too() -> None:
     car = await acknowledged()
     car.report(BEN | MR | LEFT)
     assert listed(car)[2] == OFF_MS
