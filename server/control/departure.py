@@ -1,6 +1,6 @@
 """The departure check of one drive: each item done, failed or not applicable, then signed by a person. Pure.
 
-Times of day are in ms since 1970, `now_s` is on a monotonic clock. Automatic and active items turn by what is seen.
+Times of day are in ms since 1970, `now_s` is on a monotonic clock. Automatic and active items change by measurements.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class DepartureCheck:
         return Change(step="begun")
 
     def end(self) -> None:
-        """The drive is over: no check stands."""
+        """The drive is over: discard the check."""
         self._clear()
 
     def set_item(self, name: str, result: DepartureResult, note: str, by: str, at_ms: int) -> Change:
@@ -161,7 +161,7 @@ class DepartureCheck:
         return Change(step="reopened")
 
     def change_list(self, items: Sequence[Item]) -> None:
-        """Another list: an item that is another one by now is open again. What was signed stays as it was signed."""
+        """Replace the list: an item that changed is open again. A signed result stays as it was signed."""
         before = self._prints
         self._adopt(items)
         kept = {name for name, print_ in self._prints.items() if before.get(name, print_) == print_}
@@ -284,7 +284,7 @@ class DepartureCheck:
     def restore(
         self, *, id: str, by: str | None, begun_ms: int, results: Mapping[str, Result], signature: Signature | None
     ) -> None:
-        """The check of before a restart, as the log has it. Results of items that are others by now do not count."""
+        """The check of before a restart, as the log has it. Results of items that have changed do not count."""
         self._clear()
         self.id, self.by, self.begun_ms = id, by, begun_ms
         self.results = dict(results)

@@ -86,7 +86,7 @@ class Item:
         return hashlib.sha256(orjson.dumps([self.id, self.title, self.kind, self.of, self.need])).hexdigest()
 
     def as_row(self) -> dict[str, Any]:
-        """As it stands in a file; what is empty is left out."""
+        """The row for a file, without empty fields."""
         row = {name: getattr(self, name) for name in _FIELDS}
         return {name: value for name, value in row.items() if value not in ("", None)}
 

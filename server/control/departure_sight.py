@@ -124,7 +124,7 @@ def _steered(had: Peak, tyre_rad: float | None, need: float) -> Peak:
 
 
 def _slowed(had: Peak, seen: Seen, need: float, now_s: float) -> Peak:
-    """The slow-down was ordered and the car stood meanwhile, without a break."""
+    """The slow-down was ordered and the car stood still without a break."""
     is_ordered = seen.slow_down in ("ordered", "holding")
     stands = seen.speed_mps is not None and abs(seen.speed_mps) < STANDS_MPS
     if not (is_ordered and stands and seen.is_monitored):

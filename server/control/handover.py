@@ -1,6 +1,6 @@
-"""A hand-over of control with read-back: the taker confirms each thing that stands before control changes.
+"""A hand-over of control with read-back: the taker confirms each line before control changes.
 
-The list is made anew at every moment; what has to be confirmed is decided here and nowhere else. Pure: time is an
+The list is made for each state; this module alone decides what has to be confirmed. Pure: time is an
 argument, which must not go back.
 """
 
@@ -21,7 +21,7 @@ AWAY_S = 30.0  # the taker's page may be away so long
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """One thing that stands. Another key is another thing, which has to be confirmed by itself."""
+    """One line of the list. Another key is another line, which has to be confirmed by itself."""
 
     key: str
     kind: LineKind
@@ -46,7 +46,7 @@ class Offer:
 
 
 class NotReadBack(Refused):
-    """What stands is not, or not any more, what was read back."""
+    """The list differs from what was read back."""
 
 
 def version_of(lines: Sequence[Line]) -> str:

@@ -1,4 +1,4 @@
-"""Slows one vehicle: arms, takes orders of operators and rules, has them sent, and follows what comes of them."""
+"""Slows one vehicle: arms, accepts orders of operators and rules, has them sent, and follows their result."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class CarDeparture:
         self._is_of_drive = True
 
     def end_drive(self) -> None:
-        """The car is monitored no longer: the next drive needs a check of its own."""
+        """The car is no longer monitored: the next drive needs a new check."""
         self._check.end()
         self._moves_since_s, self._is_without_logged, self._is_of_drive = None, False, False
 

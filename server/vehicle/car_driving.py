@@ -80,7 +80,7 @@ class CarDriving:
         self.summary = DrivingSummary()
 
     def _reset(self) -> None:
-        """Another drive begins: its totals start anew. What waits for its description still waits."""
+        """Another drive begins with totals of zero. Interventions without a description stay open."""
         self._drive = self._judgement.track_number
         if self.summary.driving.watch.mode != "unknown":
             text = "Who drives is not known any more: the car is not monitored."

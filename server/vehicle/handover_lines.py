@@ -1,4 +1,4 @@
-"""What stands when control is handed over: alarms, shelved ones, limits changed from their default, who is in
+"""The lines of the list when control is handed over: alarms, shelved ones, limits changed from their default, who is in
 the car, who drives, the departure check, the slow-down and a pause."""
 
 from __future__ import annotations

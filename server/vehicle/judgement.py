@@ -82,7 +82,7 @@ class Judgement:
 
     @property
     def load(self) -> AlarmLoad:
-        """The alarms announced lately, of whichever car was monitored: it is one operator who bears them."""
+        """The alarms announced lately, of whichever car was monitored: the load is that of one operator."""
         return self._load.at(self._now())
 
     def add_load(self, transitions: Collection[Transition]) -> None:

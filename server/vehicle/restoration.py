@@ -62,7 +62,7 @@ class Restoration:
             event_log.note("restarted", before.text())
 
     def of(self, url: str) -> RestoredState | None:
-        """Before a car is dialled: the past of that very car, where the server ended while it was monitored. Its
+        """Before a car is dialled: the state of the same car, where the server ended while it was monitored. Its
         alarms stand again; so do those of another car, which end with its monitoring."""
         if self.held is None:
             return None

@@ -1,4 +1,4 @@
-"""Messages that a bridge sends again after we subscribed anew: a sample that it kept, or one message twice.
+"""Messages that a bridge sends again after another subscription: a sample that it kept, or one message twice.
 
 A real bridge gives the latched sample of a topic to each new subscription, also where its throttle was changed. A
 bridge of ROS 2 sends the first message after a second subscription of one connection twice. Neither is new: it must not

@@ -1,4 +1,4 @@
-"""The subscriptions of one car's link: made of what is mapped and offered, kept at the bridge."""
+"""The subscriptions of one car's link: derived from mapped and offered topics, and kept up at the bridge."""
 
 from __future__ import annotations
 

@@ -165,7 +165,7 @@ class Subscriptions:
                 self._subscribe()
 
     def map_again(self) -> None:
-        """After a change of settings, of what is published or shown, or of what the link bears."""
+        """After a change of settings, of what is published or shown, or of the capacity of the link."""
         if self._offer is not None or self.signals.by_name is not None:
             self._map()
 

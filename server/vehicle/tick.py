@@ -147,7 +147,7 @@ class Tick:
         return facts.link_facts(self._parts, now_s, wall_ms=self._wall_ms(), log_trouble=self.log_trouble)
 
     def watch_load(self, now_s: float) -> None:
-        """Over a slow link less is subscribed to before what is judged grows old."""
+        """Over a slow link, reduce the subscriptions before judged signals become stale."""
         topics, transport = self._parts.connection.subscriptions, self._parts.judgement.transport
         if self._parts.connection.phase != "monitoring":
             return
@@ -159,7 +159,7 @@ class Tick:
             )
 
     def watch_recording(self, now_s: float) -> None:
-        """The recorder learns what the subscriptions know, and the other way round."""
+        """Pass the state of the subscriptions to the recorder, and that of the recorder to the subscriptions."""
         topics, recording = self._parts.connection.subscriptions, self._parts.recording
         recording.ros_version = topics.ros_version
         recording.missing = topics.missing

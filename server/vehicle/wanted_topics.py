@@ -1,4 +1,5 @@
-"""Which topics are to be subscribed to, and how: by what is offered and judged, and by what link and bridge bear. Pure.
+"""Which topics are to be subscribed to, and how: by what is offered and judged, and by what link and bridge can carry.
+Pure.
 
 A ROS 2 bridge does nothing else while it encodes a message. One of 40 MB delays all others by a second or more, or the
 bridge answers no ping and the link is closed. Such a topic must cost neither the judged signals nor the recording of
