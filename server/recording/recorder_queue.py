@@ -83,7 +83,7 @@ class Learn:
 
 @dataclass(slots=True)
 class Note:
-    """What is known of the part by now, for its metadata."""
+    """What is known of the part so far, for its metadata."""
 
     more: Mapping[str, str]
 

@@ -49,7 +49,7 @@ class Stood:
         self._departure: Event | None = None  # its signature
 
     def note_departure(self, event: Event) -> None:
-        """The signature of the departure check stands until the check is opened or begun again, or the drive ends."""
+        """The signature of the departure check holds until the check is opened or begun again, or the drive ends."""
         change, step = event.get("change"), event.get("step")
         if change == "departure" and step in ("signed", "begun", "reopened"):
             self._departure = event if step == "signed" else None

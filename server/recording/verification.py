@@ -1,4 +1,4 @@
-"""The verification of one file, with what the recordings beside it say, for whoever shows it.
+"""The verification of one file, with what the recordings beside it show, for the page and the command.
 
 As a process of its own (`python -m server.recording.verification`, with the path in hex) it prints one line of JSON.
 """

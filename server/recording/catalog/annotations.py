@@ -221,7 +221,7 @@ def _fitting(field: str, what: str, value: str, most: int) -> str:
 
 
 def _unique(tags: Sequence[str]) -> tuple[str, ...]:
-    """Without empty ones, and each once, however its letters are written."""
+    """Without empty ones, and each once in any case of its letters."""
     found: dict[str, str] = {}
     for tag in tags:
         if tag:

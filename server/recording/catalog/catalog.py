@@ -81,7 +81,7 @@ class Catalog:
         self._survey.look_again()
 
     def walk(self) -> None:
-        """Lists what is in the folder: new files, changed ones, and no more those that are gone."""
+        """List what is in the folder: new and changed files; remove those that no longer exist."""
         self._listing.walk()
 
     def rebuild(self) -> None:

@@ -49,7 +49,7 @@ class FolderListing:
         return entry
 
     def walk(self) -> None:
-        """Lists what is in the folder: new files, changed ones, and no more those that are gone."""
+        """List what is in the folder: new and changed files; remove those that no longer exist."""
         known = {entry.path: entry for entry in self._entries.select("", [])}
         seen: set[str] = set()
         changed: list[Entry] = []

@@ -63,7 +63,7 @@ def unrecorded_of(recording: Recording, parts: Sequence[DrivePart]) -> list[Unre
 
 
 def beside(recording: Recording, parts: Sequence[DrivePart]) -> Beside:
-    """What the folders of a recording hold. A part that is gone for good is named by the recording behind it."""
+    """What the folders of a recording hold. A deleted part is named by the recording behind it."""
     folders = {path.parent for path in recording.paths}
     files = {id for folder in folders for id in readable_beside(folder)} - {id_of(path) for path in recording.paths}
     known = {id for folder in folders for id in known_beside(folder)}

@@ -1,4 +1,4 @@
-"""The minute around an alarm as a recording of its own: what came then, and what was already so when it begins.
+"""The minute around an alarm as a recording of its own: its messages, and what was in force when it begins.
 
 Messages are copied as bytes and never decoded, so a clip holds what was recorded: the same channels, definitions and
 stamps. It begins with the settings in force, the state of the link and the last message of each latched topic. Its
@@ -172,7 +172,7 @@ def _copy(recording: Recording, file: PartFile, window: Window, before: _Before,
 
 
 def _add_marks(recording: Recording, file: PartFile, window: Window) -> None:
-    """The marks of the minute as they are by now, whenever they came, with their voice notes and photos."""
+    """The marks of the minute in their newest form, with their voice notes and photos."""
     marks = {row["mark"]: row for row in marks_of(recording) if _is_within(row, window)}
     for row in marks.values():
         channel = file.channel(_MARKS, own_schema("marks"))

@@ -154,7 +154,7 @@ class Exports:
         return self._begin(of, CLIP, (of, CLIP, window), lambda job: self._clip(job, window), named=of)
 
     async def cancel(self, id: str) -> None:
-        """Ends a job that is going on; its file is gone when this returns."""
+        """End a running job; its file is deleted when this returns."""
         job, task = self._jobs.get(id), self._tasks.get(id)
         if job is not None and task is not None:
             task.cancel()

@@ -1,4 +1,4 @@
-"""Writes one MCAP file that survives whatever happens to its writer.
+"""Writes one MCAP file that survives a crash of its writer.
 
 Chunks are small and handed to the system at every `flush`, so a killed process loses what came since the last one, and
 a loss of power what came since the last `sync`. While it is written the file has another name; its own it gets when it
@@ -105,7 +105,7 @@ class PartFile:
         self._writer.add_attachment(at_ns, at_ns, name, media_type, data)  # between two chunks, as `note`
 
     def note(self, **more: str) -> None:
-        """What is known of the drive by now, besides what was known when it began: a kill does not lose it."""
+        """Add metadata of the drive that is known only now: a kill does not lose it."""
         self._metadata |= more
         self._writer.add_metadata(METADATA, self._metadata)  # between two chunks: the current one is not written yet
 

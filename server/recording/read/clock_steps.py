@@ -109,7 +109,7 @@ class Stretch:
     shift_ns: int = 0  # corrected minus log time
 
     def moved(self, by_ns: int) -> Stretch:
-        """The stretch later by so much."""
+        """The stretch, later by this time."""
         return replace(self, shift_ns=self.shift_ns + by_ns)
 
 

@@ -138,7 +138,7 @@ def _missing(names: Sequence[str], beside: str) -> str:
 
 
 def _files_in(folder: Path) -> list[Path]:
-    """The recorded files in a folder; of one that stands there packed and unpacked, the unpacked one."""
+    """The recorded files in a folder; of one that is there packed and unpacked, the unpacked one."""
     inside = sorted(file for file in folder.iterdir() if _plain(file.name).suffix in _SUFFIXES)
     names = {file.name for file in inside}
     return [file for file in inside if not (file.suffix == PACKED_SUFFIX and file.stem in names)]

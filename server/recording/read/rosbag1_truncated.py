@@ -171,7 +171,7 @@ class _Scan:
 
 
 def _begin(file: BinaryIO) -> int:
-    """Where the first record stands."""
+    """The place of the first record."""
     file.seek(0)
     return len(file.readline(64))
 

@@ -1,4 +1,4 @@
-"""Where the store is and by which login: a bucket of an S3-compatible service. The login never stands in a command."""
+"""Where the store is and by which login: a bucket of an S3-compatible service. The login is never part of a command."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ T = TypeVar("T")
 
 
 class Pace:
-    """Holds a transfer to so many bytes a second, and ends it when it must end.
+    """Limits a transfer to a number of bytes a second, and ends it when it must end.
 
     `may_go_on` is called before each portion and raises where the transfer must end.
     """
@@ -58,7 +58,7 @@ class Pace:
         self._may_go_on()
 
     def take(self, count: int) -> None:
-        """Returns when so many more bytes may be sent or received."""
+        """Return when that number of further bytes may be sent or received."""
         self._may_go_on()
         rate = self._bytes_per_s()
         if rate <= 0:

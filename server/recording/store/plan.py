@@ -44,7 +44,7 @@ def is_deletion_due(rule: StoreRule, upload: Upload) -> bool:
 
 
 def backoff_ms(tries: int) -> int:
-    """How long nothing is tried after so many failures in succession."""
+    """The pause after that number of failures in succession."""
     return min(LAST_BACKOFF_MS, FIRST_BACKOFF_MS << min(tries - 1, 20))
 
 
