@@ -11,13 +11,13 @@ from server.control.lease import Operator
 from server.protocol import serialize
 from server.protocol.operator_state import ReachState, ReaderEnded, Ready
 
-FRESH_S = 3.0  # a page that said nothing for longer: its phone sleeps, or the radio is gone
+FRESH_S = 3.0  # a page that reported nothing for longer: its phone sleeps, or its radio link is lost
 BLIND_S = 2.0  # a page without data for longer covers its values and gets no alarm
 FORGOTTEN_S = 300.0  # a sleeping phone still counts among the operators for this time
 MOST = 64
 MOST_SHOWN = 12
 
-WORDS: dict[ReaderEnded, str] = {
+REASONS: dict[ReaderEnded, str] = {
     "silent": "no contact",
     "blind": "link slow",
     "hidden": "page in the background",
@@ -47,7 +47,7 @@ class PageStatus:
     """The last status of one operator's page."""
 
     of: Operator
-    word: Present
+    status: Present
     heard_s: float
 
     def is_fresh(self, now_s: float) -> bool:
@@ -55,21 +55,21 @@ class PageStatus:
 
     def is_seen(self, now_s: float) -> bool:
         """Whether somebody may be looking at it now."""
-        return self.word.is_visible and self.is_fresh(now_s)
+        return self.status.is_visible and self.is_fresh(now_s)
 
     def why_not(self, now_s: float) -> ReaderEnded | None:
         """Why the page cannot sound an alarm now; None: it can."""
         if not self.is_fresh(now_s):
             return "silent"
-        if not self.word.is_visible:
+        if not self.status.is_visible:
             return "hidden"
-        if self.word.lag_s > BLIND_S:
+        if self.status.lag_s > BLIND_S:
             return "blind"
-        if not self.word.is_drawing:
+        if not self.status.is_drawing:
             return "undrawn"
-        if self.word.is_replaying:
+        if self.status.is_replaying:
             return "replay"
-        return None if self.word.sound == "ready" else "sound"
+        return None if self.status.sound == "ready" else "sound"
 
 
 class AlarmReach:
@@ -79,22 +79,22 @@ class AlarmReach:
         self._pages: dict[tuple[str, str], PageStatus] = {}  # oldest status first
         self._elsewhere: dict[tuple[str, str], PageStatus] = {}  # pages of other cars that announce this one's alarms
 
-    def hear(self, operator: Operator, word: Present, now_s: float) -> None:
+    def update_status(self, operator: Operator, status: Present, now_s: float) -> None:
         """Store the status of one page."""
         key = operator.who, operator.page
         self._pages.pop(key, None)
-        self._pages[key] = PageStatus(of=operator, word=word, heard_s=now_s)
+        self._pages[key] = PageStatus(of=operator, status=status, heard_s=now_s)
         self._forget(now_s)
 
     def leave(self, operator: Operator) -> None:
         """Remove a page that was closed."""
         self._pages.pop((operator.who, operator.page), None)
 
-    def hear_elsewhere(self, operator: Operator, word: Present, now_s: float) -> None:
+    def update_status_elsewhere(self, operator: Operator, status: Present, now_s: float) -> None:
         """Store the status of a page that shows another car and announces this one's alarms: it is not here."""
         key = operator.who, operator.page
         self._elsewhere.pop(key, None)
-        self._elsewhere[key] = PageStatus(of=operator, word=word, heard_s=now_s)
+        self._elsewhere[key] = PageStatus(of=operator, status=status, heard_s=now_s)
         for old in list(self._elsewhere)[:-MOST]:
             del self._elsewhere[old]
 
@@ -136,7 +136,7 @@ class AlarmReach:
     def facts(self, now_s: float) -> ReachFacts:
         """For the check. Two pages of one device are one operator."""
         best = _by_device((*self.all(now_s), *self._announcing(now_s)), now_s)
-        reasons = Counter(WORDS[why] for why in best.values() if why is not None)
+        reasons = Counter(REASONS[why] for why in best.values() if why is not None)
         return ReachFacts(
             can=sum(why is None for why in best.values()),
             of=len(best),
@@ -156,12 +156,12 @@ class AlarmReach:
                     "name": one.of.name,
                     "can": (why := one.why_not(now_s)) is None,
                     "why": why,
-                    "why_text": WORDS[why] if why else None,
+                    "why_text": REASONS[why] if why else None,
                     "here": one.is_seen(now_s),
-                    "awake": one.word.awake,
-                    "vibrates": one.word.vibrates,
-                    "battery": serialize.plain(one.word.battery, 2),
-                    "charging": one.word.is_charging,
+                    "awake": one.status.awake,
+                    "vibrates": one.status.vibrates,
+                    "battery": serialize.plain(one.status.battery, 2),
+                    "charging": one.status.is_charging,
                     "heard_s": serialize.plain(max(0.0, now_s - one.heard_s), 1),
                 }
                 for one in pages[:MOST_SHOWN]

@@ -1,6 +1,6 @@
-"""Who looks after a car that needs a person: at most one page has its item in the attention queue.
+"""The assignment of a car that needs a person: at most one page has its item in the attention queue.
 
-The item begins when the car needs a person and ends when it does not any more; then its assignment is forgotten. Pure:
+The item begins when the car needs a person and ends when it no longer does; its assignment ends with it. Pure:
 time is an argument, which must not go back.
 """
 
@@ -36,12 +36,12 @@ class Holder:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Offer:
-    """The holder asks `to` to take the item over."""
+    """The holder offers the item to `to`."""
 
     by: Operator
     to: Operator
     since_s: float
-    heard_s: float  # the newest sign of the page that is asked
+    heard_s: float  # the newest sign of the page to which it is offered
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,8 +133,8 @@ class Attention:
         text = f"The page of {offer.to.name} is silent: the offer of {offer.by.name} has ended."
         return self._act("withdrawn", text, None)
 
-    def hear(self, operator: Operator, now_s: float) -> None:
-        """This page is there now."""
+    def mark_present(self, operator: Operator, now_s: float) -> None:
+        """Record that this page is open now."""
         item = self.item
         if item is None:
             return
@@ -146,10 +146,10 @@ class Attention:
     # -- what an operator does ---------------------------------------------------------------------------------------
 
     def take(self, by: Operator, now_s: float, *, over: bool = False) -> ItemAct | None:
-        """Assign it to who asks. None: it is already. Raises Refused: it needs nobody, or has somebody."""
+        """Assign it to `by`. None: it is already. Raises Refused: it needs nobody, or has somebody."""
         item, had = self._expect(), self.holder
         if by.is_same(had):
-            self.hear(by, now_s)
+            self.mark_present(by, now_s)
             return None
         if item.offered is not None and by.is_same(item.offered.to):
             return self.answer(by, now_s, accept=True)
@@ -167,24 +167,24 @@ class Attention:
         return self._act("released", f"{by.name} gave it back: unassigned.", by, by)
 
     def offer(self, by: Operator, to: Operator, now_s: float) -> ItemAct | None:
-        """Ask another to take it over; an earlier offer is replaced. None: they were asked. Raises Refused."""
+        """Offer it to another; an earlier offer is replaced. None: they have the offer. Raises Refused."""
         item = self._demand(by)
         if by.is_same(to):
             raise Refused("This car is assigned to you: ask another person.")
         if item.offered is not None and to.is_same(item.offered.to):
             return None
         self.item = replace(item, offered=Offer(by=by, to=to, since_s=now_s, heard_s=now_s))
-        return self._act("offered", f"{by.name} asks {to.name} to take over.", by)
+        return self._act("offered", f"{by.name} offered it to {to.name}.", by)
 
     def answer(self, by: Operator, now_s: float, *, accept: bool) -> ItemAct:
         """Accept or decline an offer. Raises Refused."""
         item = self._expect()
         offer = item.offered
         if offer is None or not by.is_same(offer.to):
-            raise Refused("You are not asked to take over.")
+            raise Refused("You have no offer to take over.")
         if accept:
             self._assign(by, now_s)
-            return self._act("accepted", f"Assigned to {by.name}: {offer.by.name} had asked.", by, offer.by)
+            return self._act("accepted", f"Assigned to {by.name}: {offer.by.name} had offered it.", by, offer.by)
         self.item = replace(item, offered=None)
         return self._act("declined", f"{by.name} declined: still assigned to {offer.by.name}.", by)
 
@@ -195,7 +195,7 @@ class Attention:
         if offer is None:
             return None
         self.item = replace(item, offered=None)
-        return self._act("withdrawn", f"{by.name} does not ask {offer.to.name} any more.", by)
+        return self._act("withdrawn", f"{by.name} withdrew the offer to {offer.to.name}.", by)
 
     # -- within ------------------------------------------------------------------------------------------------------
 
@@ -229,7 +229,7 @@ class Attention:
 
 
 def escalated_to(supervisors: Sequence[str] | None) -> str:
-    """To whom an item goes on, for a sentence."""
+    """To whom an item is escalated, as the end of a sentence."""
     if supervisors is None:
         return "escalated to the supervisor"
     if not supervisors:

@@ -125,7 +125,7 @@ class Authorization:
         if lease is not None and not (caller.fence == lease.fence and caller.who == lease.holder.who):
             raise NotInControl(f"{lease.holder.name} is in control.", lease.holder)
 
-    def obey(self, command: commands.TakeControl, caller: Caller, now_s: float) -> int | None:
+    def execute(self, command: commands.TakeControl, caller: Caller, now_s: float) -> int | None:
         """Take, hand over or request control; return the lease number if this page holds it. Raises Refused."""
         self.tick(now_s)
         by, control, fence = caller.operator, self._control, caller.fence
@@ -156,35 +156,35 @@ class Authorization:
             self._log_act(act)
         return self.fence_of(caller)
 
-    def hear(self, word: commands.PresentWord, caller: Caller, now_s: float) -> bool:
+    def update_status(self, status: commands.PresentWord, caller: Caller, now_s: float) -> bool:
         """Store a page's status; return whether control changed."""
         operator = caller.operator
         if operator is None:
             return False
         self._note_duty(operator, caller, now_s)
-        if word.leaves:
+        if status.leaves:
             self._reach.leave(operator)
             given_up = self._control.leave(operator, now_s)
             for released in given_up:
                 self._log_act(released)
             return bool(given_up)
-        self._reach.hear(operator, _present(word, caller), now_s)
+        self._reach.update_status(operator, _present(status, caller), now_s)
         changed = self.tick(now_s)
-        if word.visible:
+        if status.visible:
             act = self._control.present(operator, now_s)
             self._log_act(act)
             changed = changed or act is not None
         return changed
 
-    def hear_elsewhere(self, word: commands.PresentWord, caller: Caller, now_s: float) -> None:
-        """Store the status of a page that shows another car: it may hear alarms, and has no part in control."""
+    def update_status_elsewhere(self, status: commands.PresentWord, caller: Caller, now_s: float) -> None:
+        """Store the status of a page that shows another car: it may sound alarms, and has no part in control."""
         if (operator := caller.operator) is None:
             return
         self._take_duties(caller, now_s)
-        if word.leaves:
+        if status.leaves:
             self._reach.leave_elsewhere(operator)
         else:
-            self._reach.hear_elsewhere(operator, _present(word, caller), now_s)
+            self._reach.update_status_elsewhere(operator, _present(status, caller), now_s)
 
     def _take_duties(self, caller: Caller, now_s: float) -> None:
         if caller.supervisors is not None:
@@ -205,7 +205,7 @@ class Authorization:
 
     @property
     def has_people(self) -> bool:
-        """Whether anybody is on duty or was lately, as stated last."""
+        """Whether anybody is on duty or was lately, as last stated."""
         return bool(self._duties)
 
     def supervisors(self, now_s: float) -> tuple[str, ...] | None:
@@ -214,7 +214,7 @@ class Authorization:
         return None if stated is None or now_s - stated[1] > KNOWN_S else stated[0]
 
     def _note_duty(self, operator: Operator, caller: Caller, now_s: float) -> None:
-        """Log who comes on duty, and who goes, at a page of this car."""
+        """Log who comes on duty, and who leaves, at a page of this car."""
         self._take_duties(caller, now_s)
         key, now = (operator.who, operator.page), caller.person
         before = self._on_duty.pop(key, None)
@@ -310,15 +310,15 @@ class Authorization:
             )
 
 
-def _present(word: commands.PresentWord, caller: Caller) -> Present:
+def _present(status: commands.PresentWord, caller: Caller) -> Present:
     return Present(
-        is_visible=word.visible,
-        sound=word.sound,
-        awake=word.awake,
-        vibrates=word.vibrates,
-        battery=word.battery,
-        is_charging=word.charging,
-        lag_s=word.lag_s,
-        is_drawing=word.draws,
+        is_visible=status.visible,
+        sound=status.sound,
+        awake=status.awake,
+        vibrates=status.vibrates,
+        battery=status.battery,
+        is_charging=status.charging,
+        lag_s=status.lag_s,
+        is_drawing=status.draws,
         is_replaying=caller.is_replaying,
     )

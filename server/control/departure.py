@@ -1,6 +1,6 @@
 """The departure check of one drive: each item done, failed or not applicable, then signed by a person. Pure.
 
-Times of day are in ms since 1970, `now_s` is on a monotonic clock. Automatic and active items turn by what is seen.
+Times of day are in ms since 1970, `now_s` is on a monotonic clock. Automatic and active items change by measurements.
 """
 
 from __future__ import annotations
@@ -100,11 +100,11 @@ class DepartureCheck:
         return Change(step="begun")
 
     def end(self) -> None:
-        """The drive is over: no check stands."""
+        """The drive is over: discard the check."""
         self._clear()
 
     def set_item(self, name: str, result: DepartureResult, note: str, by: str, at_ms: int) -> Change:
-        """A person's word on one item."""
+        """A result that a person gives to one item."""
         self._demand_open()
         item = next((one for one in self.items if one.id == name), None)
         if item is None:
@@ -134,8 +134,8 @@ class DepartureCheck:
         left = self.counts()
         open_ = left["of"] - left["done"] - left["failed"] - left["not_applicable"]
         if left["failed"] or open_:
-            words = [f"{left['failed']} failed"] * bool(left["failed"]) + [f"{open_} open"] * bool(open_)
-            raise Refused(f"Not ready: {', '.join(words)}.")
+            parts = [f"{left['failed']} failed"] * bool(left["failed"]) + [f"{open_} open"] * bool(open_)
+            raise Refused(f"Not ready: {', '.join(parts)}.")
         unlogged = [
             Change(step="item", item=one, result=self.result(one)) for one in self.items if one.id in self._unlogged
         ]
@@ -161,7 +161,7 @@ class DepartureCheck:
         return Change(step="reopened")
 
     def change_list(self, items: Sequence[Item]) -> None:
-        """Another list: an item that is another one by now is open again. What was signed stays as it was signed."""
+        """Replace the list: an item that changed is open again. A signed result stays as it was signed."""
         before = self._prints
         self._adopt(items)
         kept = {name for name, print_ in self._prints.items() if before.get(name, print_) == print_}
@@ -187,7 +187,7 @@ class DepartureCheck:
         return changes
 
     def _act(self, item: Item, had: Result, seen: Seen, now_s: float, at_ms: int) -> Change | None:
-        if had.result in ("done", "failed"):  # only a person says of one that it failed
+        if had.result in ("done", "failed"):  # only a person marks one as failed
             return None
         peak = self.peaks[item.id] = see(item, self.peaks.get(item.id, Peak()), seen, now_s)
         if not peak.is_reached:
@@ -204,7 +204,7 @@ class DepartureCheck:
         turning = self._turning.get(item.id)
         if turning is None or turning.to != verdict:
             turning = self._turning[item.id] = _Turning(verdict, now_s)
-        is_first = item.id not in self._turns  # what is good at first is said at once
+        is_first = item.id not in self._turns  # what is good at first is reported at once
         settles_s = FAILED_AFTER_S if verdict != "done" else 0.0 if is_first else DONE_AFTER_S
         if now_s - turning.since_s < settles_s:
             return None
@@ -256,7 +256,7 @@ class DepartureCheck:
         }
 
     def recurring(self) -> list[RecurringItem]:
-        """The items that have an interval, and whether they were done now: when they are due is said by the logbook."""
+        """The items that have an interval, and whether they were done now; the logbook states when they are due."""
         return [
             {
                 "item": one.id, "title": one.title, "every_days": one.every_days, "every_km": one.every_km,
@@ -275,7 +275,7 @@ class DepartureCheck:
                 "kind": one.kind,
                 "of": one.of,
                 "need": one.need,
-                **_said(self.result(one)),
+                **_signed_fields(self.result(one)),
             }
             for one in self.items
         ]
@@ -284,7 +284,7 @@ class DepartureCheck:
     def restore(
         self, *, id: str, by: str | None, begun_ms: int, results: Mapping[str, Result], signature: Signature | None
     ) -> None:
-        """The check of before a restart, as the log has it. Results of items that are others by now do not count."""
+        """The check of before a restart, as the log has it. Results of items that have changed do not count."""
         self._clear()
         self.id, self.by, self.begun_ms = id, by, begun_ms
         self.results = dict(results)
@@ -295,5 +295,5 @@ class DepartureCheck:
                 self.signature = replace(signature, document=document)
 
 
-def _said(result: Result) -> dict[str, str | None]:
+def _signed_fields(result: Result) -> dict[str, str | None]:
     return {"result": result.result, "value": result.value, "note": result.note, "by": result.by}

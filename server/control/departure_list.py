@@ -74,7 +74,7 @@ class Item:
 
     @property
     def is_recurring(self) -> bool:
-        """It is not due at each departure: the logbook says when it is overdue."""
+        """It is not due at each departure: the logbook shows when it is overdue."""
         return self.every_days is not None or self.every_km is not None
 
     @property
@@ -82,11 +82,11 @@ class Item:
         return KINDS[self.kind].group
 
     def fingerprint(self) -> str:
-        """SHA-256 of what it asks, in hex: a result counts for that, and for no other item of the same id."""
+        """SHA-256 of what it requires, in hex: a result counts for that, and for no other item of the same id."""
         return hashlib.sha256(orjson.dumps([self.id, self.title, self.kind, self.of, self.need])).hexdigest()
 
     def as_row(self) -> dict[str, Any]:
-        """As it stands in a file; what is empty is left out."""
+        """The row for a file, without empty fields."""
         row = {name: getattr(self, name) for name in _FIELDS}
         return {name: value for name, value in row.items() if value not in ("", None)}
 

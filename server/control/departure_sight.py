@@ -47,7 +47,7 @@ class Peak:
 
 
 def judge(item: Item, seen: Seen) -> tuple[DepartureResult, str]:
-    """What an automatic item finds now: done or failed; open: it cannot be judged. And the value, in words."""
+    """What an automatic item finds now: done or failed; open: it cannot be judged. And the value as text."""
     need = item.need or 0.0
     match item.kind:
         case "recorder":
@@ -55,8 +55,8 @@ def judge(item: Item, seen: Seen) -> tuple[DepartureResult, str]:
                 return "done", "records"
             return "failed", seen.recorder or "not recording"
         case "sound":
-            words = "on no phone" if not seen.phones else f"on {seen.phones} phone{'s' if seen.phones > 1 else ''}"
-            return ("done" if seen.phones >= need else "failed"), words
+            text = "on no phone" if not seen.phones else f"on {seen.phones} phone{'s' if seen.phones > 1 else ''}"
+            return ("done" if seen.phones >= need else "failed"), text
         case "disk":
             if seen.room_gb is None:
                 return "open", "known once it records"
@@ -73,7 +73,7 @@ def judge(item: Item, seen: Seen) -> tuple[DepartureResult, str]:
             return ("done" if rate >= need else "failed"), f"{rate:.1f} Hz"
         case "clock":
             if seen.ahead_s is None:
-                return "open", "the car does not tell its time"
+                return "open", "the car does not send its time"
             return ("done" if abs(seen.ahead_s) <= need else "failed"), f"differs {abs(seen.ahead_s):.2f} s"
     return "open", ""
 
@@ -124,7 +124,7 @@ def _steered(had: Peak, tyre_rad: float | None, need: float) -> Peak:
 
 
 def _slowed(had: Peak, seen: Seen, need: float, now_s: float) -> Peak:
-    """The slow-down was ordered and the car stood meanwhile, without a break."""
+    """The slow-down was ordered and the car stood still without a break."""
     is_ordered = seen.slow_down in ("ordered", "holding")
     stands = seen.speed_mps is not None and abs(seen.speed_mps) < STANDS_MPS
     if not (is_ordered and stands and seen.is_monitored):

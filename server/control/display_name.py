@@ -33,6 +33,6 @@ def person_of(signed: str) -> str | None:
 
 
 def of_program(user_agent: str | None) -> str:
-    """How a program that gives no name of its own is called: "api · curl"."""
+    """The name of a program that sends none: "api · curl"."""
     product = clean((user_agent or "").split("/", 1)[0].split(" ", 1)[0])
     return clean(f"api · {product}") if product else "api"  # type: ignore[return-value]

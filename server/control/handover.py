@@ -1,6 +1,6 @@
-"""A hand-over of control with read-back: the taker confirms each thing that stands before control changes.
+"""A hand-over of control with read-back: the taker confirms each line before control changes.
 
-The list is made anew at every moment; what has to be confirmed is decided here and nowhere else. Pure: time is an
+The list is made for each state; this module alone decides what has to be confirmed. Pure: time is an
 argument, which must not go back.
 """
 
@@ -21,7 +21,7 @@ AWAY_S = 30.0  # the taker's page may be away so long
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """One thing that stands. Another key is another thing, which has to be confirmed by itself."""
+    """One line of the list. Another key is another line, which has to be confirmed by itself."""
 
     key: str
     kind: LineKind
@@ -46,7 +46,7 @@ class Offer:
 
 
 class NotReadBack(Refused):
-    """What stands is not, or not any more, what was read back."""
+    """The list differs from what was read back."""
 
 
 def version_of(lines: Sequence[Line]) -> str:
@@ -79,7 +79,7 @@ class Handover:
         return None
 
     def begin(self, by: Operator, lease: Lease | None, to: Operator, now_s: float) -> bool:
-        """Offer control; an earlier offer is replaced. False: they were asked already. Raises Refused."""
+        """Offer control; an earlier offer is replaced. False: they have the offer already. Raises Refused."""
         if lease is None or not by.is_same(lease.holder):
             raise Refused("Only who is in control can hand it over.")
         if by.is_same(to):
@@ -91,7 +91,7 @@ class Handover:
 
     def read(self, by: Operator, key: str, is_read: bool, lines: Sequence[Line]) -> None:
         """Confirm a line, or take that back. Raises Refused."""
-        offer = self._asked(by)
+        offer = self._offer_to(by)
         if key not in {line.key for line in lines}:
             raise NotReadBack("This no longer applies: look at the list again.")
         self.offer = replace(offer, read=offer.read | {key} if is_read else offer.read - {key})
@@ -103,7 +103,7 @@ class Handover:
 
     def accept(self, by: Operator, version: str, lines: Sequence[Line]) -> Offer:
         """End the offer; the caller then changes control. Raises NotReadBack, Refused."""
-        offer = self._asked(by)
+        offer = self._offer_to(by)
         left = self.unread(lines)
         if left:
             many = "One line is" if len(left) == 1 else f"{len(left)} lines are"
@@ -121,7 +121,7 @@ class Handover:
         self.offer = None
         return offer
 
-    def _asked(self, by: Operator) -> Offer:
+    def _offer_to(self, by: Operator) -> Offer:
         if self.offer is None or not by.is_same(self.offer.to):
             raise Refused("Control is not offered to this page.")
         return self.offer

@@ -239,5 +239,5 @@ def _recordings(folder: Path) -> Iterable[Path]:
 
 def _order(id: str) -> tuple[tuple[int, int | str], ...]:
     """By numbers as numbers: part 10 is behind part 9."""
-    words = re.split(r"(\d+)", id)
-    return tuple((1, int(word)) if word.isdecimal() else (0, word) for word in words)
+    pieces = re.split(r"(\d+)", id)
+    return tuple((1, int(piece)) if piece.isdecimal() else (0, piece) for piece in pieces)

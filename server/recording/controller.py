@@ -182,23 +182,23 @@ class SessionRecording:
         """What was held is of an earlier opening of the link."""
         self._parts.release()
 
-    def own(self, channel: Own, said: Mapping[str, Any]) -> None:
-        """Something of ours, on one of our channels."""
-        self._parts.own(channel, said)
+    def own(self, channel: Own, fields: Mapping[str, Any]) -> None:
+        """An entry of one of our own channels."""
+        self._parts.own(channel, fields)
 
-    def asked(self, message: Mapping[str, Any], *, by: str, reason: str | None = None) -> None:
+    def note_command(self, message: Mapping[str, Any], *, by: str, reason: str | None = None) -> None:
         """Record a page's command and the reason of a refusal. Phone positions have their own channel."""
-        said = {name: value for name, value in message.items() if name not in ("id", "by")}
-        if isinstance(said.get("address"), str):
-            said["address"] = without_login(said["address"])
+        fields = {name: value for name, value in message.items() if name not in ("id", "by")}
+        if isinstance(fields.get("address"), str):
+            fields["address"] = without_login(fields["address"])
         if message.get("kind") == "position" and reason is None:
-            self.own("phone", {"by": by} | {name: value for name, value in said.items() if name != "kind"})
+            self.own("phone", {"by": by} | {name: value for name, value in fields.items() if name != "kind"})
         else:
-            self.own("operator", {"by": by, "ok": reason is None, "reason": reason} | said)
+            self.own("operator", {"by": by, "ok": reason is None, "reason": reason} | fields)
 
-    def mark(self, said: Mapping[str, Any], marked_ms: int, at_ms: int) -> bool:
-        """Records what is said of a mark; False: no part that is written covers its moment."""
-        return self._parts.mark(said, marked_ms, at_ms)
+    def mark(self, fields: Mapping[str, Any], marked_ms: int, at_ms: int) -> bool:
+        """Record an entry of a mark; False: no part that is written covers its moment."""
+        return self._parts.mark(fields, marked_ms, at_ms)
 
     def attach(self, attachment: Attachment) -> bool:
         """Stores a file in the part that is written; False: it does not cover the moment."""
@@ -221,9 +221,9 @@ class SessionRecording:
         """All settings, as they are in force now."""
         self.own("settings", self._settings.as_entry())
 
-    def link(self, **said: Any) -> None:
+    def link(self, **fields: Any) -> None:
         """The link, whenever it changed."""
-        self.own("link", said | {"address": self._state.address, "ros_version": self.ros_version})
+        self.own("link", fields | {"address": self._state.address, "ros_version": self.ros_version})
 
     def learn(self, definitions: Mapping[str, str]) -> None:
         """Definitions of types, in .msg text, as the bridge has them."""

@@ -33,7 +33,7 @@ MOST = 50_000  # rows of one channel: a day of a phone; a file that holds more i
 
 
 def read_recorded_events(recording: Recording) -> RecordedEvents:
-    """Reads the recording's own channels. What is invalid in them is left out, and said."""
+    """Reads the recording's own channels. What is invalid in them is left out, and reported."""
     events: list[tuple[float, RecordedEvent]] = []
     left_out = changes = 0
     metadata: Mapping[str, str] = getattr(recording, "metadata", {})

@@ -53,12 +53,12 @@ class PartWriter:
             self.file.add(channel, at_ns, text or _json(message))
         self.messages += 1
 
-    def own(self, channel: Own, at_ns: int, said: Mapping[str, Any]) -> None:
+    def own(self, channel: Own, at_ns: int, fields: Mapping[str, Any]) -> None:
         """An entry of one of our own channels. Raises OSError."""
         number = self._own_channels.get(channel)
         if number is None:
             number = self._own_channels[channel] = self.file.channel(PREFIX + channel, own_schema(channel))
-        self.file.add(number, at_ns, _json(said))
+        self.file.add(number, at_ns, _json(fields))
 
     def _channel(self, topic: str, type: str | None) -> tuple[int, Schema, int | None]:
         schema = self._book.schema(type) or self._book.loose(type)
@@ -79,5 +79,5 @@ def _parsed(frame: RawFrame) -> tuple[Any, bytes | None]:
 def _json(message: Any) -> bytes:
     try:
         return json_bytes(message)
-    except Unencodable:  # nothing that came through JSON or CBOR is so; its words are kept all the same
+    except Unencodable:  # nothing that came through JSON or CBOR is so; its text is kept all the same
         return orjson.dumps({"unencodable": repr(message)[:100_000].encode("utf-8", "replace").decode()})

@@ -1,4 +1,4 @@
-"""Begins and ends the parts of a recording, and hands what belongs into them to the recorder."""
+"""Begins and ends the parts of a recording, and passes their content to the recorder."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class RecordingParts:
 
     @property
     def status(self) -> Status:
-        """What the recorder's thread last said of itself."""
+        """The newest status of the recorder's thread."""
         return self.recorder.status if self.recorder is not None else Status()
 
     def is_current(self, session: RecordingSession) -> bool:
@@ -123,8 +123,8 @@ class RecordingParts:
         for topic, type, message in self._held.values():
             self.recorder.take(topic, type, message, self._clock.ns(self._now()), 0, self._now())
         self.own("settings", settings)
-        for channel, said in early:
-            self.own(channel, said)
+        for channel, fields in early:
+            self.own(channel, fields)
 
     def close(self, why: str) -> None:
         """Ends the part that is open, if one is."""
@@ -161,20 +161,20 @@ class RecordingParts:
         """What was held is of an earlier opening of the link: the next one sends it anew."""
         self._held.clear()
 
-    def own(self, channel: Own, said: Mapping[str, Any]) -> None:
+    def own(self, channel: Own, fields: Mapping[str, Any]) -> None:
         """An entry of one of our own channels."""
         session = self._state.session
         if session is not None and session.is_open and self.recorder is not None:
-            self.recorder.own(channel, self._clock.entry(said), self._clock.ns(self._now()))
-            self.early.note(channel, said)
+            self.recorder.own(channel, self._clock.entry(fields), self._clock.ns(self._now()))
+            self.early.note(channel, fields)
         elif self._folder is not None:
-            self.early.hold(self._now(), channel, {"time_ms": self._wall_ms(), **said})
+            self.early.hold(self._now(), channel, {"time_ms": self._wall_ms(), **fields})
 
-    def mark(self, said: Mapping[str, Any], marked_ms: int, at_ms: int) -> bool:
-        """Records at `at_ms` what is said of a mark; False: the part that is written does not cover its moment."""
+    def mark(self, fields: Mapping[str, Any], marked_ms: int, at_ms: int) -> bool:
+        """Record an entry of a mark at `at_ms`; False: the part that is written does not cover its moment."""
         recorder = self._covering(marked_ms)
         if recorder is not None:
-            recorder.own("marks", self._clock.entry(said), round(self._clock.moment_ms(at_ms)) * 1_000_000)
+            recorder.own("marks", self._clock.entry(fields), round(self._clock.moment_ms(at_ms)) * 1_000_000)
         return recorder is not None
 
     def attach(self, attachment: Attachment) -> bool:

@@ -97,12 +97,12 @@ BULKY = frozenset(
 
 
 def choose(
-    offered: Mapping[str, str], *, without: Collection[str], also: Also, asked: Collection[str]
+    offered: Mapping[str, str], *, without: Collection[str], also: Also, requested: Collection[str]
 ) -> tuple[dict[str, str], tuple[str, ...]]:
     """Topic → type of the topics that are only recorded, and the topics that are left out.
 
-    A topic waits until the definition of its type was `asked` for. Our own names are nobody else's in a recording, and
-    names that are none in ROS are not sent to a bridge.
+    A topic waits until the definition of its type has been `requested`. Our own names are reserved in a recording, and
+    names that are not valid in ROS are not sent to a bridge.
     """
     others: dict[str, str] = {}
     left_out: list[str] = []
@@ -118,6 +118,6 @@ def choose(
             or len(others) >= MAX_OTHERS
         ):
             left_out.append(topic)
-        elif not kind or kind in asked:
+        elif not kind or kind in requested:
             others[topic] = kind
     return others, tuple(left_out)

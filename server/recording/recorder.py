@@ -58,7 +58,7 @@ class Recorder:
 
     @property
     def status(self) -> Status:
-        """What the thread last said of itself."""
+        """The newest status of the thread."""
         return self._thread.status
 
     @property
@@ -116,9 +116,9 @@ class Recorder:
         frame it came in."""
         self._queue.take(CarMessage(topic, type, at_ns, message, size, now_s))
 
-    def own(self, channel: Own, said: Mapping[str, Any], at_ns: int) -> None:
+    def own(self, channel: Own, fields: Mapping[str, Any], at_ns: int) -> None:
         """Something of ours: there is little of it, and room is kept for it."""
-        self._queue.own(OwnEntry(channel, at_ns, {"time_ms": at_ns // 1_000_000, **said}))
+        self._queue.own(OwnEntry(channel, at_ns, {"time_ms": at_ns // 1_000_000, **fields}))
 
     def attach(self, attachment: Attachment) -> None:
         """A file becomes an attachment of the part."""

@@ -1,4 +1,4 @@
-"""What the loop hands to the recorder's thread: bounded, never waiting, and what does not fit is counted."""
+"""What the loop passes to the recorder's thread: bounded, never waiting, and what does not fit is counted."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class OwnEntry:
 
     channel: Own
     at_ns: int
-    said: Mapping[str, Any]
+    fields: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +83,7 @@ class Learn:
 
 @dataclass(slots=True)
 class Note:
-    """What is known of the part by now, for its metadata."""
+    """What is known of the part so far, for its metadata."""
 
     more: Mapping[str, str]
 

@@ -48,7 +48,7 @@ Writing = Literal["off", "recording", "saving", "stopped"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Status:
-    """What the thread last said of itself; replaced as a whole."""
+    """The newest status of the thread; replaced as a whole."""
 
     state: Writing = "off"
     part: Part | None = None  # the one being written, or the last one
@@ -95,7 +95,7 @@ class RecorderThread:
 
     def start(self) -> None:
         for name, work in (("recorder", self._run), ("recorder sync", self._sync_forever)):
-            # With the context of who starts it: a line of the log says which car it is about.
+            # With the context of the caller: a line of the log names its car.
             threading.Thread(target=copy_context().run, args=(work,), name=name, daemon=True).start()
 
     def _run(self) -> None:
@@ -142,7 +142,7 @@ class RecorderThread:
                     self._write(self._writer, item)
             case OwnEntry():
                 if self._writer is not None:
-                    self._writer.own(item.channel, item.at_ns, item.said)
+                    self._writer.own(item.channel, item.at_ns, item.fields)
             case Attachment():
                 if self._writer is not None:
                     self._attach(self._writer, item)
@@ -230,11 +230,11 @@ class RecorderThread:
         try:
             path = writer.file.close(**ended)
         except Exception as error:  # one of the library too: what the disk has is of use in any case
-            said = space.why(error) if isinstance(error, OSError) else type(error).__name__
-            log.error("recording not completed: %s", said)
+            reason = space.why(error) if isinstance(error, OSError) else type(error).__name__
+            log.error("recording not completed: %s", reason)
             self._newest_head = None  # it is in the file, as far as the disk took it
             self._unfinished.add(writing_path(writer.file.path), time.monotonic())
-            failed = f"The recording could not be completed: {said}. What was written is kept."
+            failed = f"The recording could not be completed: {reason}. What was written is kept."
             self.status = replace(self.status, state="stopped", trouble=trouble or failed)
             return
         self._newest_head = writer.file.head(id_of(path))

@@ -1,11 +1,11 @@
 """The clock of a recording: the time of day at its beginning, and from then on the time that passes; and its history.
 
-The server's clock may be set while a recording is written. Its messages and entries go on as before, whatever the time
-of day is then, and entries that carry a time of day are corrected.
+The server's clock may be set while a recording is written. The times of its messages and entries continue as before,
+whatever the time of day is then, and entries that carry a time of day are corrected.
 
-A page knows the time of day of the server as it was when the page heard of it last. What waited on a phone while the
-server's clock was set therefore has a time of the clock before. The history knows which time of day a moment had, over
-all steps of the server's clock, and the clock of the recording that covers it.
+A page knows the time of day of the server as it was when the page received it last. What waited on a phone while the
+server's clock was set therefore has a time of the clock before. The history has the time of day of each moment,
+over all steps of the server's clock, and the clock of the recording that covers it.
 """
 
 from __future__ import annotations
@@ -53,13 +53,13 @@ class RecordingClock:
         """The time of the recording for a time of day of about now; others are of before the clock was set."""
         return at_ms + self.shift_ms() if abs(at_ms - self._wall_ms()) < NEAR_MS else at_ms
 
-    def entry(self, said: Mapping[str, Any]) -> Mapping[str, Any]:
+    def entry(self, fields: Mapping[str, Any]) -> Mapping[str, Any]:
         """An entry with the times of day in it (`…_ms`) as times of the recording."""
-        return self._corrected(said) if self.shift_ms() else said
+        return self._corrected(fields) if self.shift_ms() else fields
 
-    def _corrected(self, said: Mapping[str, Any]) -> dict[str, Any]:
-        found = dict(said)
-        for name, value in said.items():
+    def _corrected(self, fields: Mapping[str, Any]) -> dict[str, Any]:
+        found = dict(fields)
+        for name, value in fields.items():
             if isinstance(value, Mapping):
                 found[name] = self._corrected(value)
             elif name.endswith("_ms") and isinstance(value, int | float) and not isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""One session of recording and its parts, the settings of the recorder, what else its controller knows."""
+"""One session of recording and its parts, the settings of the recorder, and the other state of its controller."""
 
 from __future__ import annotations
 

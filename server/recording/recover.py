@@ -3,8 +3,8 @@
 The new file begins with the bytes of the old one, up to the last record of its hash chain, and the chain continues in
 it; whatever was changed before shows in the chain as it did. Where a chunk is damaged, or there is no chain, the chunks
 that are whole are copied, and the new file has no chain. The new file gets its name only when the disk has it; only
-then what was left goes. Nothing that might still be of use is removed: what could not be read is kept aside under
-another name, and said.
+then what was left is removed. Nothing that might still be of use is removed: what could not be read is kept aside under
+another name, and reported.
 
 What the last run left is recovered at the start of a server, while monitoring runs; what a full disk left, when there
 is room again.

@@ -1,4 +1,4 @@
-"""How much room there is for recordings, how much they take already, and why a disk refuses, in words.
+"""How much room there is for recordings, how much they take already, and a text for why a disk refuses.
 
 The free space of the disk is read often, and the recordings' files are summed up rarely.
 """
@@ -93,7 +93,7 @@ _WHY = {
 
 
 def why(error: OSError) -> str:
-    """What the disk did, in a few words."""
+    """What the disk did, as a short text."""
     return _WHY.get(error.errno or 0) or (error.strerror or str(error)).lower()
 
 
@@ -126,5 +126,5 @@ class SpaceWatch:
         return self.now(size)
 
     def now(self, size: int) -> Space:
-        """What the disk said last, with what was written since."""
+        """What the disk reported last, with what was written since."""
         return Space(free=self._free, used=self._used_elsewhere + size)

@@ -1,6 +1,7 @@
 """What is in force when a part of a drive begins: alarms, pause, planned stop, phone, slow-down, people, mode.
 
-Its metadata says so, for no message in it does. Entries of our own channels that come while no part is open count too.
+Its metadata states them, because no message in it does. Entries of our own channels that come while no part is open
+count too.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class Stood:
         self._departure: Event | None = None  # its signature
 
     def note_departure(self, event: Event) -> None:
-        """The signature of the departure check stands until the check is opened or begun again, or the drive ends."""
+        """The signature of the departure check holds until the check is opened or begun again, or the drive ends."""
         change, step = event.get("change"), event.get("step")
         if change == "departure" and step in ("signed", "begun", "reopened"):
             self._departure = event if step == "signed" else None
@@ -118,11 +119,11 @@ class EarlyEntries:
         self._entries: list[tuple[float, Own, Mapping[str, Any]]] = []
         self._stood = Stood()
 
-    def hold(self, at_s: float, channel: Own, said: Mapping[str, Any]) -> None:
+    def hold(self, at_s: float, channel: Own, fields: Mapping[str, Any]) -> None:
         """Keeps an entry for the next part."""
-        self._entries.append((at_s, channel, said))
+        self._entries.append((at_s, channel, fields))
         if channel == "alarms":
-            self._stood.note_departure(said)  # it counts at once: a part that begins now was checked
+            self._stood.note_departure(fields)  # it counts at once: a part that begins now was checked
         for _, old_channel, old in self._entries[:-EARLY_AT_MOST]:
             self.note(old_channel, old)
         del self._entries[:-EARLY_AT_MOST]
@@ -130,18 +131,18 @@ class EarlyEntries:
     def take(self, since_s: float) -> list[tuple[Own, Mapping[str, Any]]]:
         """The entries for a part that begins, none older than `since_s`."""
         entries, self._entries = self._entries, []
-        for at_s, channel, said in entries:
+        for at_s, channel, fields in entries:
             if at_s < since_s:
-                self.note(channel, said)
-        return [(channel, said) for at_s, channel, said in entries if at_s >= since_s]
+                self.note(channel, fields)
+        return [(channel, fields) for at_s, channel, fields in entries if at_s >= since_s]
 
     def clear(self) -> None:
         self._entries.clear()
 
-    def note(self, channel: Own, said: Mapping[str, Any]) -> None:
+    def note(self, channel: Own, fields: Mapping[str, Any]) -> None:
         """An entry was written."""
         if channel == "alarms":
-            self._stood.note(said)
+            self._stood.note(fields)
 
     def remember(self, stood: Iterable[Event]) -> None:
         """Events of alarms that stand since before the server was started."""

@@ -1,4 +1,4 @@
-"""The verification of one file, with what the recordings beside it say, for whoever shows it.
+"""The verification of one file, with what the recordings beside it show, for the page and the command.
 
 As a process of its own (`python -m server.recording.verification`, with the path in hex) it prints one line of JSON.
 """
@@ -36,7 +36,7 @@ class Verification:
 
     @property
     def short(self) -> str:
-        """A few words; never *Intact* where a recording beside it objects."""
+        """A short text; never *Intact* where a recording beside it objects."""
         if self.file.state == "intact" and self.beside.problems:
             return "Does not match the recording beside it"
         return self.file.short

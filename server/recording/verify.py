@@ -59,7 +59,7 @@ class Verified:
     state: State
     sentence: str
     records: int = 0  # of the chain that were read
-    head: str | None = None  # hash of the last record [hex]; that of a broken chain says nothing
+    head: str | None = None  # hash of the last record [hex]; that of a broken chain proves nothing
     broken: Break | None = None
     is_recovered: bool = False  # the recorder had ended without closing the file, and recovery completed it
     previous: str | None = None  # the recording that this one names as the one before it
@@ -232,8 +232,8 @@ class _Run:
             return self._unfinished()
         if self._broken is None and self._last is None and not has_more:  # as recovery leaves a damaged file
             why = self._newest.get("why", "")
-            said = f": {why}" if self._newest.get("ended") == "recovered" and why else "."
-            return self._found("broken", f"Broken: its chain is missing{said}")
+            reason = f": {why}" if self._newest.get("ended") == "recovered" and why else "."
+            return self._found("broken", f"Broken: its chain is missing{reason}")
         self._break(self._size)
         return self._is_broken()
 

@@ -1,4 +1,4 @@
-"""Slows one vehicle: arms, takes orders of operators and rules, has them sent, and follows what comes of them."""
+"""Slows one vehicle: arms, accepts orders of operators and rules, has them sent, and follows their result."""
 
 from __future__ import annotations
 
@@ -194,7 +194,7 @@ class SlowDownController:
 
     # -- orders ------------------------------------------------------------------------------------------------------
 
-    def obey(self, command: drive_commands.SlowingCommand, *, by: str) -> None:
+    def execute(self, command: drive_commands.SlowingCommand, *, by: str) -> None:
         """Execute an operator's command. Raises Refused; the refusal of a slow-down is logged."""
         match command:
             case drive_commands.Arm():

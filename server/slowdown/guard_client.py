@@ -14,13 +14,13 @@ from server.slowdown.publisher import CommandPublisher
 UINT32 = "std_msgs/UInt32"
 END_OF_MONITORING = 0  # instead of a count
 SILENT_S = 1.0  # the guard publishes 5 times a second
-SICK_S = 0.25  # after a tick later than this no heartbeat is sent: it would vouch for a server that is not well
+SICK_S = 0.25  # after a tick later than this no heartbeat is sent: it would confirm a server that is not well
 STATES: tuple[GuardPhase, ...] = get_args(GuardPhase)
 LONGEST_WHY = 120
 
 
 class GuardClient:
-    """One vehicle's guard, as this server knows it."""
+    """The client of one vehicle's guard: its state as last received, and the heartbeats to it."""
 
     PERIOD_S = 0.2
 

@@ -76,7 +76,7 @@ class OrderLog:
 
 
 def commanded(order: Order) -> str:
-    """The newest command in words."""
+    """The newest command as text."""
     last = order.last
     return "nothing yet" if last is None else f"{last.speed_mps:.2f} m/s, tyres at {last.tyre_rad:+.3f} rad"
 

@@ -31,7 +31,7 @@ class CommandPublisher:
             self._advertised[topic] = type
 
     def unadvertise_all(self) -> None:
-        """Nothing is to be said any more."""
+        """Withdraw all announced topics."""
         for topic in list(self._advertised):
             del self._advertised[topic]
             try:

@@ -74,7 +74,7 @@ class MeasuredCar:
         return Car(speed_mps=speed.value.speed_mps if speed is not None and is_known else None, tyre_rad=tyre_rad)
 
     def _is_of_now(self, reading: Reading[Any], now_s: float) -> bool:
-        """Fresh, and not from before the link was lost: meanwhile the car may have done anything."""
+        """Fresh, and not from before the link was lost: the car may have changed its speed since."""
         return reading.is_fresh(now_s) and reading.received_s >= self.opened_s
 
 

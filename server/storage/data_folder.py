@@ -52,7 +52,7 @@ class DataFolder:
             raise
 
     def close(self) -> None:
-        """Lets go of the folder."""
+        """Release the folder."""
         self._close()
 
     def _lock(self, descriptor: int) -> None:

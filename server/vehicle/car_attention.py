@@ -39,12 +39,12 @@ class CarAttention:
             self._log_act(act)
         return bool(acts)
 
-    def hear(self, caller: Caller, now_s: float) -> None:
+    def mark_present(self, caller: Caller, now_s: float) -> None:
         """A page of this car, or one that announces its alarms, is there."""
         if caller.page is not None:
-            self._attention.hear(_operator(caller), now_s)
+            self._attention.mark_present(_operator(caller), now_s)
 
-    def obey(self, command: handover_commands.ItemCommand, caller: Caller, now_s: float) -> None:
+    def execute(self, command: handover_commands.ItemCommand, caller: Caller, now_s: float) -> None:
         """Raises Refused."""
         self.tick(now_s)
         by, attention = _operator(caller), self._attention
@@ -87,11 +87,10 @@ class CarAttention:
             assigned = {"name": had.of.name, "page": had.of.page, "since_ms": at_ms(had.since_s)}
         offered: ItemOffer | None = None
         if (offer := item.offered) is not None:
-            asked = offer.to
             offered = {
                 "by": offer.by.name,
-                "name": asked.name,
-                "page": asked.page,
+                "name": offer.to.name,
+                "page": offer.to.page,
                 "since_ms": at_ms(offer.since_s),
             }
         escalates_s = attention.escalates_s

@@ -60,7 +60,7 @@ class CarDeparture:
                 self._log_change(change, wall_ms)
 
     def watch_drive(self, speed_mps: float | None, now_s: float) -> None:
-        """A drive without a signed check is said once in the log."""
+        """Log a drive without a signed check once."""
         if speed_mps is None or abs(speed_mps) < MOVES_MPS:
             self._moves_since_s = None
             return
@@ -73,7 +73,7 @@ class CarDeparture:
 
     def dialled(self, wall_ms: int, *, resumed: bool, by: str | None) -> None:
         """A car is monitored from now on. What was begun for the drive before does not count for this one; what was
-        begun while no car was monitored does. `resumed`: the drive goes on after a restart of the server."""
+        begun while no car was monitored does. `resumed`: the drive continues after a restart of the server."""
         if self._is_of_drive and not resumed:
             self._moves_since_s, self._is_without_logged = None, False
             if self.is_begun:
@@ -81,7 +81,7 @@ class CarDeparture:
         self._is_of_drive = True
 
     def end_drive(self) -> None:
-        """The car is monitored no longer: the next drive needs a check of its own."""
+        """The car is no longer monitored: the next drive needs a new check."""
         self._check.end()
         self._moves_since_s, self._is_without_logged, self._is_of_drive = None, False, False
 
@@ -109,7 +109,7 @@ class CarDeparture:
 
     # -- commands ----------------------------------------------------------------------------------------------------
 
-    async def obey(
+    async def execute(
         self,
         command: drive_commands.DepartureCommand,
         caller: Caller,
@@ -157,11 +157,11 @@ class CarDeparture:
             case "item":
                 item, result = change.item, change.result
                 assert item is not None
-                words = {"done": "done", "failed": "failed", "not_applicable": "not applicable", "open": "open again"}
-                said = ": ".join(part for part in (words[result.result], result.note or result.value) if part)
+                labels = {"done": "done", "failed": "failed", "not_applicable": "not applicable", "open": "open again"}
+                outcome = ": ".join(part for part in (labels[result.result], result.note or result.value) if part)
                 self._note(
                     "departure",
-                    f"Departure check, {item.title}: {said}.".replace("..", "."),
+                    f"Departure check, {item.title}: {outcome}.".replace("..", "."),
                     by=by,
                     step="item",
                     check=check.id or "",
@@ -190,9 +190,9 @@ class CarDeparture:
                     **counts,
                 )
             case _:
-                words = {"begun": "The departure check begins.", "reopened": "The departure check is open again."}
+                texts = {"begun": "The departure check begins.", "reopened": "The departure check is open again."}
                 id = check.id or ""
-                text = words[change.step]
+                text = texts[change.step]
                 self._note("departure", text, by=by, step=change.step, check=id, moment_ms=moment_ms, **counts)
 
     # -- what others see ---------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from server.vehicle.judgement import Judgement
 
 MOST_OPEN = 20
 KEPT = 200  # interventions that can still be described
-OPEN_FOR_MS = 24 * 3_600_000  # after a restart older ones are not asked for again
+OPEN_FOR_MS = 24 * 3_600_000  # after a restart older ones are not requested again
 BY_RULE = "commands"
 _KINDS: Mapping[KindOf, str] = {
     "to_manual": "Intervention: taken over by hand",
@@ -80,7 +80,7 @@ class CarDriving:
         self.summary = DrivingSummary()
 
     def _reset(self) -> None:
-        """Another drive begins: its totals start anew. What waits for its description still waits."""
+        """Another drive begins with totals of zero. Interventions without a description stay open."""
         self._drive = self._judgement.track_number
         if self.summary.driving.watch.mode != "unknown":
             text = "Who drives is not known any more: the car is not monitored."
@@ -136,22 +136,22 @@ class CarDriving:
             self._alarm_s = now_s
 
     def describe(self, command: DescribeIntervention, *, by: str) -> None:
-        """Logs what somebody says of an intervention; the same again changes nothing. Raises Refused."""
+        """Log a person's description of an intervention; the same again changes nothing. Raises Refused."""
         one = self._known.get(command.intervention)
         if one is None:
             raise Refused("This car has no such intervention.")
         what = command.what.strip()
         if not what and command.category is None:
-            raise Refused("Choose what made you intervene, or say it in words.")
-        said = (what, command.category, command.initiated_by)
-        if one.described == said:
+            raise Refused("Choose what made you intervene, or describe it.")
+        described = (what, command.category, command.initiated_by)
+        if one.described == described:
             return
-        one.described, one.described_by = said, by
+        one.described, one.described_by = described, by
         extra: dict[str, Any] = {} if command.initiated_by is None else {"initiated_by": command.initiated_by}
-        words = ": ".join(part for part in (command.category, what) if part)
+        text = ": ".join(part for part in (command.category, what) if part)
         self._note(
             "intervention_described",
-            f"An intervention was described: {words[:300]}",
+            f"An intervention was described: {text[:300]}",
             by=by,
             intervention=one.id,
             what=what,

@@ -92,7 +92,7 @@ class CarHandover:
         self.tick(now_s)
         by, handover = caller.operator, self._handover
         if by is None:
-            raise Refused("Only a page hands control over: a program cannot show that somebody is watching.")
+            raise Refused("Only a page can hand control over: a program cannot show that somebody is watching.")
         match command:
             case handover_commands.OfferControl():
                 to = self._authorization.find(command.to, now_s)
@@ -147,11 +147,11 @@ class CarHandover:
         self._judgement.report(monitor.take_over(command.alarm, caller.name, now_s, is_read_back=True))
 
     def refusal(self, why: NotReadBack, now_s: float, wall_ms: int) -> Answer:
-        """The answer to a read-back that does not fit, with what stands now."""
+        """The answer to a read-back that does not match, with the present list."""
         return {"ok": False, "reason": why.reason, "handover": self.as_json(now_s, wall_ms)}
 
     def lines(self, now_s: float, wall_ms: int) -> list[Line]:
-        """What stands now."""
+        """The present list."""
         judgement, slow_down = self._judgement, self._slow_down.frame()
         off_duty_ms = self._authorization.off_duty_ms
         standing = [serialize.alarm(one, now_s, wall_ms, None, off_duty_ms) for one in judgement.monitor.standing()]

@@ -122,7 +122,8 @@ def worst(
     standing: Iterable[Alarm], now_s: float, wall_ms: int, silent_at_stop: Collection[str] | None = None
 ) -> CarAlarm | None:
     """The alarm that needs a person most: one that stands unanswered, then one that ended so, then the others.
-    `silent_at_stop`: as of `serialize.alarm`. Of two alike it is the one that sounds: only this one is heard elsewhere.
+    `silent_at_stop`: as of `serialize.alarm`. Of two alike it is the one that sounds: only this one sounds on
+    pages of other cars.
     """
     order = {"UNACKED": 2, "RTN_UNACKED": 1}
     shown = [serialize.alarm(alarm, now_s, wall_ms, silent_at_stop) for alarm in standing]
@@ -197,7 +198,7 @@ def place(snapshot: Snapshot, now_s: float) -> CarPlace | None:
 
 
 def energy_percent(snapshot: Snapshot, now_s: float) -> float | None:
-    """Of the tank or battery; None where the car does not say it in percent, or said it too long ago."""
+    """Of the tank or battery; None where the car does not send it in percent, or the newest value is too old."""
     reading = snapshot.readings.get("fuel")
     if reading is None or reading.value.unit != "%" or not reading.is_fresh(now_s):
         return None

@@ -28,7 +28,7 @@ from server.vehicle.settings_change import SettingsChange
 
 log = logging.getLogger("catgraph.session")
 
-# Nothing of the car changes by these, so one that is not on the disk was not obeyed.
+# Nothing of the car changes by these, so one that is not on the disk was not executed.
 RECORDS = (drive_commands.OfMark, drive_commands.OfDeparture, drive_commands.DescribeIntervention)
 OTHER_CAR = "This was meant for {meant}, and this is {this}: nothing was sent to either."
 
@@ -71,9 +71,9 @@ class CommandHandler:
     async def _carry_out(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         caller = Caller.of(message)
         with acting_as(caller.name, caller.person):
-            return await self._obey(message, caller)
+            return await self._execute(message, caller)
 
-    async def _obey(self, message: Mapping[str, Any], caller: Caller) -> Mapping[str, Any]:
+    async def _execute(self, message: Mapping[str, Any], caller: Caller) -> Mapping[str, Any]:
         parts, by = self._parts, caller.name
         try:
             command = commands.read(dict(message))
@@ -97,7 +97,7 @@ class CommandHandler:
             return refusal
         self._record(message, by=by)
         answer: Answer = {"ok": True}
-        if was is not None and was.person is not None:  # for the web node, which knows who is on duty there
+        if was is not None and was.person is not None:  # for the web node, which has who is on duty there
             answer["handed_over"] = {"device": was.person.device, "to": by}
         if isinstance(command, (commands.Set, commands.Import)):  # another version of the settings
             answer["version"] = parts.settings.settings.version
@@ -133,10 +133,10 @@ class CommandHandler:
                 parts.publisher.put()
                 return {"ok": True}
             case "announces":  # of a page that shows another car; no page can send it itself
-                word, caller = commands.PresentWord.model_validate({**message, "kind": "present"}), Caller.of(message)
-                parts.authorization.hear_elsewhere(word, caller, self._now())
-                if not word.leaves:
-                    parts.attention.hear(caller, self._now())
+                status, caller = commands.PresentWord.model_validate({**message, "kind": "present"}), Caller.of(message)
+                parts.authorization.update_status_elsewhere(status, caller, self._now())
+                if not status.leaves:
+                    parts.attention.mark_present(caller, self._now())
                 return {"ok": True}
             case "signals":
                 topics = parts.connection.subscriptions
@@ -174,14 +174,14 @@ class CommandHandler:
     def _record(self, message: Mapping[str, Any], *, by: str, reason: str | None = None) -> None:
         """Record a command that was executed or refused; the reply does not depend on it."""
         try:
-            self._parts.recording.asked(message, by=by, reason=reason)
+            self._parts.recording.note_command(message, by=by, reason=reason)
         except Exception:
             log.exception("command not recorded: vehicle=%s", self._vehicle)
 
-    def _present(self, word: commands.PresentWord, caller: Caller) -> Answer:
-        if not word.leaves:
-            self._parts.attention.hear(caller, self._now())
-        if self._parts.authorization.hear(word, caller, self._now()):
+    def _present(self, status: commands.PresentWord, caller: Caller) -> Answer:
+        if not status.leaves:
+            self._parts.attention.mark_present(caller, self._now())
+        if self._parts.authorization.update_status(status, caller, self._now()):
             self._parts.publisher.put_soon()
         return {"ok": True}
 
@@ -216,16 +216,16 @@ class CommandHandler:
             case handover_commands.TakeAlarm():
                 parts.handover.take_alarm(command, caller, now_s)
             case commands.TakeControl():
-                parts.authorization.obey(command, caller, now_s)
-                self._actions.attention_changed()  # the queue shows who asks for control
+                parts.authorization.execute(command, caller, now_s)
+                self._actions.attention_changed()  # the queue shows who requests control
             case handover_commands.OfHandover():
                 was = parts.handover.obey(command, caller, now_s, self._wall_ms())
                 parts.publisher.put()
                 return was
             case drive_commands.OfDeparture():
-                await parts.departure.obey(command, caller, self._wall_ms(), self._storage)
+                await parts.departure.execute(command, caller, self._wall_ms(), self._storage)
             case handover_commands.OfItem():
-                parts.attention.obey(command, caller, now_s)
+                parts.attention.execute(command, caller, now_s)
                 self._actions.attention_changed()
                 return None  # the state has nothing of it
             case commands.Ride():
@@ -233,9 +233,9 @@ class CommandHandler:
             case drive_commands.DescribeIntervention():
                 parts.driving.describe(command, by=by)
             case drive_commands.OfMark():
-                parts.marks.obey(command, by=by, source="http" if caller.page is None else "page")
+                parts.marks.execute(command, by=by, source="http" if caller.page is None else "page")
             case drive_commands.OfSlowing():
-                parts.slow_down.obey(command, by=by)
+                parts.slow_down.execute(command, by=by)
                 self._actions.slow_down_ordered()
             case commands.Position():
                 self._receive_position(command, now_s, by=by)
@@ -265,7 +265,7 @@ class CommandHandler:
 
     def _plan_stop(self, command: drive_commands.PlannedStopCommand, now_s: float, *, by: str) -> None:
         speed_mps, phase = departure_seen.speed_of(self._parts, now_s), self._parts.connection.phase
-        self._parts.planned_stop.obey(command, now_s, by=by, phase=phase, speed_mps=speed_mps)
+        self._parts.planned_stop.execute(command, now_s, by=by, phase=phase, speed_mps=speed_mps)
         self._actions.attention_changed()  # the summary of the car shows it
 
     def _receive_position(self, command: commands.Position, now_s: float, *, by: str) -> None:

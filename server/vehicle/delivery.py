@@ -54,7 +54,7 @@ class _Row:
         """Whether the bridge delivered anything of it on this connection."""
         return self.newest_s is not None or self.was_given
 
-    def heard(self, now_s: float) -> None:
+    def received(self, now_s: float) -> None:
         is_of_these = self.newest_s is not None and self.newest_s >= self.publishers_s
         if self.got:
             self.renewed = self.single = 0
@@ -131,12 +131,12 @@ class Delivery:
                 rows[topic] = row
         self._rows = rows
 
-    def heard(self, topic: str, now_s: float) -> bool:
+    def received(self, topic: str, now_s: float) -> bool:
         """A message; whether it is the first one of a topic that was thought to have no publisher."""
         self._newest_s = now_s
         row = self._rows.get(topic)
         if row is not None:
-            row.heard(now_s)
+            row.received(now_s)
         self.delivered.add(topic)
         if topic in self.unpublished:
             self.unpublished.discard(topic)
@@ -180,10 +180,10 @@ class Delivery:
             for topic, row in self._rows.items()
             if row.is_silent(now_s) and now_s - row.asked_s >= row.again_s()
         ]
-        asked = {topic for _, topic in due}
+        chosen = {topic for _, topic in due}
         for topic in candidates:
             before_s = self._absent_asked_s.get(topic, -math.inf)
-            if topic in self.unpublished and topic not in asked and now_s - before_s >= ABSENT_AGAIN_S:
+            if topic in self.unpublished and topic not in chosen and now_s - before_s >= ABSENT_AGAIN_S:
                 due.append((before_s, topic))
         return [topic for _, topic in sorted(due)[:AT_ONCE]]
 

@@ -33,9 +33,9 @@ class DepartureFile:
                 log.warning("departure list unusable: path=%s why=%s", path, why.reason)
 
     def write(self, items: Iterable[Item] | None) -> Path | None:
-        """Keeps a list, or with None the profile's again; on any thread. Raises OSError.
+        """Store a list, or with None the profile's again; on any thread. Raises OSError.
 
-        A file that cannot be used is set aside first, also one that was changed meanwhile: where it is then.
+        A file that cannot be used now is set aside first; return its new path.
         """
         path, aside = self._path, None
         if path is None:

@@ -19,8 +19,8 @@ from typing import Any
 ANSWERED_WITHIN_S = 0.3  # and a round trip: of what comes later it is not known whether the subscription gave it
 SILENCES = (0, 2, 4)  # before each probe, in times of that; so many answers show that a sample is kept
 SETTLED_AFTER_S = 5.0  # without something new
-QUIET_PERIODS = 5  # a topic that is silent for so long does not go on
-GOES_ON_S = 0.5  # another content that comes so soon after the answers is of a topic that goes on
+QUIET_PERIODS = 5  # a topic that is silent for so long does not continue
+GOES_ON_S = 0.5  # another content that comes so soon after the answers is of a topic that continues
 MOST_HELD, MOST_HELD_BYTES = 500, 8_000_000
 
 
@@ -118,7 +118,7 @@ class Doubtful:
 
     def came_new(self, topic: str, one: Held, is_same: Callable[[Any, Any], bool]) -> tuple[Held, ...]:
         """What is held of a topic and to be recorded, once: something new came of it. Another content, long after the
-        answers, says nothing of those."""
+        answers, is no evidence about those."""
         doubt, held = self._doubts.get(topic), self.settled(topic)
         if doubt is None or not doubt.is_kept:
             return held

@@ -59,7 +59,7 @@ class EventLog:
         return f"The event log fails: {self._why}. Events that wait: {len(self._waiting)}{lost}."
 
     def trouble_of_disk(self) -> str | None:
-        """Why what was logged by now would not survive the end of the server, as a sentence; None: it would."""
+        """Why the events logged so far would not survive the end of the server, as a sentence; None: they would."""
         return self.trouble or self._bus.save_events()
 
     def retry(self) -> None:

@@ -49,7 +49,7 @@ def link_facts(parts: SessionParts, now_s: float, *, wall_ms: int, log_trouble: 
         log_trouble=log_trouble,
         late_s=judgement.transport.late_s(now_s) if connection.phase == "monitoring" else None,
         throttled=topics.table.load.throttled(now_s),
-        reduced=f"{topics.table.load.level.words}." if topics.table.load.step else None,
+        reduced=f"{topics.table.load.level.text}." if topics.table.load.step else None,
         wall_zero_s=wall_ms / 1000 - now_s,
     )
 

@@ -1,5 +1,5 @@
-"""What stands when control is handed over: alarms, shelved ones, limits changed from their default, who rides, who
-drives, the departure check, the slow-down and a pause."""
+"""The lines of the list when control is handed over: alarms, shelved ones, limits changed from their default, who is in
+the car, who drives, the departure check, the slow-down and a pause."""
 
 from __future__ import annotations
 
@@ -100,10 +100,14 @@ def limit_lines(settings: SettingsAnswer) -> list[Line]:
 
 
 def rides_line(people: Sequence[Operator], phone: str | None) -> Line:
-    """Who rides: who is signed on as safety driver with a page of this car, and the phone that is in it."""
+    """Who is in the car: who is signed on as safety driver with a page of this car, and the phone that is in it."""
     names = sorted({one.person.name for one in people if one.person is not None and one.person.role == "safety_driver"})
     where = f"Phone in the car: {phone}." if phone else "No phone is known to be in the car."
-    title = f"{' and '.join(names)} rides, safety driver" if names else "Who rides is not known"
+    title = (
+        f"In the car: {' and '.join(names)}, safety driver{'s' if len(names) > 1 else ''}"
+        if names
+        else "Who is in the car is not known"
+    )
     text = where if names else f"Nobody is signed on as safety driver. {where}"
     return Line(key=_joined("rides", [*names, phone or ""]), kind="rides", title=title, text=text)
 

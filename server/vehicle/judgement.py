@@ -58,7 +58,7 @@ class Judgement:
         self._crashes_logged: set[str] = set()
         self._load = RecentLoad()
         self.monitor = Monitor(checks, tuning.limits)
-        self.rides: str | None = None  # the phone in the car, chosen by the operator in control
+        self.phone_in_car: str | None = None  # the phone in the car, chosen by the operator in control
         self.track_number = 0  # of this run of the server; another number is another track
         self.reset()
 
@@ -68,7 +68,7 @@ class Judgement:
         self.transport = TransportDelay()
         self.frames = Frames()
         self.state = State(expected_rates(self._tuning.limits))
-        self.state.ride(self.rides, self._now())
+        self.state.ride(self.phone_in_car, self._now())
         self.trends = Trends(self._now())
         self.drive_trends = DriveTrends(self._now())
         self.drive_trends.set_limits(self._tuning.limits, self._now())
@@ -82,7 +82,7 @@ class Judgement:
 
     @property
     def load(self) -> AlarmLoad:
-        """The alarms announced lately, of whichever car was monitored: it is one operator who bears them."""
+        """The alarms announced lately, of whichever car was monitored: the load is that of one operator."""
         return self._load.at(self._now())
 
     def add_load(self, transitions: Collection[Transition]) -> None:
@@ -103,8 +103,8 @@ class Judgement:
     def receive_again(
         self, sources: tuple[Source, ...], topic: str, message: Any, note: str | None, now_s: float, *, came_s: float
     ) -> tuple[str, ...]:
-        """Count a message that the bridge sent again, and that came first at `came_s`. It says nothing new to the
-        signals that have it; any other signal takes it at its age."""
+        """Count a message that the bridge sent again, and that came first at `came_s`. It is not new to the signals
+        that have it; any other signal takes it at its age."""
         filled = self._filled.get(topic, ())
         others = tuple(source for source in sources if source not in filled)
         changed = self._apply(others, topic, message, note, now_s, Aged(now_s - came_s)) if others else ()
@@ -163,7 +163,7 @@ class Judgement:
 
     def ride(self, phone: str | None, now_s: float) -> None:
         """From now on this phone is compared with the car, whatever the others report; it is kept over connections."""
-        self.rides = phone
+        self.phone_in_car = phone
         self.state.ride(phone, now_s)
 
     def apply_settings(self) -> None:

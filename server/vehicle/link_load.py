@@ -28,7 +28,7 @@ TRENDS = frozenset(name for name, signal in SIGNALS.items() if signal.optional)
 class Level:
     """The throttling of one step."""
 
-    words: str  # what is not received in full, as a sentence
+    text: str  # what is not received in full, as a sentence
     records_others: bool = False
     scan_ms: int = 0
     trends_ms: int = 0
@@ -36,21 +36,21 @@ class Level:
 
 
 LEVELS = (
-    Level(words="Everything is received", records_others=True),
-    Level(words="Topics that are only recorded are not subscribed"),
+    Level(text="Everything is received", records_others=True),
+    Level(text="Topics that are only recorded are not subscribed"),
     Level(
-        words="Topics that are only recorded are not subscribed, scans and trends are throttled",
+        text="Topics that are only recorded are not subscribed, scans and trends are throttled",
         scan_ms=200,
         trends_ms=500,
     ),
     Level(
-        words="Topics that are only recorded are not subscribed, all signals are throttled",
+        text="Topics that are only recorded are not subscribed, all signals are throttled",
         scan_ms=500,
         trends_ms=500,
         judged_ms=100,
     ),
     Level(
-        words="Topics that are only recorded are not subscribed, all signals are limited to 5 Hz",
+        text="Topics that are only recorded are not subscribed, all signals are limited to 5 Hz",
         scan_ms=500,
         trends_ms=500,
         judged_ms=200,

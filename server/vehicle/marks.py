@@ -26,7 +26,7 @@ MOST = 2000  # marks of one drive, by people
 MOST_OF_CAR = 500  # by the car's own button
 KNOWN = 2 * MOST  # marks that are known by their ids, those of earlier drives and removed ones among them
 OLDEST_MS = 30 * 24 * 3600 * 1000  # a mark that waited longer on a phone has lost its moment
-LATE_MS = 60_000  # the event of a mark that comes so late says so
+LATE_MS = 60_000  # the event of a mark that comes so late names that
 _PORTION = 500
 
 
@@ -43,13 +43,13 @@ class _Moment:
     """When a mark was made, by the session's clock."""
 
     at_s: float
-    said: str
+    note: str
     is_arrival: bool = False  # its own time cannot be
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MarksPlace:
-    """Where what is no part of a recording that is written goes."""
+    """Where what is no part of a recording is stored."""
 
     on_late: Callable[[int], None]  # with the moment [ms since 1970] of a mark that none covers
     on_described: Callable[[int, str], None]  # with that of an intervention that somebody described, and its id
@@ -82,50 +82,50 @@ class Marks:
         self._drive = 1
         self.count = 0  # of this drive
         self._by_car = 0  # of those
-        self._said_by_car: dict[str, None] = {}  # with what words its button marked, whatever became of these marks
+        self._texts_by_car: dict[str, None] = {}  # texts with which its button marked, whatever became of these marks
 
     # -- orders ------------------------------------------------------------------------------------------------------
 
-    def obey(self, command: MarkCommand, *, by: str, source: MarkSource) -> None:
+    def execute(self, command: MarkCommand, *, by: str, source: MarkSource) -> None:
         """Raises Refused."""
         if isinstance(command, RemoveMark):
             self._remove(command.mark, by=by)
             return
-        words = None if command.words is None else clean(command.words, MOST_WORDS).strip()
+        text = None if command.words is None else clean(command.words, MOST_WORDS).strip()
         category = None if command.category is None else clean(command.category, MOST_CATEGORY).strip()
         known = self._known.get(command.mark)
         if known is not None:
             if not known.is_removed:  # what was taken back stays so, though it is sent again
-                self._change(known, command, words=words, category=category, by=by)
+                self._change(known, command, text=text, category=category, by=by)
             return
         if self.count - self._by_car >= MOST:
             raise Refused(f"This drive has {MOST} marks, which is the most there can be: take one back first.")
         found = self._moment(command)
         marked_ms = self._history.placed(found.at_s).ms
         row: DriveMark = {
-            "mark": command.mark, "marked_ms": marked_ms, "category": category or None, "words": words or "",
+            "mark": command.mark, "marked_ms": marked_ms, "category": category or None, "words": text or "",
             "voice": False, "photo": False, "source": source, "by": by,
         }  # fmt: skip
-        self._put(row, "mark", f"Mark{_described(row)}.{found.said}", by=by, moment_s=found.at_s)
+        self._put(row, "mark", f"Mark{_described(row)}.{found.note}", by=by, moment_s=found.at_s)
 
-    def place(self, mark: str, words: str, suffix: str = "") -> None:
+    def place(self, mark: str, text: str, suffix: str = "") -> None:
         """The car's own button."""
         if self._by_car >= MOST_OF_CAR:
             raise Refused(f"This drive has {MOST_OF_CAR} marks of the car, which is the most there can be.")
         row: DriveMark = {
             "mark": mark, "marked_ms": self._wall_ms(), "category": None,
-            "words": _words(words), "voice": False, "photo": False, "source": "car", "by": None,
+            "words": _cleaned(text), "voice": False, "photo": False, "source": "car", "by": None,
         }  # fmt: skip
         moment_s = self._history.look()
         self._put(row, "mark", f"Mark by the car{_described(row)}.{suffix}", by=None, moment_s=moment_s)
-        self._said_by_car[row["words"]] = None
+        self._texts_by_car[row["words"]] = None
 
     def button(self, now_s: float, *, read_s: Callable[[float], float | None]) -> CarMarks:
         """The car's own button; `now_s`: of the clock by which its messages come. `read_s`: as `CarMarks` has it."""
         return CarMarks(
             self.place,
             lambda text: self._note("mark_refused", text),
-            is_known=lambda words: _words(words) in self._said_by_car,
+            is_known=lambda text: _cleaned(text) in self._texts_by_car,
             read_s=read_s,
             now_s=now_s,
         )
@@ -177,23 +177,23 @@ class Marks:
             text = f"A mark was taken back{_described(known.row)}."
             self._put(known.row, "mark_removed", text, by=by, moment_s=known.moment_s)
 
-    def _change(self, known: _Known, command: PlaceMark, *, words: str | None, category: str | None, by: str) -> None:
-        old, moment_s, said = known.row, known.moment_s, ""
+    def _change(self, known: _Known, command: PlaceMark, *, text: str | None, category: str | None, by: str) -> None:
+        old, moment_s, note = known.row, known.moment_s, ""
         marked_ms = old["marked_ms"]
         if command.at_ms is not None and not (found := self._moment(command)).is_arrival:
-            moment_s, said = found.at_s, found.said  # else it is as it was when it came first
+            moment_s, note = found.at_s, found.note  # else it is as it was when it came first
             marked_ms = _kept_ms(marked_ms, self._history.placed(moment_s).ms, least_ms=1)
         new: DriveMark = {
             **old,
             "marked_ms": marked_ms,
-            "words": old["words"] if words is None else words,
+            "words": old["words"] if text is None else text,
             "category": old["category"] if category is None else category or None,
         }
         if new != old:
-            self._put(new, "mark_changed", f"A mark was changed{_described(new)}.{said}", by=by, moment_s=moment_s)
+            self._put(new, "mark_changed", f"A mark was changed{_described(new)}.{note}", by=by, moment_s=moment_s)
 
     def _moment(self, command: PlaceMark) -> _Moment:
-        """The moment that counts, and what has to be said of it."""
+        """The moment that counts, and a note on it."""
         now_s, now_ms, at_ms = self._history.look(), self._wall_ms(), command.at_ms
         if at_ms is None:
             return _Moment(now_s, "")
@@ -253,7 +253,7 @@ class Marks:
                 drive = before.drive if before is not None else self._drive if event["n"] > began else 0
                 self._known[row["mark"]] = _Known(row, drive)
                 if event["change"] == "mark" and row["source"] == "car":
-                    self._said_by_car[row["words"]] = None
+                    self._texts_by_car[row["words"]] = None
         self._count()
 
     def _keep(self, mark: str, known: _Known) -> None:
@@ -296,8 +296,8 @@ def _drive_began(bus: SessionBus, vehicle: str) -> int:
     return 0
 
 
-def _words(said: str) -> str:
-    return clean(said, MOST_WORDS).strip()
+def _cleaned(text: str) -> str:
+    return clean(text, MOST_WORDS).strip()
 
 
 def _described(row: DriveMark) -> str:

@@ -48,8 +48,8 @@ class Outcomes:
             raise
         self.end(message, answer, self._now())
         if message.get("kind") != "position":
-            said = (message.get("kind"), message.get("by"), answer.get("ok"), answer.get("reason", ""))
-            log.info("command kind=%s by=%s ok=%s reason=%s", *said)
+            fields = (message.get("kind"), message.get("by"), answer.get("ok"), answer.get("reason", ""))
+            log.info("command kind=%s by=%s ok=%s reason=%s", *fields)
         return answer
 
     def may_begin(self, message: Mapping[str, Any], now_s: float) -> bool:
@@ -76,7 +76,7 @@ class Outcomes:
             self._put(key, _Known(now_s, "not_known"), now_s)
 
     def ask(self, page: str | None, of: str, ago_s: float, now_s: float) -> Answer:
-        """What became of one that was asked for `ago_s` ago. One that is not known is not carried out from now on."""
+        """What became of one that was requested `ago_s` ago. One that is not known is not carried out from now on."""
         if page is None:
             return {"ok": True, "became": "not_known"}
         known = self._known.get((page, of))

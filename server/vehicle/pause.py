@@ -69,7 +69,7 @@ class CarPlannedStop:
         """None: there is none."""
         return self._stop
 
-    def obey(
+    def execute(
         self,
         command: drive_commands.PlannedStopCommand,
         now_s: float,
@@ -107,7 +107,7 @@ class CarPlannedStop:
     def go_on(self, stop: PlannedStop | None, now_s: float, wall_ms: int) -> None:
         """Restore the one of before a restart. It is logged again and shown."""
         if stop is not None:
-            text = f"The server was restarted and the planned stop goes on: {REASONS[stop.reason]}."
+            text = f"The server was restarted and the planned stop continues: {REASONS[stop.reason]}."
             since_ms = round(wall_ms - (now_s - stop.since_s) * 1000)
             self._event_log.note("planned_stop", text, by=stop.by, reason=stop.reason, since_ms=since_ms)
             self._begin(stop)

@@ -25,7 +25,14 @@ from server.rosbridge import connection_errors
 from server.rosbridge.address import BadAddress
 from server.vehicle.judgement import Judgement
 
-REFUSALS = (commands.NotUnderstood, BadAddress, Refused, BadSetting, Conflict, OSError)  # what `refusal` has words for
+REFUSALS = (
+    commands.NotUnderstood,
+    BadAddress,
+    Refused,
+    BadSetting,
+    Conflict,
+    OSError,
+)  # those for which `refusal` has a text
 
 
 def refusal(why: Exception) -> Answer:

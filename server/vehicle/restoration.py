@@ -59,10 +59,10 @@ class Restoration:
             event_log.settings("The settings differ from the last ones in force, which were lost.", by=None)
         if before.address is not None or before.standing:
             self.held = before
-            event_log.note("restarted", before.words())
+            event_log.note("restarted", before.text())
 
     def of(self, url: str) -> RestoredState | None:
-        """Before a car is dialled: the past of that very car, where the server ended while it was monitored. Its
+        """Before a car is dialled: the state of the same car, where the server ended while it was monitored. Its
         alarms stand again; so do those of another car, which end with its monitoring."""
         if self.held is None:
             return None

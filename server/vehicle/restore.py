@@ -40,7 +40,7 @@ class RestoredState:
     paused_s: float | None = None  # since when its monitoring was paused
     paused_by: str | None = None
     planned_stop: PlannedStop | None = None
-    settings_version: int = 0  # the highest that the log knows
+    settings_version: int = 0  # the highest in the log
     order: Mapping[str, Any] | None = None  # the event of the slow-down that stood when the server ended
     transitions: tuple[Transition, ...] = ()  # of each alarm since it was last at rest, oldest first
     stood: tuple[Mapping[str, Any], ...] = ()  # the newest event of each alarm that was not at rest
@@ -52,7 +52,7 @@ class RestoredState:
         newest = {transition.alarm_id: transition for transition in self.transitions}
         return {name: last for name, last in newest.items() if last.state is not AlarmState.NORMAL}
 
-    def words(self) -> str:
+    def text(self) -> str:
         """The log text after a restart."""
         titles = [last.spec.title for last in self.standing.values()]
         stood = f" Active alarms: {', '.join(titles)}." if titles else " No alarm was active."
@@ -122,7 +122,7 @@ def _is_history(event: Mapping[str, Any]) -> bool:
 
 
 def phone_chosen(bus: SessionBus, vehicle: str) -> str | None:
-    """The phone that rides in the car, as the operator said last."""
+    """The phone in the car, as the operator chose it last."""
     newest = bus.past_events(vehicle, change="ride", limit=1)
     return text_of(newest[0].get("phone")) if newest and not _is_history(newest[0]) else None
 

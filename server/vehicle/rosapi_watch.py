@@ -37,7 +37,7 @@ class RosWatch:
         self._now = now
         self._timed = timed
         self.diagnosis = Diagnosis()
-        self.asks = None if link is None else Questions(link, self.diagnosis, now=now)
+        self.rosapi = None if link is None else Questions(link, self.diagnosis, now=now)
         self.alive: bool | None = None  # None: not known
         self.answered_s: float | None = None
         self.commanded_on: str | None = None  # the topic on which the car is commanded
@@ -48,11 +48,11 @@ class RosWatch:
         if topic != self.commanded_on:
             self.commanded_on, self.publishers = topic, None
 
-    async def ask(self, asks: Questions) -> bool | None:
+    async def ask(self, rosapi: Questions) -> bool | None:
         """Call rosapi; return whether ROS answered. Raises LinkDown."""
-        alive = await discovery.fetch_alive(asks, timed=partial(self._timed, self._now()))
+        alive = await discovery.fetch_alive(rosapi, timed=partial(self._timed, self._now()))
         if self.commanded_on is not None:
-            self.publishers = await discovery.fetch_publishers(asks, self.commanded_on)
+            self.publishers = await discovery.fetch_publishers(rosapi, self.commanded_on)
         return alive
 
     def answered(self, alive: bool | None) -> None:
@@ -68,8 +68,8 @@ class RosWatch:
 
     def end(self) -> None:
         """Whatever is still answered is of no interest any more."""
-        if self.asks is not None:
-            self.asks.stop()
+        if self.rosapi is not None:
+            self.rosapi.stop()
 
 
 class MissingWatch:
@@ -122,7 +122,7 @@ class MissingWatch:
 
     async def look(
         self,
-        asks: Asks,
+        rosapi: Asks,
         candidates: Collection[str],
         *,
         commanded: Collection[str | None],
@@ -133,7 +133,7 @@ class MissingWatch:
         Stops once `is_current()` is false. Raises LinkDown."""
         topics = self.delivery.to_ask(self._now(), candidates)
         answers = await asyncio.gather(
-            *(discovery.fetch_publishers(asks, topic, and_bridge=topic not in commanded) for topic in topics),
+            *(discovery.fetch_publishers(rosapi, topic, and_bridge=topic not in commanded) for topic in topics),
             return_exceptions=True,
         )
         if not is_current():
@@ -157,7 +157,7 @@ class MissingWatch:
             self._named |= set(missing)
             self._noted(f"Topics with a publisher but no messages: {', '.join(news[:MOST_NAMED])}.")
 
-    async def look_behind(self, asks: Asks) -> None:
+    async def look_behind(self, rosapi: Asks) -> None:
         """Fetch whether the bridge subscribed to published signal topics that do not arrive; renew those that another
         client no longer blocks. Raises LinkDown."""
         needed = self._undelivered.needs_clients
@@ -166,9 +166,9 @@ class MissingWatch:
         if self._undelivered.needs_clients != needed:
             self._resubscribe()
         if self._undelivered.needs_clients and not self._undelivered.bridges:
-            nodes = await discovery.fetch_publishers(asks, CLIENT_COUNT, and_bridge=True)
+            nodes = await discovery.fetch_publishers(rosapi, CLIENT_COUNT, and_bridge=True)
             self._undelivered.bridges = frozenset(nodes or ())
         for topic in self._undelivered.to_ask(self._now()):
-            self._undelivered.answered(topic, await discovery.fetch_subscribers(asks, topic), self._now())
+            self._undelivered.answered(topic, await discovery.fetch_subscribers(rosapi, topic), self._now())
         for topic in self._undelivered.to_renew(self._now(), delivery.renewed_s):
             self._renew(topic)

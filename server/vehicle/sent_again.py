@@ -1,4 +1,4 @@
-"""Messages that a bridge sends again after we subscribed anew: a sample that it kept, or one message twice.
+"""Messages that a bridge sends again after another subscription: a sample that it kept, or one message twice.
 
 A real bridge gives the latched sample of a topic to each new subscription, also where its throttle was changed. A
 bridge of ROS 2 sends the first message after a second subscription of one connection twice. Neither is new: it must not
@@ -26,7 +26,7 @@ from server.rosbridge.raw_frame import RawFrame
 
 GIVEN_WITHIN_S = 5.0  # after it has read a subscription, a bridge of ROS 2 needs some time to get the kept sample
 TWICE_WITHIN_S = 0.1  # a message that a bridge sends twice
-EXPECTED_S = 30.0  # a topic that goes on for so long after a subscription has been given what was kept
+EXPECTED_S = 30.0  # a topic that continues for so long after a subscription has been given what was kept
 IN_TIME = 0.25  # a message that comes when its period has passed, give or take so much of it, may be a new one
 PERIOD_WEIGHT = 0.2
 STEADY = 3  # gaps in a row that make a period

@@ -134,7 +134,7 @@ class SessionActions(Protocol):
         """The slow-down and the checks act on an order at once."""
 
     def attention_changed(self) -> None:
-        """Who looks after the car changed: pages of all cars are notified at once."""
+        """The assignment of the car changed: pages of all cars are notified at once."""
 
 
 class SessionObserver(ConnectionObserver, Protocol):

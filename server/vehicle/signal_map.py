@@ -20,7 +20,7 @@ ALL_CAME_S = 2.0  # after the first message: what is slower is no candidate at f
 MOST_TOPICS = 200
 NOTE = "subscribed by name: the bridge has no rosapi"
 
-SEEN_S, SETTLED_S = 1.0, 2.0  # with messages of all candidates, or without, the operator is not asked before
+SEEN_S, SETTLED_S = 1.0, 2.0  # with messages of all candidates, or without, the operator is not prompted before
 
 
 class TopicsByName:
@@ -59,7 +59,7 @@ class TopicsByName:
         return self._first_s is not None and now_s - self._first_s >= ALL_CAME_S
 
     def beside(self, used: Mapping[str, object]) -> dict[str, Source]:
-        """The topics that are not used: what they send is not judged, and was asked for."""
+        """The topics that are not used: they are subscribed to, and what they send is not judged."""
         return {
             topic: Source(signal="", topic=topic, type=kind or None, decode=None, carries=False)
             for topic, kind in self.found.items()
@@ -157,7 +157,7 @@ class SignalMap:
         return by_name.found
 
     def _settle(self, now_s: float) -> bool:
-        """Whether the candidates have shown themselves only now, as far as they will before the operator is asked."""
+        """Whether only now enough is known of the candidates to prompt the operator."""
         was_settled = self._evidence.is_settled
         if not self.watched:
             self._compared_since_s = None

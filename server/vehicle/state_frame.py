@@ -43,7 +43,7 @@ from server.vehicle.restore import RestoredState
 if TYPE_CHECKING:  # a replay shows states too, and has no use for all that dials
     from server.rosbridge.live_source import LiveSource
 
-CAR_SILENT_S = 1.4  # said before 2 s are over
+CAR_SILENT_S = 1.4  # reported before 2 s are over
 OVERDUE_PERIODS = 3
 NO_MESSAGE_S = 5.0
 MOST_SUPPRESSED = 20
@@ -54,7 +54,7 @@ ROS_GONE_S = 2.5  # one unanswered question may be lost; three are a sign
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """What only the session knows; `…_s` without `for` are moments of its monotonic clock."""
+    """What only the session has; `…_s` without `for` are moments of its monotonic clock."""
 
     vehicle: str
     now_s: float

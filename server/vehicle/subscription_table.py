@@ -1,4 +1,4 @@
-"""The subscriptions of one car's link: made of what is mapped and offered, kept at the bridge."""
+"""The subscriptions of one car's link: derived from mapped and offered topics, and kept up at the bridge."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class SubscriptionTable:
         self.transforms: frozenset[str] = frozenset()  # topics that say where the sensors are
         self.needs_moving = self._has_moving = False  # whether those that move may place a sensor: each one counts
         self.judged = 0  # topics that are subscribed to for their signals
-        self.button: car_marks.Asked | None = None  # how the car's button was subscribed to
+        self.button: car_marks.ButtonSubscription | None = None  # how the car's button was subscribed to
 
     @property
     def rows(self) -> tuple[Subscription, ...]:
@@ -63,7 +63,7 @@ class SubscriptionTable:
     def opened(self) -> None:
         """The connection opens, and the link sends its rows."""
         self._by_name_s, self._by_name_pause_s = self._now(), BY_NAME_AGAIN_S
-        self.button = car_marks.Asked(self._now())
+        self.button = car_marks.ButtonSubscription(self._now())
         self.probation.opened(self._now())
 
     def subscribe(
@@ -83,18 +83,18 @@ class SubscriptionTable:
         carrying = {topic: sources for topic, sources in by_topic.items() if any(one.carries for one in sources)}
         beside = {**{topic: (one,) for topic, one in watched.items()}, **by_topic}
         wanted = wanted_topics.judged(
-            carrying, self.load, without=too_large, asked=known.asked, fit=known.fit, compression=compression
+            carrying, self.load, without=too_large, requested=known.requested, fit=known.fit, compression=compression
         )
         wanted |= wanted_topics.compared(
             beside, self.load, undecided=watched, without={*carrying, *too_large}, is_recorded=self.also != "none",
-            asked=known.asked, fit=known.fit, compression=compression,
+            requested=known.requested, fit=known.fit, compression=compression,
         )  # fmt: skip
         self.judged = len(wanted)
         if offered is not None:
             has_button = car_marks.is_button(car_marks.TOPIC, offered.get(car_marks.TOPIC))
             without = {*wanted, *too_large, *([car_marks.TOPIC] if has_button else ())}
             self.recorded = wanted_topics.recorded(
-                offered, self.load, without=without, held=self.probation.held, also=self.also, asked=known.asked
+                offered, self.load, without=without, held=self.probation.held, also=self.also, requested=known.requested
             )
             wanted |= wanted_topics.rows_of(self.recorded, fit=known.fit, compression=compression)
             if has_button:
@@ -205,7 +205,7 @@ class SubscriptionTable:
 
     def given(self, topic: str) -> None:
         """A sample from before came again on a topic."""
-        self.probation.heard(topic)
+        self.probation.received(topic)
         self._delivery.given(topic)
 
     def renew_quiet(self) -> None:
@@ -226,7 +226,7 @@ class SubscriptionTable:
             if row.topic not in wanted:
                 link.unsubscribe(row.topic)
         if wanted.get(car_marks.TOPIC) not in (None, *self.rows):
-            self.button = car_marks.Asked(self._now())
+            self.button = car_marks.ButtonSubscription(self._now())
         for subscription in wanted.values():
             link.subscribe(subscription)
         self._delivery.follow(judged, recorded, now_s=self._now())
@@ -239,7 +239,7 @@ class SubscriptionTable:
 
     def _note_button(self, topic: str, *, is_quiet: bool) -> None:
         if topic == car_marks.TOPIC:
-            self.button = car_marks.Asked(self._now(), is_renewal=is_quiet)
+            self.button = car_marks.ButtonSubscription(self._now(), is_renewal=is_quiet)
 
     def _renew(self, topic: str, *, is_quiet: bool = False) -> None:
         self._note_button(topic, is_quiet=is_quiet)

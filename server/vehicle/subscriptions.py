@@ -70,25 +70,25 @@ class Subscriptions:
 
     async def run(self) -> None:
         """While this connection is open: fetch the car's topics, and check whether ROS is alive."""
-        link, ros, asks = self._link, self.ros, self.ros.asks
+        link, ros, rosapi = self._link, self.ros, self.ros.rosapi
         looked_s = -LOOK_AGAIN_S
         self._missing.opened()
         ros.diagnosis.opened()
         self.table.opened()
-        while link is not None and asks is not None and link is self._link and link.is_open:
+        while link is not None and rosapi is not None and link is self._link and link.is_open:
             try:
                 self._look_soon |= self.signals.is_due(self._now())
                 if self._look_soon or self._now() - looked_s >= (LOOK_AGAIN_S if self.signals.sources else 1.0):
                     looked_s, self._look_soon = self._now(), False
-                    await self._look(link, asks)
-                alive = await ros.ask(asks)
+                    await self._look(link, rosapi)
+                alive = await ros.ask(rosapi)
                 if self.table.tries_another():
                     self._subscribe()
                 if self._offer is not None:
                     found = could_carry(self._offer.topics, self._tuning.settings.topics)
                     commanded = {ros.commanded_on, self.signals.command_topic}
-                    await self._missing.look(asks, found, commanded=commanded, is_current=lambda: link is self._link)
-                await self._missing.look_behind(asks)
+                    await self._missing.look(rosapi, found, commanded=commanded, is_current=lambda: link is self._link)
+                await self._missing.look_behind(rosapi)
             except LinkDown:
                 return
             if link is not self._link:
@@ -165,7 +165,7 @@ class Subscriptions:
                 self._subscribe()
 
     def map_again(self) -> None:
-        """After a change of settings, of what is published or shown, or of what the link bears."""
+        """After a change of settings, of what is published or shown, or of the capacity of the link."""
         if self._offer is not None or self.signals.by_name is not None:
             self._map()
 
@@ -173,8 +173,8 @@ class Subscriptions:
 
     def received(self, topic: str) -> None:
         """A message came on a topic."""
-        self.table.probation.heard(topic)
-        if self._missing.delivery.heard(topic, self._now()):
+        self.table.probation.received(topic)
+        if self._missing.delivery.received(topic, self._now()):
             self._look_soon = True  # it has a publisher now: it may carry a signal
 
     def took(self, topic: str, message: object) -> bool:
@@ -223,8 +223,8 @@ class Subscriptions:
 
     # -- subscribing -------------------------------------------------------------------------------------------------
 
-    async def _look(self, link: LiveSource, asks: Asks) -> None:
-        offer = await discovery.fetch_topics(asks)
+    async def _look(self, link: LiveSource, rosapi: Asks) -> None:
+        offer = await discovery.fetch_topics(rosapi)
         if link is not self._link:
             return
         if offer is None:
@@ -232,7 +232,7 @@ class Subscriptions:
                 self._map()  # no rosapi: try the names we know
                 self.table.renew_by_name()
             else:
-                self._learn(asks, self._offer)  # rosapi may have ended since it named them
+                self._learn(rosapi, self._offer)  # rosapi may have ended since it named them
             return
         self.signals.by_name = None
         self._proved()
@@ -241,11 +241,11 @@ class Subscriptions:
         if self._tuning.recognise(offer.topics, offer.ros):
             self._recognised(self._tuning.profile.title)
         self._map()
-        self._learn(asks, offer)
+        self._learn(rosapi, offer)
 
-    def _learn(self, asks: Asks, offer: discovery.Offer) -> None:
+    def _learn(self, rosapi: Asks, offer: discovery.Offer) -> None:
         if self.table.also != "none":
-            self._definitions.learn(asks, offer.topics, self.ros_version)
+            self._definitions.learn(rosapi, offer.topics, self.ros_version)
 
     def _map(self) -> None:
         """Chooses the topic of each signal and subscribes to them; without rosapi of those of which messages come."""

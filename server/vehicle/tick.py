@@ -148,7 +148,7 @@ class Tick:
         return facts.link_facts(self._parts, now_s, wall_ms=self._wall_ms(), log_trouble=self.log_trouble)
 
     def watch_load(self, now_s: float) -> None:
-        """Over a slow link less is subscribed to before what is judged grows old."""
+        """Over a slow link, reduce the subscriptions before judged signals become stale."""
         topics, transport = self._parts.connection.subscriptions, self._parts.judgement.transport
         if self._parts.connection.phase != "monitoring":
             return
@@ -156,11 +156,11 @@ class Tick:
             late_s = transport.late_s(now_s)
             why = f"The link is slow, {late_s:.1f} s late" if late_s > RESTORE_BELOW_S else "The link is fast enough"
             self._parts.event_log.note(
-                "reduced", f"{why}. {topics.table.load.level.words}.", step=topics.table.load.step
+                "reduced", f"{why}. {topics.table.load.level.text}.", step=topics.table.load.step
             )
 
     def watch_recording(self, now_s: float) -> None:
-        """The recorder learns what the subscriptions know, and the other way round."""
+        """Pass the state of the subscriptions to the recorder, and that of the recorder to the subscriptions."""
         topics, recording = self._parts.connection.subscriptions, self._parts.recording
         recording.ros_version = topics.ros_version
         recording.missing = topics.missing
@@ -189,7 +189,7 @@ class Tick:
             self.summary.put()
 
     def watch_slow_down(self, now_s: float) -> None:
-        """What slows the car learns what the judge knows, and the other way round."""
+        """Pass the facts of the judge to the slow-down, and those of the slow-down to the judge."""
         parts, topics, slow_down = self._parts, self._parts.connection.subscriptions, self._parts.slow_down
         monitor = parts.judgement.monitor
         link, sources = parts.connection.link, topics.signals.sources

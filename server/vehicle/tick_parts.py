@@ -1,4 +1,4 @@
-"""The parts of a tick beside the checks: one that fails is an alarm of its own and keeps no other from its work."""
+"""The parts of a tick beside the checks: one that fails raises an alarm and does not stop the others."""
 
 from __future__ import annotations
 

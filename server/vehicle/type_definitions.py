@@ -47,8 +47,8 @@ LEARN_TRIES = 3  # of rosapi's call for all definitions, which may take it long
 def fit_for_cbor(types: Collection[str], texts: Mapping[str, str], version: RosVersion | None) -> set[str]:
     """Of `types`, as the bridge spells them, those that arrive as CBOR. It parses texts: not for the event loop.
 
-    `texts`: the bridge's definitions by type; where it has none, those of the distribution count. A type nobody knows
-    is not fit; without a version it must fit both.
+    `texts`: the bridge's definitions by type; where it has none, those of the distribution count. A type without
+    a definition is not fit; without a version it must fit both.
     """
     versions: tuple[RosVersion, ...] = (version,) if version is not None else (1, 2)
     return {type for type in types if all(_is_fit(type, texts.get(type), each) for each in versions)}
@@ -100,14 +100,14 @@ class TypeDefinitions:
         self._tries = 0
         self._task: asyncio.Task[None] | None = None
         self._ended = False
-        self.asked: set[str] = set()  # types whose definitions were requested
+        self.requested: set[str] = set()  # types whose definitions were requested
         self.fit: set[str] = set()  # of those, the ones that arrive as CBOR
         self.may_be_large: set[str] = set()  # types that have arrays without a bound
 
-    def learn(self, asks: Asks, topics: Mapping[str, str], ros_version: int | None) -> None:
+    def learn(self, rosapi: Asks, topics: Mapping[str, str], ros_version: int | None) -> None:
         """Start to fetch unknown type definitions of these topics; does nothing while a fetch runs."""
         if self._task is None:
-            self._task = asyncio.create_task(self._ask(asks, topics, ros_version), name="definitions")
+            self._task = asyncio.create_task(self._ask(rosapi, topics, ros_version), name="definitions")
             self._task.add_done_callback(self._done)
 
     def end(self) -> None:
@@ -116,9 +116,9 @@ class TypeDefinitions:
         if self._task is not None:
             self._task.cancel()
 
-    async def _ask(self, asks: Asks, topics: Mapping[str, str], ros_version: int | None) -> None:
+    async def _ask(self, rosapi: Asks, topics: Mapping[str, str], ros_version: int | None) -> None:
         """Definitions come first: what is recorded before they are known is JSON."""
-        types = {kind for kind in topics.values() if kind} - self.asked
+        types = {kind for kind in topics.values() if kind} - self.requested
         if self._tries < LEARN_TRIES:
             types |= self._unanswered
         if not types:
@@ -126,7 +126,7 @@ class TypeDefinitions:
         ros: RosVersion | None = 1 if ros_version == 1 else 2 if ros_version == 2 else None
         found: dict[str, str] = {}
         try:
-            found = await discovery.fetch_definitions(asks, types, ros)
+            found = await discovery.fetch_definitions(rosapi, types, ros)
         except LinkDown:
             return
         except CallFailed as why:
@@ -138,7 +138,7 @@ class TypeDefinitions:
             self._unanswered.clear()
         fit = await asyncio.to_thread(fit_for_cbor, types, found, ros)
         if not self._ended:
-            self.asked |= types
+            self.requested |= types
             self.fit |= fit
             self.may_be_large |= {kind for kind in types if kind not in found or "[]" in found[kind]}
             if found:

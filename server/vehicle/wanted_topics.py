@@ -1,4 +1,5 @@
-"""Which topics are to be subscribed to, and how: by what is offered and judged, and by what link and bridge bear. Pure.
+"""Which topics are to be subscribed to, and how: by what is offered and judged, and by what link and bridge can carry.
+Pure.
 
 A ROS 2 bridge does nothing else while it encodes a message. One of 40 MB delays all others by a second or more, or the
 bridge answers no ping and the link is closed. Such a topic must cost neither the judged signals nor the recording of
@@ -134,8 +135,8 @@ class Probation:
         """Whether one of them is subscribed to now, to see what it does."""
         return self._tried is not None
 
-    def heard(self, topic: str) -> None:
-        """A message of it came: it is not this one."""
+    def received(self, topic: str) -> None:
+        """A message of it arrived: it is not the cause."""
         if self._waiting.pop(topic, None) is not None and topic == self._tried:
             self._tried = None
 
@@ -169,17 +170,17 @@ def judged(
     load: LinkLoad,
     *,
     without: Collection[str],
-    asked: Collection[str],
+    requested: Collection[str],
     fit: Collection[str],
     compression: Compression,
 ) -> dict[str, Subscription]:
-    """The subscriptions of the signals. `asked`: types whose definitions are known; `fit`: those fit for CBOR."""
+    """The subscriptions of the signals. `requested`: types with a requested definition; `fit`: those fit for CBOR."""
     wanted: dict[str, Subscription] = {}
     for topic, sources in by_topic.items():
         rows = [BY_SIGNAL[source.signal] for source in sources if source.decode is not None]
         if rows and topic not in without:
             kind = sources[0].type
-            is_fit = rows[0].compression == "cbor" and (kind not in asked or kind in fit)
+            is_fit = rows[0].compression == "cbor" and (kind not in requested or kind in fit)
             wanted[topic] = Subscription(
                 topic=topic,
                 type=kind,
@@ -197,7 +198,7 @@ def compared(
     undecided: Collection[str],
     without: Collection[str],
     is_recorded: bool,
-    asked: Collection[str],
+    requested: Collection[str],
     fit: Collection[str],
     compression: Compression,
 ) -> dict[str, Subscription]:
@@ -206,7 +207,7 @@ def compared(
     `undecided`: those that may carry one, of which each message counts, but for lasers; `is_recorded`: all topics are
     recorded, so that none is thinned out for it.
     """
-    found = judged(by_topic, load, without=without, asked=asked, fit=fit, compression=compression)
+    found = judged(by_topic, load, without=without, requested=requested, fit=fit, compression=compression)
     for topic, row in found.items():
         if is_recorded and load.level.records_others:
             queue_length = 1 if load.step else recorded_topics.QUEUE_LENGTH
@@ -225,10 +226,10 @@ def recorded(
     without: Collection[str],
     held: Collection[str],
     also: Also,
-    asked: Collection[str],
+    requested: Collection[str],
 ) -> Recorded:
     """What is to be recorded beside; none over a link that is too slow for it. `held`: they silence the bridge."""
-    found, left_out = recorded_topics.choose(offered, without=without, also=also, asked=asked)
+    found, left_out = recorded_topics.choose(offered, without=without, also=also, requested=requested)
     left_out = tuple(sorted({*left_out, *(topic for topic in found if topic in held)}))
     others = {topic: kind for topic, kind in found.items() if topic not in held}
     if not load.level.records_others:

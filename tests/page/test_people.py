@@ -115,7 +115,7 @@ async def test_people_sign_on_act_and_hand_over(browser: Browser, car: Process, 
 
         await one.order(ann, "Hand over to M. R. (iPhone)")
         sheet = ben.page.locator("#sheet-handover")
-        await expect(sheet).to_contain_text("M. R. rides, safety driver")
+        await expect(sheet).to_contain_text("In the car: M. R., safety driver")
         await ann.page.locator(".snack.note").get_by_role("button", name="Show").tap()
         await expect(ann.page.locator("#sheet-handover")).to_contain_text("0 of")
         await no_barrier(ben.page, "hand over", "#sheet-handover")

@@ -43,14 +43,14 @@ class Client:
     async def publish(self, topic: str, message: dict[str, Any]) -> None:
         await self._send({"op": "publish", "topic": topic, "msg": message})
 
-    async def hear(self, ears: dict[str, Callable[[dict[str, Any]], Any]]) -> None:
+    async def subscribe(self, handlers: dict[str, Callable[[dict[str, Any]], Any]]) -> None:
         """Until it is cancelled."""
-        for topic in ears:
+        for topic in handlers:
             await self._send({"op": "subscribe", "topic": topic, "type": TYPES[topic]})
         async for text in self._socket:
-            said = json.loads(text)
-            if said.get("op") == "publish":
-                ears[said["topic"]](said["msg"])
+            message = json.loads(text)
+            if message.get("op") == "publish":
+                handlers[message["topic"]](message["msg"])
 
     async def _send(self, message: dict[str, Any]) -> None:
         await self._socket.send(json.dumps(message))
@@ -92,12 +92,12 @@ async def run_guard(port: int, guard: Guard) -> None:
 
         async def speak() -> None:
             while True:
-                said = await waiting.get()
-                if said is not None:
-                    await bridge.publish(CMD_VEL, twist(said.speed_mps, said.angle_rad))
+                newest = await waiting.get()
+                if newest is not None:
+                    await bridge.publish(CMD_VEL, twist(newest.speed_mps, newest.angle_rad))
 
         async with task(tick()), task(speak()):
-            await bridge.hear(
+            await bridge.subscribe(
                 {
                     CONTROLLER: lambda message: waiting.put_nowait(guard.controller(*command(message))),
                     OPERATOR: lambda message: waiting.put_nowait(guard.operator(*command(message))),

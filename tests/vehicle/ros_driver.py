@@ -5,7 +5,7 @@
 Reads one JSON object a line and takes over its fields; publishes what they say every 50 ms; writes a line for each
 command and each state that the guard publishes. Moments are of the machine's monotonic clock [s].
 
-controller, operator: [m/s, rad] or null. speed: m/s, "obeys" (the car does what it was commanded) or null.
+controller, operator: [m/s, rad] or null. speed: m/s, "follows" (the car does what it was commanded) or null.
 heartbeat: true counts on, 5 times a second. Once only, when they come: release and beat, a number each.
 """
 
@@ -131,7 +131,7 @@ def main():
                 publish("ocu_guard/heartbeat", count)
             speed = wanted["speed"]
             if speed is not None:
-                publish("vel", (commanded_mps[0] if speed == "obeys" else speed, 0.0))
+                publish("vel", (commanded_mps[0] if speed == "follows" else speed, 0.0))
             for topic, name in (("cmd_vel_controller", "controller"), ("ocu_guard/cmd_vel", "operator")):
                 if wanted[name] is not None:
                     publish(topic, wanted[name])

@@ -121,7 +121,7 @@ class Car:
             return [ROS1_PYTHON, str(GUARD / "scripts" / "ocu_guard_node"), *renamed, *given]
         given = [f"{name}:={value}" for name, value in parameters.items()]
         start = [str(ros2_environment.PYTHON), "-c", "from ocu_guard.ros2 import main; main()", "--ros-args"]
-        return [*start, *(word for one in renamed for word in ("-r", one)), *(w for one in given for w in ("-p", one))]
+        return [*start, *(part for one in renamed for part in ("-r", one)), *(w for one in given for w in ("-p", one))]
 
     def run(self, command: list[str], vehicle: str, guard: str) -> None:
         """Starts the guard by that command; returns when the driver's topics reach it. `vehicle`, `guard`: the

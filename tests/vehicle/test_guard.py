@@ -16,7 +16,7 @@ DRIVING = Command(8.0, 0.1)
 
 
 class Drive:
-    """A guard with its clock; controller, heart and measured speed go on as long as they are told to."""
+    """A guard with its clock; controller, heart and measured speed continue as long as they are set to."""
 
     def __init__(self, guard: Guard | None = None, speed_mps: float = 8.0) -> None:
         self.guard = guard or Guard()
@@ -43,7 +43,7 @@ class Drive:
     def note(self, command: Command | None) -> None:
         if command is not None:
             self.out.append((self.now_s, command))
-            self.speed_mps = command.speed_mps  # the car obeys
+            self.speed_mps = command.speed_mps  # the car follows the command
 
     @property
     def state(self) -> str:
@@ -185,7 +185,7 @@ def test_a_car_that_rolls_backwards_is_slowed_to_zero_too() -> None:
     assert drive.out[-1][1].speed_mps == 0.0
 
 
-def test_where_no_speed_is_measured_the_ramp_begins_at_what_the_car_was_told() -> None:
+def test_where_no_speed_is_measured_the_ramp_begins_at_the_last_command() -> None:
     guard = Guard()
     guard.heartbeat(0.0, 1)
     assert guard.controller(0.1, 5.0, 0.2) == Command(5.0, 0.2)
@@ -220,7 +220,7 @@ def test_a_time_that_guards_nothing_is_refused(seconds: float) -> None:
 
 
 def test_the_clock_of_a_machine_that_slept_makes_no_leap_up() -> None:
-    """After an hour in one step the car is held at zero, whatever is said next."""
+    """After an hour in one step the car is held at zero, whatever is sent next."""
     drive = Drive()
     drive.go(1.0)
     drive.now_s += 3600.0
@@ -231,7 +231,7 @@ def test_the_clock_of_a_machine_that_slept_makes_no_leap_up() -> None:
 
 
 class Life(RuleBasedStateMachine):
-    """Whatever comes, in whatever order: a held car is told ever less, no NaN goes out, and only a release lets go."""
+    """Whatever the input, the speed of a held car never rises, no NaN is sent, and only a release ends the hold."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -298,10 +298,10 @@ class Life(RuleBasedStateMachine):
         if self.was_held and not self.released:
             assert held
         if held:
-            said = self.guard.tick(self.now_s)
-            assert said is not None
-            assert abs(said.speed_mps) <= self.limit_mps + 1e-9
-            self.limit_mps = abs(said.speed_mps)
+            command = self.guard.tick(self.now_s)
+            assert command is not None
+            assert abs(command.speed_mps) <= self.limit_mps + 1e-9
+            self.limit_mps = abs(command.speed_mps)
         else:
             self.limit_mps = math.inf
         self.was_held, self.released = held, False

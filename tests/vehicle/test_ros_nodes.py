@@ -20,7 +20,7 @@ from tests.vehicle.ros_nodes import Car
 
 pytestmark = [pytest.mark.slow, pytest.mark.world(n=2), pytest.mark.timeout(120), pytest.mark.field]
 FAST_MPS2 = 4.6  # so that the tests need not wait long for standstill
-DRIVING = {"controller": [3.0, 0.1], "speed": "obeys"}
+DRIVING = {"controller": [3.0, 0.1], "speed": "follows"}
 
 
 @pytest.fixture(scope="module", params=[1, 2], ids=["ros1", "ros2"])
@@ -134,7 +134,7 @@ def test_a_killed_node_starts_again_and_takes_no_command_from_before(car: Car) -
     car.until_state("slowing")
 
 
-def test_the_node_ends_when_it_is_asked_to_and_without_a_traceback(car: Car) -> None:
+def test_the_node_ends_on_request_and_without_a_traceback(car: Car) -> None:
     for by in (signal.SIGTERM, signal.SIGINT):
         car.start()
         assert car.guard is not None

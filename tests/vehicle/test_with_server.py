@@ -59,7 +59,7 @@ async def test_the_guard_slows_the_car_when_the_server_dies_and_not_when_monitor
                 await car.until(lambda _: car.speed_mps > 1.0)
 
 
-async def test_without_a_guard_the_page_is_told_so() -> None:
+async def test_without_a_guard_the_page_is_informed() -> None:
     async with simulated() as (service, address), watching(service, address) as car:
         state = await car.until(lambda s: s["decelerate"]["state"] == "not_armed")
         assert state["decelerate"]["guard"] is None

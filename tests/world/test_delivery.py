@@ -31,7 +31,7 @@ def drive(
     while (now_s := start_s + step * 0.1) <= start_s + seconds:
         for topic, period_s in flows.items():
             if step % max(1, round(period_s / 0.1)) == 0:
-                delivery.heard(topic, now_s)
+                delivery.received(topic, now_s)
         if step % 10 == 0:
             for topic in delivery.to_ask(now_s, candidates):
                 asked.append((now_s, topic))
@@ -53,7 +53,7 @@ def test_a_published_topic_of_which_nothing_comes_is_subscribed_to_anew_and_then
     assert delivery.not_received(5.0) == {}  # it has its time as JSON
     drive(delivery, {"/imu": ("/car",)}, flows={"/vel": 0.1}, seconds=5.0, start_s=5.1)
     assert delivery.not_received(10.1) == {"/imu": ("/car",)}
-    delivery.heard("/imu", 10.2)
+    delivery.received("/imu", 10.2)
     assert delivery.not_received(10.2) == {}
 
 
@@ -80,7 +80,7 @@ def test_a_slow_topic_that_comes_in_time_is_never_renewed_again() -> None:
     """A latched topic says one thing and is silent for the rest of the drive."""
     delivery = Delivery()
     delivery.follow(["/vel"], ["/map"], 0.0)
-    delivery.heard("/map", 0.2)
+    delivery.received("/map", 0.2)
     asked, renewed = drive(delivery, {"/map": ("/car",)}, flows={"/vel": 0.1}, seconds=600.0)
     assert asked == renewed == []
 
@@ -145,9 +145,9 @@ def test_a_slow_topic_that_starts_with_one_message_is_soon_left_alone_and_nobody
     renewed = []
     for step in range(6000):
         now_s = step / 10
-        delivery.heard("/vel", now_s)
+        delivery.received("/vel", now_s)
         if step % 200 == 30:
-            delivery.heard("/fuel", now_s)
+            delivery.received("/fuel", now_s)
         for topic in delivery.to_ask(now_s):
             if delivery.answered(topic, ("/car",), now_s):
                 renewed.append(now_s)
@@ -168,10 +168,10 @@ def test_a_topic_that_is_slow_is_never_said_to_give_one_message_a_subscription(p
         due_s = chance.uniform(0.0, 7.0)
         for step in range(1200):
             now_s = step / 5
-            delivery.heard("/vel", now_s)
+            delivery.received("/vel", now_s)
             if now_s >= due_s:
                 due_s = now_s + chance.uniform(*periods_s)
-                delivery.heard("/fuel", now_s)
+                delivery.received("/fuel", now_s)
             for topic in delivery.to_ask(now_s):
                 delivery.answered(topic, ("/car",), now_s)
             assert delivery.came_once(now_s) == [], (seed, now_s)
@@ -192,9 +192,9 @@ def test_one_message_a_subscription_is_noticed_within_half_a_minute(given_after_
     back_s = subscribed_s
     for step in range(300):
         now_s = back_s + step / 5
-        delivery.heard("/vel", now_s)
+        delivery.received("/vel", now_s)
         if 0.0 <= now_s - subscribed_s - given_after_s < 0.19:
-            delivery.heard("/fuel", now_s)
+            delivery.received("/fuel", now_s)
         for topic in delivery.to_ask(now_s):
             if delivery.answered(topic, ("/car",), now_s):
                 subscribed_s = now_s
@@ -301,6 +301,6 @@ def test_a_topic_whose_name_is_not_sent_to_a_bridge_is_named_as_left_out() -> No
         "/wrong": "no type",
         "/a b": "std_msgs/String",
     }
-    others, left_out = choose(offered, without=(), also="all", asked={*offered.values()})
+    others, left_out = choose(offered, without=(), also="all", requested={*offered.values()})
     assert set(others) == {"/good"}
     assert left_out == ("/a b", "/wrong", "relative")

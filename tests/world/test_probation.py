@@ -62,7 +62,7 @@ def test_a_lost_radio_holds_them_back_for_a_while_and_leaves_none() -> None:
     assert not one.look(10.0 + STEADY_S - 0.1)
     assert one.look(10.0 + STEADY_S)
     assert one.held == {"/b"}
-    one.heard("/b")  # it cannot be this one
+    one.received("/b")  # it is not the cause
     assert one.look(10.0 + 2 * STEADY_S) is False
     assert one.held == set()
 
@@ -79,7 +79,7 @@ def test_one_that_makes_all_others_late_is_found_and_left_and_the_others_are_rec
     """A ROS 2 bridge that encodes 40 MB each second sends everything else a second late, and answers each ping."""
     clock = [0.0]
     definitions, delivery = TypeDefinitions(lambda _: None, lambda: None), Delivery()
-    definitions.asked = definitions.may_be_large = {"std_msgs/msg/UInt8MultiArray"}
+    definitions.requested = definitions.may_be_large = {"std_msgs/msg/UInt8MultiArray"}
     table = SubscriptionTable(None, definitions, delivery, now=lambda: clock[0])
     table.also = "all"
     offered = {f"/{name}": "std_msgs/msg/UInt8MultiArray" for name in ("a", "cloud", "z")}
@@ -95,8 +95,8 @@ def test_one_that_makes_all_others_late_is_found_and_left_and_the_others_are_rec
         clock[0] = tick / 10
         if "/a" in table.recorded.topics:
             recorded_s += 0.1
-            delivery.heard("/a", clock[0])
-            delivery.heard("/z", clock[0])
+            delivery.received("/a", clock[0])
+            delivery.received("/z", clock[0])
         changed, now_left = table.look_at_load(1.1 if "/cloud" in table.recorded.topics else 0.05, 0.0)
         left += now_left
         if changed or table.tries_another():

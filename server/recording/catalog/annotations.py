@@ -29,7 +29,7 @@ MAX_TAG = 40
 MAX_TAGS = 20
 MAX_MARKS = 2500  # of people and of the car in one drive
 _LETTER = 4  # bytes of UTF-8; what JSON writes longer is cleaned away
-_ROW = 512  # bytes of a mark or a description besides its words: names, numbers, ids, blanks
+_ROW = 512  # bytes of a mark or a description besides its texts: names, numbers, ids, blanks
 # Of the file: all that may be written fits, and a larger one is not ours.
 MAX_BYTES = (
     _LETTER * (MAX_TITLE + MAX_WEATHER + MAX_NOTE + MAX_TAGS * (MAX_TAG + 4) + 100)
@@ -37,7 +37,7 @@ MAX_BYTES = (
     + descriptions.MOST
     * (_ROW + _LETTER * (descriptions.MOST_WORDS + descriptions.MOST_CATEGORY + descriptions.MOST_NAME))
 )
-CHANGING = threading.RLock()  # marks and words come from different threads
+CHANGING = threading.RLock()  # marks and descriptions come from different threads
 # Letters that turn the direction of what follows, that hide, or that end a line in one program and not in another.
 _UNSEEN = frozenset("\u200b\u200e\u200f\u061c\ufeff\u2028\u2029\u00ad")
 _TURNING = range(0x202A, 0x202F), range(0x2066, 0x206A)
@@ -46,7 +46,7 @@ log = logging.getLogger("catgraph.recording")
 
 
 class BadAnnotation(ValueError):
-    """What was said cannot be kept; the text is one sentence for a person, `field` is what it is about."""
+    """An annotation that cannot be kept; the text is one sentence for a person, `field` names the field."""
 
     def __init__(self, field: str, sentence: str) -> None:
         super().__init__(sentence)
@@ -126,8 +126,8 @@ def ids_of(listed: object) -> tuple[str, ...]:
 
 
 def write(recording: Path, annotations: Annotations) -> Annotations:
-    """Write title, note and tags atomically, and answer them with the late words that are there; without any the file
-    is deleted. Raises OSError."""
+    """Write title, note and tags atomically, and return them with the late entries that are there; without any the
+    file is deleted. Raises OSError."""
     with CHANGING:
         there = read(recording)
         new = replace(annotations, marks=there.marks, removed=there.removed, described=there.described)
@@ -142,21 +142,21 @@ def write_marks(recording: Path, marks: Sequence[DriveMark], removed: Sequence[s
 
 
 def write_described(recording: Path, described: Sequence[InterventionDescription]) -> bool:
-    """As `write_marks`, of what was said of interventions. Raises OSError."""
-    what = "words on interventions"
+    """As `write_marks`, of descriptions of interventions. Raises OSError."""
+    what = "descriptions of interventions"
     kept = _newest(recording, described, descriptions.MOST, what, lambda row: row["described_ms"])
     return _change(recording, described=kept)
 
 
 def _newest(
-    recording: Path, said: Sequence[T], most: int, what: str, at_ms: Callable[[T], int] | None = None
+    recording: Path, entries: Sequence[T], most: int, what: str, at_ms: Callable[[T], int] | None = None
 ) -> tuple[T, ...]:
     """As many as are kept, in their order; without a moment the last ones."""
-    if len(said) <= most:
-        return tuple(said)
-    log.warning("beside %s: %d %s, of which the newest %d are kept", recording.name, len(said), what, most)
-    kept = range(len(said)) if at_ms is None else sorted(range(len(said)), key=lambda n: at_ms(said[n]))
-    return tuple(said[n] for n in sorted(kept[-most:]))
+    if len(entries) <= most:
+        return tuple(entries)
+    log.warning("beside %s: %d %s, of which the newest %d are kept", recording.name, len(entries), what, most)
+    kept = range(len(entries)) if at_ms is None else sorted(range(len(entries)), key=lambda n: at_ms(entries[n]))
+    return tuple(entries[n] for n in sorted(kept[-most:]))
 
 
 def _change(recording: Path, **late: Any) -> bool:
@@ -174,10 +174,10 @@ def _write(recording: Path, annotations: Annotations) -> None:
     if annotations == NONE:
         path.unlink(missing_ok=True)
         return
-    said = {name: value for name, value in asdict(annotations).items() if value or name not in LATE}
-    body = orjson.dumps(said, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+    fields = {name: value for name, value in asdict(annotations).items() if value or name not in LATE}
+    body = orjson.dumps(fields, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
     if len(body) > MAX_BYTES:
-        sentence = f"{len(body)} bytes of words are more than the {MAX_BYTES} that are kept beside a recording"
+        sentence = f"{len(body)} bytes of annotations are more than the {MAX_BYTES} that are kept beside a recording"
         raise OSError(errno.EFBIG, sentence, str(path))
     if path.exists() and not _is_ours(path):  # somebody else's: it is not lost
         path.rename(next(name for name in _others(path) if not name.exists()))
@@ -214,14 +214,14 @@ def _tags(tags: Sequence[str]) -> tuple[str, ...]:
     return found
 
 
-def _fitting(field: str, what: str, words: str, most: int) -> str:
-    if len(words) > most:
-        raise BadAnnotation(field, f"{what} has at most {most} letters; this has {len(words)}.")
-    return words
+def _fitting(field: str, what: str, value: str, most: int) -> str:
+    if len(value) > most:
+        raise BadAnnotation(field, f"{what} has at most {most} letters; this has {len(value)}.")
+    return value
 
 
 def _unique(tags: Sequence[str]) -> tuple[str, ...]:
-    """Without empty ones, and each once, however its letters are written."""
+    """Without empty ones, and each once in any case of its letters."""
     found: dict[str, str] = {}
     for tag in tags:
         if tag:
@@ -229,16 +229,16 @@ def _unique(tags: Sequence[str]) -> tuple[str, ...]:
     return tuple(found.values())
 
 
-def line(words: Any) -> str:
+def line(value: Any) -> str:
     """One line of printable characters, because a title must not change the text beside it."""
-    return " ".join("".join(map(_seen, words)).split()) if isinstance(words, str) else ""
+    return " ".join("".join(map(_seen, value)).split()) if isinstance(value, str) else ""
 
 
-def text(words: Any) -> str:
+def text(value: Any) -> str:
     """In lines, else the same."""
-    if not isinstance(words, str):
+    if not isinstance(value, str):
         return ""
-    lines = words.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = value.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     return "\n".join("".join(map(_seen, line_)).rstrip() for line_ in lines).strip()
 
 

@@ -34,7 +34,7 @@ from server.recording.folder import first_part, part_number
 MOST_IN_LOGBOOK = 20_000  # recordings
 AROUND_MS = 7 * 86_400_000  # no drive takes longer
 
-MAX_LATE = 200  # late marks of a recording that is asked for alone
+MAX_LATE = 200  # late marks of a recording that is requested alone
 
 
 class Catalog:
@@ -81,7 +81,7 @@ class Catalog:
         self._survey.look_again()
 
     def walk(self) -> None:
-        """Lists what is in the folder: new files, changed ones, and no more those that are gone."""
+        """List what is in the folder: new and changed files; remove those that no longer exist."""
         self._listing.walk()
 
     def rebuild(self) -> None:
@@ -146,8 +146,8 @@ class Catalog:
         if body is None or entry is None:
             return None
         whole = zlib.decompress(body)
-        said = entry.annotations
-        return orjson.dumps(with_marks(orjson.loads(whole), entry.marks)) if said.marks or said.removed else whole
+        beside = entry.annotations
+        return orjson.dumps(with_marks(orjson.loads(whole), entry.marks)) if beside.marks or beside.removed else whole
 
     def drives(self, which: Which) -> list[LogbookDrive]:
         """The drives for the logbook, oldest first; those that are yet to be read are not among them."""

@@ -113,7 +113,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def why_not_one_file(path: Path) -> str | None:
-    """What a recording is of which no single file is a copy, as words behind "it is"; None: its file is all of it."""
+    """What a recording is if no single file is a copy of it, as text behind "it is"; None: its file is all of it."""
     if path.is_dir():
         return SEVERAL
     with contextlib.suppress(FileNotFoundError):

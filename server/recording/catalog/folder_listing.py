@@ -49,7 +49,7 @@ class FolderListing:
         return entry
 
     def walk(self) -> None:
-        """Lists what is in the folder: new files, changed ones, and no more those that are gone."""
+        """List what is in the folder: new and changed files; remove those that no longer exist."""
         known = {entry.path: entry for entry in self._entries.select("", [])}
         seen: set[str] = set()
         changed: list[Entry] = []
@@ -83,7 +83,7 @@ class FolderListing:
             self._shape = shape
 
     def look(self, path: Path, known: Entry | None) -> Entry | None:
-        """What can be said of a file without reading it, and what is known of it if it is still the same."""
+        """What is known of a file without reading it, and what was read of it if it is still the same."""
         try:
             stats = [file.stat() for file in files_of(path)]
         except OSError:

@@ -1,4 +1,4 @@
-"""Recordings as a page gets them: one row each, newest first, so many at a time."""
+"""Recordings as a page gets them: one row each, newest first, a page at a time."""
 
 from __future__ import annotations
 

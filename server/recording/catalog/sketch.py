@@ -117,12 +117,12 @@ def _rounded(point: Points) -> tuple[float, float]:
 _MARKS = {"critical": ("M0-5l5 5-5 5-5-5z", "#c80a1c"), "warning": ("M0-6.5l6 10.5h-12z", "#ffb420")}
 
 
-def svg(drawn: Sketch | None, words: str) -> str:
+def svg(drawn: Sketch | None, title: str) -> str:
     """A stand-alone SVG in the current text colour, for any theme.
 
-    `words` is the text alternative, without markup. None: an empty square with the reason.
+    `title` is the text alternative, without markup. None: an empty square with the reason.
     """
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 64" role="img"><title>{words}</title>'
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 64" role="img"><title>{title}</title>'
     if drawn is None:
         return (
             f'{head}<g fill="currentColor" font-family="sans-serif" font-size="11" text-anchor="middle">'

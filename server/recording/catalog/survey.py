@@ -86,7 +86,7 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
     started_ms = _whole(metadata.get("started_ms"))
     if started_ms is None or "clip_of" in metadata:  # a clip can have been requested from before its drive started
         started_ms = round(recording.start_s * 1000)
-    damage = [_sentence(words, path) for words in (*recording.damage, *broke_off)]
+    damage = [_sentence(text, path) for text in (*recording.damage, *broke_off)]
     return {
         "vehicle": _text(metadata.get("vehicle")),
         "session": _text(metadata.get("session")),
@@ -225,10 +225,10 @@ def _whole(value: object) -> int | None:
     return number if number is not None and 0 < number < 2**53 else None
 
 
-def _sentence(words: str, path: Path) -> str:
+def _sentence(text: str, path: Path) -> str:
     """As a person reads it: the file's name, not where this server keeps it."""
-    said = line(words.replace(str(path), path.name))[:400]
-    return said if said.endswith(".") else f"{said}."
+    sentence = line(text.replace(str(path), path.name))[:400]
+    return sentence if sentence.endswith(".") else f"{sentence}."
 
 
 def _digest(path: Path) -> str:

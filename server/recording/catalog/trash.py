@@ -1,6 +1,6 @@
 """Deletes recordings, takes them back and destroys them: files and entries together.
 
-A recording is moved with what people said of it, so that a kill at any moment parts them not.
+A recording is moved with its annotations; a kill at any moment does not separate them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def move(source: Path, target: Path) -> bool:
     """
     with annotation_store.CHANGING:  # else what is written meanwhile would stay behind
         media, media_there = annotation_store.media_beside(source), annotation_store.media_beside(target)
-        said, there = annotation_store.beside(source), annotation_store.beside(target)
+        annotations, there = annotation_store.beside(source), annotation_store.beside(target)
         files = moves(source, target)
         if not files:
             return False
@@ -43,7 +43,7 @@ def move(source: Path, target: Path) -> bool:
             for old in logs_of(target):
                 old.unlink(missing_ok=True)
             with contextlib.suppress(FileNotFoundError):
-                shutil.copyfile(said, there)
+                shutil.copyfile(annotations, there)
             remove_folder(media_there)
             if media.is_dir():
                 shutil.copytree(media, media_there, copy_function=_link)
@@ -62,7 +62,7 @@ def move(source: Path, target: Path) -> bool:
             with contextlib.suppress(OSError):
                 remove_folder(media_there)
             raise
-        for file in (*(file for file, _ in brought), said):
+        for file in (*(file for file, _ in brought), annotations):
             with contextlib.suppress(OSError):
                 file.unlink()
         with contextlib.suppress(OSError):
@@ -126,7 +126,7 @@ class Trash:
                 raise Refused("It is being recorded now: stop recording first.")
             entry = self._listing.need(id)
             now_ms = max(self._wall_ms(), 1)
-            while (self._folder / TRASH / str(now_ms)).exists():  # what was deleted lies alone: see discovery
+            while (self._folder / TRASH / str(now_ms)).exists():  # a folder for each: see discovery
                 now_ms += 1
             moved = replace(entry, path=f"{TRASH}/{now_ms}/{entry.path}", trashed_ms=now_ms)
             self._move(entry, moved)

@@ -73,8 +73,8 @@ def alarms_of(events: Sequence[Event]) -> list[AlarmInDrive]:
 
 
 def marks_of(alarm: Mapping[str, Any]) -> str:
-    """What an alarm of a report bears beside its text; empty: nothing."""
-    return " · ".join(words for name, words in MARKS.items() if alarm[name])
+    """The marks of an alarm of a report, beside its text; empty: none."""
+    return " · ".join(text for name, text in MARKS.items() if alarm[name])
 
 
 def percentile(values: Sequence[float], share: float) -> float | None:

@@ -12,7 +12,7 @@ DAY_MS = 86_400_000
 
 
 def checks_of(drives: Sequence[LogbookDrive], now_ms: int) -> list[LogbookCheck]:
-    """One for each car, by name. `drives`: all of them, oldest first, whatever else was asked for."""
+    """One for each car, by name. `drives`: all of them, oldest first, whatever else was requested."""
     by_vehicle: dict[str, list[LogbookDrive]] = {}
     for drive in drives:
         by_vehicle.setdefault(drive["vehicle"], []).append(drive)

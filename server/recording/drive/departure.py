@@ -45,7 +45,7 @@ class Departure:
 
 
 def departure_of(events: Sequence[Event]) -> Departure:
-    """What the log says of it; items of an earlier check do not count for a later one."""
+    """The departure check by the log; items of an earlier check do not count for a later one."""
     check: object = None
     items: dict[str, DepartureItem] = {}
     newest: Event | None = None

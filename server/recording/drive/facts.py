@@ -1,4 +1,4 @@
-"""Everything a recording says of its drive, read once: for the report, its tables and the logbook."""
+"""All facts of a drive in its recording, read once: for the report, its tables and the logbook."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MOST_NAMES = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveLog:
-    """What the log of a drive says."""
+    """The facts in the log of a drive."""
 
     people: Sequence[PersonInDrive]
     departure: Departure
@@ -105,7 +105,7 @@ class DriveFacts:
 
 
 def read_facts(recording: Recording) -> DriveFacts:
-    """Reads the whole recording, with what is beside it; a judge is not asked. Raises RecordingUnreadable."""
+    """Read the whole recording, with what is beside it, without judging it. Raises RecordingUnreadable."""
     drive = Drive(recording, read_recorded_events(recording), signals=SIGNALS)
     has_speed = any("speed" in epoch.published for epoch in drive.epochs)
     motion = Motion(drive.length_s, speed="speed" if has_speed else "odometry", gaps=gaps_of(recording))

@@ -17,7 +17,7 @@ from server.recording.marks.rows import merged
 WEEK_MS = 7 * 86_400_000
 MONDAY_MS = 4 * 86_400_000  # the first Monday after 1970 began
 MEDIAN_OF = 5
-LEAST_M = 100.0  # in a week: of less, a rate on 100 km says nothing
+LEAST_M = 100.0  # in a week: of less, a rate on 100 km has no meaning
 MOST_WEEKS = 520
 MOST_STOPPED_MS = 3_600_000  # between two recordings of one drive, with a restart of the server between them
 
@@ -208,7 +208,7 @@ def _drive(
 
 
 def _joined(drive: LogbookDrive, part: LogbookDrive) -> LogbookDrive:
-    """With its next part. A part whose log has no departure check says nothing of it."""
+    """With its next part. A part whose log has no departure check does not count for it."""
     newest = part["departure"]
     checked = part if newest in ("open", "signed") or not drive["departure"] else drive
     components = dict(drive["components"])

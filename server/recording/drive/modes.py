@@ -33,7 +33,7 @@ class Intervention:
     intervention: str
     at_ms: int
     kind_of: str
-    kind: str  # in words
+    kind: str  # as text
     speed_mps: float | None
     lat_deg: float | None
     lon_deg: float | None
@@ -46,7 +46,7 @@ class Intervention:
 
 
 def mode_spans(events: Sequence[Event], start_ms: int, end_ms: int) -> list[ModeSpan]:
-    """The whole drive without a gap; what nobody said is unknown. Neighbours of one mode are one span."""
+    """The whole drive without a gap; what is not in the log is unknown. Neighbours of one mode are one span."""
     changes: list[tuple[int, str]] = []
     first = "unknown"
     for event in sorted(of_change(events, "mode"), key=moment_of):

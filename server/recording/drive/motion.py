@@ -1,4 +1,4 @@
-"""How the car moved in a drive: distance, speed, steering and place over time, and when nothing was heard of it.
+"""How the car moved in a drive: distance, speed, steering and place over time, and when nothing was received of it.
 
 Times are seconds since the beginning of the recording.
 """
@@ -126,13 +126,13 @@ class Motion(Observer):
         return distance_m(*self.places[before][1:], *self.places[after][1:])
 
     def blind_spans(self) -> list[tuple[float, float]]:
-        """When nothing was heard, the end of the recording included."""
+        """When nothing was received, the end of the recording included."""
         spans = [*self.blind, (self._heard_s, self._length_s)]
         pieces = [piece for span in spans for piece in outside(span, self._gaps)]
         return [(from_s, to_s) for from_s, to_s in pieces if to_s - from_s > BLIND_S]
 
     def message_received(self, topic: str, now_s: float) -> None:
-        """Notes when nothing was heard."""
+        """Note when nothing was received."""
         if now_s - self._heard_s > BLIND_S:
             self.blind.append((self._heard_s, now_s))
         self._heard_s = max(self._heard_s, now_s)

@@ -48,8 +48,8 @@ def people_of(events: Sequence[Event], start_ms: int) -> list[PersonInDrive]:
 
 
 def joined_people(parts: Sequence[tuple[int, int, Sequence[PersonInDrive]]]) -> list[PersonInDrive]:
-    """Of a drive of several parts: when each began and ended, and its people. A time that goes on in the next part is
-    one time; else it ends with its part, as nobody knows what was between."""
+    """Of a drive of several parts: when each began and ended, and its people. A time that continues in the next part is
+    one time; else it ends with its part, because the time between is not known."""
     found: dict[str, PersonInDrive] = {}
     for number, (start_ms, end_ms, people) in enumerate(parts):
         is_last = number == len(parts) - 1
@@ -73,7 +73,7 @@ def names_of(people: Sequence[PersonInDrive]) -> list[str]:
 
 
 def controllers(events: Sequence[Event]) -> bool:
-    """Whether the log says anything of control."""
+    """Whether the log has anything on control."""
     return any(True for _ in of_change(events, "control"))
 
 
@@ -93,7 +93,7 @@ def _person(event: Event, found: dict[str, PersonInDrive]) -> PersonInDrive | No
 
 
 def _holder(name: str, found: dict[str, PersonInDrive]) -> PersonInDrive | None:
-    """Whose name stands before the brackets of the device, else the device itself."""
+    """The person's name before the brackets of the device, else the device itself."""
     if not name:
         return None
     person = name.rpartition(" (")[0] if name.endswith(")") else ""

@@ -15,16 +15,16 @@ MOST = 500
 class PlannedStopInDrive:
     """One. `from_ms` may be before the drive began; `to_ms` None: it did not end in it."""
 
-    reason: str  # in words
+    reason: str  # as text
     by: str
     from_ms: int
     to_ms: int | None = None
-    ended: str = ""  # what was said of its end
+    ended: str = ""  # the text of its end
     ended_by: str = ""  # "": it ended by itself
 
 
 def planned_stops_of(events: Sequence[Event]) -> list[PlannedStopInDrive]:
-    """All of them, in order. One that goes on after a restart of the server is the same; another reason is another."""
+    """All of them, in order. After a restart of the server it is the same one; another reason is another."""
     found: list[PlannedStopInDrive] = []
     for event in of_change(events, "planned_stop", "planned_stop_ended"):
         at_ms, newest = event["at_ms"], found[-1] if found and found[-1].to_ms is None else None

@@ -20,7 +20,7 @@ class SlowDownInDrive:
     ordered_ms: int
     sent_ms: int | None = None  # the first command
     slows_ms: int | None = None  # the car's speed proved it
-    proof: str = ""  # what was said of it
+    proof: str = ""  # the text of the proof
     not_confirmed_ms: int | None = None
     released_ms: int | None = None
     steps: int = 1

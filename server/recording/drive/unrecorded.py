@@ -1,6 +1,6 @@
 """Times of a drive of which its report has no record: a part is missing, is damaged, or the server did not run.
 
-A time between two parts that follow each other in one session is none of them: the recorder keeps what the log says
+A time between two parts that follow each other in one session is none of them: the recorder keeps the events of the log
 meanwhile, and the next part has it. Times are seconds since the beginning of the drive.
 """
 
@@ -34,7 +34,7 @@ class Unrecorded:
         return "Not in this report" if self.is_elsewhere else "No record here"
 
     def time(self, clock: Callable[[float], str]) -> str:
-        """Its time in words; `clock`: a moment as a time of day."""
+        """Its time as text; `clock`: a moment as a time of day."""
         since = "" if self.from_s is None else f"from {clock(self.from_s)}"
         if self.to_s is None:
             return f"{since} on" if since else "at a time that is not known"
@@ -63,7 +63,7 @@ def unrecorded_of(recording: Recording, parts: Sequence[DrivePart]) -> list[Unre
 
 
 def beside(recording: Recording, parts: Sequence[DrivePart]) -> Beside:
-    """What the folders of a recording hold. A part that is gone for good is named by the recording behind it."""
+    """What the folders of a recording hold. A deleted part is named by the recording behind it."""
     folders = {path.parent for path in recording.paths}
     files = {id for folder in folders for id in readable_beside(folder)} - {id_of(path) for path in recording.paths}
     known = {id for folder in folders for id in known_beside(folder)}

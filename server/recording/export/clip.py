@@ -1,4 +1,4 @@
-"""The minute around an alarm as a recording of its own: what came then, and what was already so when it begins.
+"""The minute around an alarm as a recording of its own: its messages, and what was in force when it begins.
 
 Messages are copied as bytes and never decoded, so a clip holds what was recorded: the same channels, definitions and
 stamps. It begins with the settings in force, the state of the link and the last message of each latched topic. Its
@@ -147,21 +147,21 @@ def _copy(recording: Recording, file: PartFile, window: Window, before: _Before,
 
     first_ns, last_ns = span_ns(recording)
     begin_ns, end_ns = max(window.from_ns, first_ns), min(window.to_ns, last_ns)
-    said = {row["intervention"]: row for row in described_late(recording)}
-    held: set[str] = set()  # interventions of the minute of which something was said later
+    described = {row["intervention"]: row for row in described_late(recording)}
+    held: set[str] = set()  # interventions of the minute that were described later
     _add_marks(recording, file, window)
     for raw in before.latest.values():
-        add(raw, begin_ns)  # what held then; when it was said stands in the message where it has a stamp
+        add(raw, begin_ns)  # what was in force then; the message has its own time where it has a stamp
     for raw in _within(recording, window, progress):
         if raw.channel.topic == _MARKS:
             continue
-        if raw.channel.topic == _ALARMS and said:
-            held.update(name for name in said if name.encode() in raw.data)
+        if raw.channel.topic == _ALARMS and described:
+            held.update(name for name in described if name.encode() in raw.data)
         add(raw, raw.time_ns)
         outcome.entries += 1
         if outcome.entries % _HELD == 0:
             file.flush()
-    for row in (said[name] for name in said if name in held):
+    for row in (described[name] for name in described if name in held):
         file.add(file.channel(_ALARMS, own_schema("alarms")), end_ns, orjson.dumps(described_event(row)))
     if not outcome.entries:
         raise NothingRecorded(f"Nothing was recorded from {_clock(window.from_ns)} to {_clock(window.to_ns)} UTC.")
@@ -172,7 +172,7 @@ def _copy(recording: Recording, file: PartFile, window: Window, before: _Before,
 
 
 def _add_marks(recording: Recording, file: PartFile, window: Window) -> None:
-    """The marks of the minute as they are by now, whenever they came, with their voice notes and photos."""
+    """The marks of the minute in their newest form, with their voice notes and photos."""
     marks = {row["mark"]: row for row in marks_of(recording) if _is_within(row, window)}
     for row in marks.values():
         channel = file.channel(_MARKS, own_schema("marks"))

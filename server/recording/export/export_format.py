@@ -14,7 +14,7 @@ class ExportFormat:
 
     name: str
     label: str  # on the page's key
-    use: str  # in few words, below the label
+    use: str  # a short text, below the label
     extension: str  # of the file's name, without the first dot
     media_type: str
     writer: str  # "module:function", loaded when it is needed; see docs/extending.md
@@ -29,7 +29,7 @@ class ExportRefused(RuntimeError):
 
 
 class NothingRecorded(ExportRefused):
-    """The recording has nothing of the time that is asked for."""
+    """The recording has nothing of the requested time."""
 
 
 @dataclass(slots=True)

@@ -61,7 +61,7 @@ class Job:
     of: str  # the recording
     format: str
     key: tuple[Any, ...]  # the same for the same work
-    asked: str = ""  # the recording that was named: of a drive, any part
+    named: str = ""  # the recording that was named: of a drive, any part
     state: ExportState = "waiting"
     progress: float = 0.0
     sentence: str = "Waiting for the previous export."
@@ -144,17 +144,17 @@ class Exports:
         whichever of them is named. Raises NoSuchRecording, TooMany."""
         first, sources = await asyncio.to_thread(self._sources, of, format)
         changed = await asyncio.to_thread(lambda: tuple(map(_state_of, sources)))
-        return self._begin(first, format, (first, format, changed), lambda job: self._export(job, sources), asked=of)
+        return self._begin(first, format, (first, format, changed), lambda job: self._export(job, sources), named=of)
 
     async def clip(self, of: str, window: Window) -> Job:
         """Cuts a recording, one being written too. Raises NoSuchRecording, NotYet, TooMany."""
         await asyncio.to_thread(self._source, of)
         if window.to_ns / 1e6 > self._wall_ms() + AHEAD_S * 1000:
             raise NotYet("This time is in the future.")
-        return self._begin(of, CLIP, (of, CLIP, window), lambda job: self._clip(job, window), asked=of)
+        return self._begin(of, CLIP, (of, CLIP, window), lambda job: self._clip(job, window), named=of)
 
     async def cancel(self, id: str) -> None:
-        """Ends a job that is going on; its file is gone when this returns."""
+        """End a running job; its file is deleted when this returns."""
         job, task = self._jobs.get(id), self._tasks.get(id)
         if job is not None and task is not None:
             task.cancel()
@@ -163,16 +163,16 @@ class Exports:
             self._drop(job)
             await asyncio.gather(*self._removing)
 
-    def _begin(self, of: str, format: str, key: tuple[Any, ...], work: Callable[[Job], Any], *, asked: str) -> Job:
+    def _begin(self, of: str, format: str, key: tuple[Any, ...], work: Callable[[Job], Any], *, named: str) -> Job:
         self._sweep()
         for job in self._jobs.values():
-            if job.is_whole is False and job.asked != asked:
+            if job.is_whole is False and job.named != named:
                 continue  # another part may be readable with others
             if job.key == key and (not job.is_over or (job.state == "done" and job.path is not None)):
                 return job
         if len(self._tasks) >= MOST_WAITING:
             raise TooMany(f"{MOST_WAITING} exports are already waiting: try again later.")
-        job = Job(id=secrets.token_hex(8), of=of, format=format, key=key, asked=asked)
+        job = Job(id=secrets.token_hex(8), of=of, format=format, key=key, named=named)
         self._jobs[job.id] = job
         task = self._tasks[job.id] = asyncio.create_task(self._run(job, work), name=f"export {of} as {format}")
         task.add_done_callback(lambda _: self._over(job))
@@ -207,8 +207,8 @@ class Exports:
     async def _export(self, job: Job, sources: Sequence[Path]) -> None:
         async with self._turn:
             out = await self._place(job, f"{job.of}.{FORMATS[job.format].extension}")
-            asked = next((path for path in sources if id_of(path) == job.asked), sources[0])
-            arguments = ["--format", job.format, "--name", job.of, "--asked", str(asked), "--out", str(out)]
+            named = next((path for path in sources if id_of(path) == job.named), sources[0])
+            arguments = ["--format", job.format, "--name", job.of, "--asked", str(named), "--out", str(out)]
             made = await self._work(job, sources, arguments)
             job.path = made.path
             job.size = (await asyncio.to_thread(made.path.stat)).st_size
@@ -311,7 +311,7 @@ class Exports:
 
 
 def _state_of(path: Path) -> tuple[tuple[str, int, int], ...]:
-    """Another value: another content of the file, or of what is beside it: words, late marks, their files."""
+    """Another value: another content of the file, or of what is beside it: annotations, late marks, their files."""
     try:
         stat = path.stat()
     except OSError:

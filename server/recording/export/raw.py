@@ -1,7 +1,7 @@
 """Messages of a recording as bytes, in the order of time, for copies that decode and judge nothing.
 
 They come from all of its files; besides them there is what came after it was complete, as messages of catgraph's own
-channels: marks, and what was said of interventions.
+channels: marks, and descriptions of interventions.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def in_time(recorded: Iterator[Raw], later: Sequence[Raw]) -> Iterator[Raw]:
 
 
 def explain(recording: Recording, later: Sequence[Raw], outcome: Outcome) -> None:
-    """Says what a bag has besides what was recorded, and that it has no attachments."""
+    """Note what a bag has besides what was recorded, and that it has no attachments."""
     if later:
         many = "1 message of catgraph was" if len(later) == 1 else f"{len(later)} messages of catgraph were"
         outcome.notices.append(f"{many} added: marks and descriptions that came after the recording was complete.")
@@ -122,9 +122,9 @@ def explain(recording: Recording, later: Sequence[Raw], outcome: Outcome) -> Non
 
 
 def described_event(row: InterventionDescription) -> dict[str, object]:
-    """As an event of the log, which has words for people."""
-    said = ": ".join(part for part in (row["category"], row["what"]) if part)
-    return {**as_event(row), "text": f"An intervention was described after the recording: {said}"}
+    """As an event of the log, which has a text for people."""
+    text = ": ".join(part for part in (row["category"], row["what"]) if part)
+    return {**as_event(row), "text": f"An intervention was described after the recording: {text}"}
 
 
 def _later_marks(recording: Recording) -> Iterator[tuple[int, dict[str, object]]]:

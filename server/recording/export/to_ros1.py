@@ -1,6 +1,6 @@
 """How recorded messages of any encoding become those of a ROS 1 bag: as they are, or from ROS 2's CDR.
 
-A type that ROS 1 has too takes ROS 1's definition, so that its md5sum is the one every ROS 1 node knows; any other
+A type that ROS 1 has too takes ROS 1's definition, so that its md5sum is the one that every ROS 1 node has; any other
 takes that of the recording, with the types in it as ROS 1 has them.
 
 The md5sum of a type is computed from its definition as genmsg does. Sources: genmsg's gentools (the text that is

@@ -198,7 +198,7 @@ def _alarms(drive: DecodedDrive, tracks: Tracks) -> None:
 
 
 def _marks(drive: DecodedDrive, tracks: Tracks) -> None:
-    """Each with its category or its first words as its title."""
+    """Each with its category or the beginning of its text as its title."""
     nowhere = 0
     for mark in marks_of(drive.recording):
         place = _place(tracks.car, mark["marked_ms"] / 1000, {**mark, "title": title_of(mark), "text": mark["words"]})

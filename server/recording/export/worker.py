@@ -1,4 +1,4 @@
-"""Runs an export as a process of its own: its reckoning never holds up the event loop, and it can be ended at once."""
+"""Runs an export as a process of its own: its computing never blocks the event loop, and it can be ended at once."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ log = logging.getLogger("catgraph.export")
 
 _ROOT = Path(__file__).resolve().parents[3]  # of the packages: the process must find the same code
 _LINE = 1 << 20  # bytes of an answer at most
-_PATIENCE_S = 5.0  # to sweep up after itself, before it is killed
+_PATIENCE_S = 5.0  # to remove its files, before it is killed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,13 +49,13 @@ async def run_worker(arguments: Sequence[str], progress: Progress) -> Made:
         await process.wait()
     finally:
         await asyncio.shield(_end(process))
-        said = await complaints
+        errors = await complaints
     if answer is None:
-        log.error("export process ended: status=%s error=%s", process.returncode, said)
+        log.error("export process ended: status=%s error=%s", process.returncode, errors)
         raise ExportRefused("The export failed: it ran out of memory or was killed.")
     if "refused" in answer:
-        if said:
-            log.error("export failed: %s", said)
+        if errors:
+            log.error("export failed: %s", errors)
         raise (NothingRecorded if answer.get("is_nothing") is True else ExportRefused)(str(answer["refused"]))
     return Made(
         path=Path(answer["done"]),
@@ -80,12 +80,12 @@ async def _listen(process: asyncio.subprocess.Process, progress: Progress) -> di
 
 
 async def _last_output(process: asyncio.subprocess.Process) -> str:
-    """The end of what it complained of."""
+    """The end of its error output."""
     assert process.stderr is not None
-    said = b""
+    last = b""
     while portion := await process.stderr.read(1 << 16):
-        said = (said + portion)[-4000:]
-    return said.decode("utf-8", "replace")
+        last = (last + portion)[-4000:]
+    return last.decode("utf-8", "replace")
 
 
 async def _end(process: asyncio.subprocess.Process) -> None:

@@ -1,6 +1,6 @@
-"""What somebody said of interventions after the recording that holds them was complete: kept beside it, as late marks.
+"""Descriptions of interventions after the recording that holds them was complete: kept beside it, as late marks.
 
-The log has all that was said; beside a recording is what it does not hold itself, or holds otherwise.
+The log has all descriptions; beside a recording are those that it does not hold itself, or holds otherwise.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def as_event(row: InterventionDescription) -> dict[str, Any]:
 
 
 def late_of(path: Path, logged: Mapping[str, InterventionDescription]) -> list[InterventionDescription] | None:
-    """Of the interventions that a file holds, what is not said of them in it; None: it cannot be read. Raises OSError.
+    """Of the interventions that a file holds, the descriptions that it lacks; None: it cannot be read. Raises OSError.
 
     `logged`: what the log has of interventions of the vehicle.
     """
@@ -77,13 +77,13 @@ def late_of(path: Path, logged: Mapping[str, InterventionDescription]) -> list[I
         return None
     try:
         with contextlib.closing(finished(path)) as source:
-            interventions, said = _in_file(_entries(source))
+            interventions, described = _in_file(_entries(source))
     except OSError:
         raise
     except Exception:  # damage makes the readers fail in every way there is
         return None
     mine = (row for id, row in logged.items() if id in interventions)
-    return [row for row in mine if not has_same_content(row, said.get(row["intervention"]))]
+    return [row for row in mine if not has_same_content(row, described.get(row["intervention"]))]
 
 
 def holds(path: Path, intervention: str) -> bool:
@@ -103,12 +103,12 @@ def holds(path: Path, intervention: str) -> bool:
 
 
 def has_same_content(one: InterventionDescription, other: InterventionDescription | None) -> bool:
-    """Whether both say the same."""
+    """Whether both have the same content."""
     return other is not None and all(one[name] == other[name] for name in COMPARED)  # type: ignore[literal-required]
 
 
 def _in_file(entries: Iterable[Mapping[str, Any]]) -> tuple[set[str], dict[str, InterventionDescription]]:
-    """The ids of the interventions, and what is said of them."""
+    """The ids of the interventions, and their descriptions."""
     events = [event for event in entries if event.get("change") in ("intervention", CHANGE)]
     ids = (event.get("intervention") for event in events if event["change"] == "intervention")
     return {id for id in ids if isinstance(id, str)}, newest(events)

@@ -1,6 +1,6 @@
-"""Keeps late marks and late words on interventions beside their recordings, in the background: after each recording
-that is complete, each mark that no recording covers, each intervention that somebody described, and once at the start
-for what a killed server left."""
+"""Keeps late marks and late descriptions of interventions beside their recordings, in the background: after each
+recording that is complete, each mark that no recording covers, each intervention that somebody described, and once at
+the start for what a killed server left."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ LEFT_AT_START = 3  # newest recordings of each vehicle that are looked through a
 DESCRIBED_AT_START = 20  # newest descriptions whose recordings are looked through then
 MOST_INTERVENTIONS = 1000  # among which that of a description is looked for
 MOST_PARTS = 30  # of a session that are looked through for one intervention
-SETTLES_S = 0.3  # several marks at once are looked at once
-TIDIES_S = 600.0  # what waits for nothing is looked for so often, and what failed is tried again
+SETTLES_S = 0.3  # several marks within this time are handled together
+TIDIES_S = 600.0  # between two searches for what waits for nothing, and new attempts of what failed
 CLAIMED_MS = 60_000  # after so long no recording that begins takes a mark
 _PORTION = 1000
 
 
 class Late(NamedTuple):
-    """What came after the part that it belongs to: a mark, or what somebody said of an intervention."""
+    """What came after the part that it belongs to: a mark, or a description of an intervention."""
 
     vehicle: str
     moment_ms: int
@@ -182,8 +182,8 @@ class MarkKeeper:
         marks, removed = await self._logged(vehicle, since_ms=since_ms)
         with contextlib.suppress(FileNotFoundError):
             is_changed = await asyncio.to_thread(settle, path, marks, removed, pending=self._pending, vehicle=vehicle)
-            said = await self._described(vehicle, since_ms=since_ms)
-            if await asyncio.to_thread(settle_described, path, said) or is_changed:
+            described = await self._described(vehicle, since_ms=since_ms)
+            if await asyncio.to_thread(settle_described, path, described) or is_changed:
                 await asyncio.to_thread(self._on_changed, path)
 
     async def _logged(self, vehicle: str, **filters: Any) -> tuple[dict[str, DriveMark], set[str]]:
@@ -196,10 +196,10 @@ class MarkKeeper:
 
     async def _described_last(self, vehicle: str) -> set[Late]:
         """The interventions that were described last."""
-        said = await self._find_events(vehicle, change=descriptions.CHANGE, limit=DESCRIBED_AT_START)
-        if not said:
+        described = await self._find_events(vehicle, change=descriptions.CHANGE, limit=DESCRIBED_AT_START)
+        if not described:
             return set()
-        ids = {event.get("intervention") for event in said}
+        ids = {event.get("intervention") for event in described}
         found = await self._find_events(vehicle, change="intervention", limit=MOST_INTERVENTIONS)
         return {
             Late(vehicle, int(event.get("moment_ms") or event["at_ms"]), str(event["intervention"]))

@@ -64,7 +64,7 @@ def named(mark: str, kind: Kind, content_type: str) -> MediaName:
 
 
 def check(name: MediaName, data: bytes) -> None:
-    """That the bytes are what the name says, by their first ones. Raises BadMedia."""
+    """Check that the bytes are of the kind in the name, by their first ones. Raises BadMedia."""
     if not data:
         raise BadMedia(f"The {_WHAT[name.kind]} is empty.")
     if not _begins_as(name.media_type, data[:16]):

@@ -1,4 +1,4 @@
-"""The marks of a recording that is read, which may be of several files, and what was said of its interventions later.
+"""The marks of a recording that is read, which may be of several files, and later descriptions of its interventions.
 
 The report, the catalog, replays, and all that is exported read them here.
 """
@@ -39,17 +39,17 @@ def media_of(recording: Recording) -> Iterator[tuple[MediaName, bytes]]:
 
 
 def described_late(recording: Recording) -> list[InterventionDescription]:
-    """What was said of its interventions after it was complete, oldest first."""
-    said = [row for path in files_of(recording) for row in annotation_store.read(path).described]
-    return sorted(said, key=lambda row: row["described_ms"])
+    """The descriptions of its interventions after it was complete, oldest first."""
+    rows = [row for path in files_of(recording) for row in annotation_store.read(path).described]
+    return sorted(rows, key=lambda row: row["described_ms"])
 
 
 def files_of(recording: Recording) -> Sequence[Path]:
-    """Those of which it is, and before them the folder of a split bag: marks and words can be beside each."""
+    """Those of which it is, and before them the folder of a split bag: marks and descriptions can be beside each."""
     folders = [folder for path in recording.paths if path.is_dir() and (folder := path.absolute()).name]
     return [*folders, *(file.path for file in recording.files)]
 
 
 def title_of(mark: DriveMark) -> str:
-    """A few words for a map or a table."""
+    """A short text for a map or a table."""
     return mark["category"] or (mark["words"][:60] if mark["words"] else "Mark")

@@ -1,4 +1,4 @@
-"""Voice notes and photos of the drive that goes on: on the disk before anything is answered, until a recording that is
+"""Voice notes and photos of the present drive: on the disk before anything is answered, until a recording that is
 complete holds them."""
 
 from __future__ import annotations

@@ -77,8 +77,8 @@ def read_marks(path: Path, within: InFile | None = None) -> list[DriveMark]:
 def with_late(rows: Iterable[DriveMark], paths: Iterable[Path], start_ms: float) -> list[DriveMark]:
     """Marks that files hold, with those that came after they were complete; oldest first, each with its moment since
     the beginning of the recording."""
-    said = [annotation_store.read(path) for path in paths]
-    late, removed = [row for one in said for row in one.marks], [id for one in said for id in one.removed]
+    beside = [annotation_store.read(path) for path in paths]
+    late, removed = [row for one in beside for row in one.marks], [id for one in beside for id in one.removed]
     return [
         {**row, "at_s": max(0.0, round((row["marked_ms"] - start_ms) / 1000, 3)), "late": row.get("late", False)}
         for row in merged(rows, late, removed)
@@ -114,7 +114,7 @@ def attached(path: Path) -> Iterator[tuple[MediaName, bytes]]:
 
 
 def _attachment(file: IO[bytes], index: AttachmentIndex) -> bytes | None:
-    """The data of one attachment; None: it is not what its index says. Raises OSError."""
+    """The data of one attachment; None: it does not match its index. Raises OSError."""
     if not 0 <= index.length - index.data_size <= _MOST_AROUND:
         return None
     try:

@@ -20,7 +20,7 @@ COMPARED = ("marked_ms", "category", "words", "voice", "photo")  # in which two 
 
 def row_of(event: Mapping[str, Any]) -> DriveMark | None:
     """The mark in an event or an entry of a recording; None: there is none."""
-    mark, marked_ms, category, words = (event.get(name) for name in ("mark", "marked_ms", "category", "words"))
+    mark, marked_ms, category, text = (event.get(name) for name in ("mark", "marked_ms", "category", "words"))
     source, by = event.get("source"), event.get("by")
     if not isinstance(mark, str) or not MARK_ID.fullmatch(mark) or not isinstance(marked_ms, int):
         return None
@@ -30,7 +30,7 @@ def row_of(event: Mapping[str, Any]) -> DriveMark | None:
         "mark": mark,
         "marked_ms": marked_ms,
         "category": clean(category, MOST_CATEGORY) if isinstance(category, str) and category else None,
-        "words": clean(words, MOST_WORDS) if isinstance(words, str) else "",
+        "words": clean(text, MOST_WORDS) if isinstance(text, str) else "",
         "voice": event.get("voice") is True,
         "photo": event.get("photo") is True,
         "source": source if source in ("page", "http", "car") else "page",
@@ -54,7 +54,7 @@ def folded(events: Iterable[Mapping[str, Any]]) -> tuple[dict[str, DriveMark], s
 
 
 def has_same_content(one: DriveMark, other: DriveMark | None) -> bool:
-    """Whether both say the same."""
+    """Whether both have the same content."""
     return other is not None and all(one[name] == other[name] for name in COMPARED)  # type: ignore[literal-required]
 
 

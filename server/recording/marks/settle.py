@@ -1,5 +1,5 @@
-"""Makes a finished recording's marks, and what is said of its interventions, those of the log: what it does not hold,
-or holds otherwise, is kept beside it."""
+"""Makes a finished recording's marks, and the descriptions of its interventions, those of the log: what it does not
+hold, or holds otherwise, is kept beside it."""
 
 from __future__ import annotations
 
@@ -67,15 +67,15 @@ def settle(
 
 
 def settle_described(path: Path, logged: Mapping[str, InterventionDescription]) -> bool:
-    """As `settle`, of interventions: each is in the recording that holds it. `logged`: the newest said of each of the
-    vehicle. Raises OSError."""
+    """As `settle`, of interventions: each is in the recording that holds it. `logged`: the newest description of each
+    of the vehicle. Raises OSError."""
     beside = annotation_store.read(path).described
     if not logged and not beside:
         return False
     late = descriptions.late_of(path, logged)
     if late is None:
         return False
-    kept = [row for row in beside if row["intervention"] not in logged]  # said before what is left of the log
+    kept = [row for row in beside if row["intervention"] not in logged]  # older than what is left of the log
     return annotation_store.write_described(path, [*kept, *late])
 
 
@@ -107,7 +107,7 @@ def named_at(path: Path) -> int:
 
 
 def began_at(path: Path) -> int:
-    """When a recording began [ms since 1970], by the first words of the file, else by its name."""
+    """When a recording began [ms since 1970], by the beginning of the file, else by its name."""
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD_BYTES)

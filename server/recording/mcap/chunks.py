@@ -1,7 +1,7 @@
 """Walks through an MCAP file from its beginning, as far as it is whole: chunk by chunk, without its index.
 
-Where no record can be read, the walk goes on behind the next record of the hash chain, and what is between counts as
-damaged. Without one behind that place the file ends there.
+Where no record can be read, the walk continues behind the next record of the hash chain, and what is between counts as
+damaged. Without a record of the chain behind that place the file ends there.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Walk:
         self.header: Header | None = None
         self.metadata: list[Metadata] = []
         self.metadata_at: list[tuple[int, int]] = []  # place and length of each
-        self.attachments: list[AttachmentIndex] = []  # those that their checksums vouch for
+        self.attachments: list[AttachmentIndex] = []  # those with a correct checksum
         self.last_link: ChainRecord | None = None  # of the chain; the seal is none
         self.linked_to = 0  # where it ends
         self._sure_to = 0  # end of the last whole chunk or record of the chain: lengths behind it may be wrong
@@ -120,7 +120,7 @@ class Walk:
                 yield found
 
     def _read(self, head: bytes, body: bytes) -> WholeChunk | None:
-        """Notes what a record says; the chunk, where it is one."""
+        """Note what a record contains; return the chunk, where it is one."""
         if head[0] == Opcode.CHUNK:
             return _chunk(self.at, head + body)
         if head[0] == Opcode.METADATA:
@@ -139,7 +139,7 @@ class Walk:
         return None
 
     def _is_out_of_place(self, opcode: int, body: bytes) -> bool:
-        """Whether a record cannot be what its opcode says, as one that was a chunk, and the chain goes on behind it."""
+        """Whether a record cannot be of its opcode, as one that was a chunk, and the chain continues behind it."""
         if opcode == Opcode.MESSAGE_INDEX:
             is_odd = len(body) != 6 + int.from_bytes(body[2:6], "little")
         else:

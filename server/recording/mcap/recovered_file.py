@@ -69,7 +69,7 @@ class Contents:
         if linked_to > self._linked_to:
             self._linked_to = linked_to
             self.unlinked.clear()
-        if linked_to:  # without a chain nobody asks for them
+        if linked_to:  # they are needed only with a chain
             self.unlinked.append(chunk.at)
         return True
 
@@ -87,8 +87,8 @@ def write_recovered(path: Path, left: IO[bytes], walk: Walk, found: Contents, **
                 _continue(new, left, walk, found)
             else:
                 found = _salvage(new, left, walk)
-            said = next((note.metadata for note in reversed(walk.metadata) if note.name == METADATA), {})
-            new.note(Metadata(name=METADATA, metadata=dict(said) | ended))
+            recorded = next((note.metadata for note in reversed(walk.metadata) if note.name == METADATA), {})
+            new.note(Metadata(name=METADATA, metadata=dict(recorded) | ended))
             new.finish(found)
             file.flush()
             os.fsync(file.fileno())

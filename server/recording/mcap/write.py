@@ -1,4 +1,4 @@
-"""Writes one MCAP file that survives whatever happens to its writer.
+"""Writes one MCAP file that survives a crash of its writer.
 
 Chunks are small and handed to the system at every `flush`, so a killed process loses what came since the last one, and
 a loss of power what came since the last `sync`. While it is written the file has another name; its own it gets when it
@@ -45,7 +45,7 @@ class PartFile:
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._sequence: dict[int, int] = {}
         self._newest_ns = 0
-        self.failed: OSError | None = None  # what the disk said of keeping it; the next flush raises it
+        self.failed: OSError | None = None  # the error of the disk; the next flush raises it
         self._closing = threading.Lock()
         self._is_named = False  # the disk knows that the file is there
         make_folder(path.parent)
@@ -105,12 +105,12 @@ class PartFile:
         self._writer.add_attachment(at_ns, at_ns, name, media_type, data)  # between two chunks, as `note`
 
     def note(self, **more: str) -> None:
-        """What is known of the drive by now, besides what was known when it began: a kill does not lose it."""
+        """Add metadata of the drive that is known only now: a kill does not lose it."""
         self._metadata |= more
         self._writer.add_metadata(METADATA, self._metadata)  # between two chunks: the current one is not written yet
 
     def flush(self) -> None:
-        """Hands all that was added to the system: a kill does not lose it any more."""
+        """Pass all that was added to the system: a kill does not lose it any more."""
         if self.failed is not None:
             raise self.failed
         self._writer.flush()

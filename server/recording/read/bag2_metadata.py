@@ -1,6 +1,6 @@
-"""Reads what the `metadata.yaml` of a ROS 2 bag says of its files, within bounds: it may come from anywhere.
+"""Read what the `metadata.yaml` of a ROS 2 bag states of its files, within bounds: it may come from anywhere.
 
-The files themselves say what they hold. Counts and times of the metadata are those of a recorder that ended well, and
+The files themselves state what they hold. Counts and times of the metadata are those of a recorder that ended well, and
 are not used.
 
 The quality of service of a topic is read as every version of rosbag2 writes it. Sources: `offered_qos_profiles` is YAML
@@ -34,7 +34,7 @@ _TRANSIENT_LOCAL = ("1", "transient_local")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BagMetadata:
-    """What a bag says of its files."""
+    """What a bag states of its files."""
 
     files: tuple[str, ...]  # their names in the folder
     distro: str | None

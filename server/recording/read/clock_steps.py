@@ -1,11 +1,11 @@
 """Finds where the clock of a recorder was set while it recorded, by the log times of messages in the order of receipt.
 
-A clock is set where the log times go back, where they begin before 2000 and leap to now, where they leap by more than a
-day, where the stamps of a sensor with a clock of its own show that less time has passed, or where another step takes
+A clock was set where the log times go back, where they begin before 2000 and jump to now, where they jump by more than
+a day, where the stamps of a sensor with a clock of its own show that less time has passed, or where another step takes
 the gap back. Every other gap is silence.
 
 A gap of some minutes may be silence, or a clock that was set ahead. Where the clock goes back by just as much, the gap
-was the clock: a silence that is as long as the step to a second is next to impossible.
+is a step of the clock: a silence of the same length to a second is very unlikely.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ FIRST_NS, LAST_NS = 946_684_800 * S, 4_102_444_800 * S  # years 2000 and 2100: o
 MOST_STEPS = 100
 MOST_COMPARED = 50  # gaps whose stamps are compared
 MOST_INTERVALS = 10_000
-WINDOW = 512  # messages before and behind a step whose interval is looked at
-UNKNOWN_NS = S // 100  # the interval where too few messages tell one
-LEAST = 3  # messages from which the clock of a stretch is believed
+WINDOW = 512  # messages before and behind a step whose interval is evaluated
+UNKNOWN_NS = S // 100  # the interval where too few messages show one
+LEAST = 3  # messages from which the clock of a stretch is trusted
 PLACES_A_PART = 2**32
 
 
@@ -109,7 +109,7 @@ class Stretch:
     shift_ns: int = 0  # corrected minus log time
 
     def moved(self, by_ns: int) -> Stretch:
-        """The stretch later by so much."""
+        """The stretch, later by this time."""
         return replace(self, shift_ns=self.shift_ns + by_ns)
 
 
@@ -302,7 +302,7 @@ def follows(before: Stretch, one: Stretch, change_ns: int) -> Stretch:
 
 
 def _usual_change(found: Arrivals, start: int, at: int, end: int) -> int:
-    """The change of the shift with which the most frequent channel goes on at its usual interval."""
+    """The change of the shift with which the most frequent channel continues at its usual interval."""
     start, end = max(start, at - WINDOW), min(end, at + WINDOW)
     before, after = slice(start, at), slice(at, end)
     best: tuple[int, int] | None = None

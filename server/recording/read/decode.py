@@ -50,21 +50,21 @@ def sifted(decode: Decode, topic: str, topics: Collection[str] | None) -> Decode
 
     The decoder of a topic's messages where only `topics` are wanted (None: all); what is not is empty.
 
-    With `topics` as a mapping, those are wanted whose bytes hold one of the words of their topic (None: all); the words
-    may change while they are read.
+    With `topics` as a mapping, those are wanted whose bytes hold one of the patterns of their topic (None: all); the
+    patterns may change while they are read.
     """
     if topics is None:
         return decode
     if topic not in topics:
         return _nothing
-    words: Collection[bytes] | None = topics[topic] if isinstance(topics, Mapping) else None
-    return decode if words is None else _sifting(decode, words)
+    patterns: Collection[bytes] | None = topics[topic] if isinstance(topics, Mapping) else None
+    return decode if patterns is None else _sifting(decode, patterns)
 
 
-def _sifting(decode: Decode, words: Collection[bytes]) -> Decode:
+def _sifting(decode: Decode, patterns: Collection[bytes]) -> Decode:
     def decode_some(raw: bytes) -> dict[str, Any]:
-        for word in words:
-            if word in raw:
+        for pattern in patterns:
+            if pattern in raw:
                 return decode(raw)
         return {}
 

@@ -17,8 +17,8 @@ def of_car(source: FileSource) -> bool:
     return any(channel.count and not channel.topic.startswith(PREFIX) for channel in source.channels)
 
 
-def open_with(asked: Path, paths: Sequence[Path], sources: list[FileSource], lacking: list[str]) -> None:
-    """As `open_parts` of each path, but of the files that can be read with `asked`: the others are named in `lacking`.
+def open_with(named: Path, paths: Sequence[Path], sources: list[FileSource], lacking: list[str]) -> None:
+    """As `open_parts` of each path, but of the files that can be read with `named`: the others are named in `lacking`.
     Raises RecordingUnreadable where none can be read."""
     opened: dict[Path, list[FileSource]] = {}
     whys: list[RecordingUnreadable] = []
@@ -36,10 +36,10 @@ def open_with(asked: Path, paths: Sequence[Path], sources: list[FileSource], lac
         opened[path] = own
     if not sources:
         raise whys[0]
-    versions = [one.ros_version for path in (asked, *paths) for one in opened[path] if of_car(one)]
+    versions = [one.ros_version for path in (named, *paths) for one in opened[path] if of_car(one)]
     for path, own in opened.items():
         if any(of_car(one) and one.ros_version != versions[0] for one in own):
-            lacking.append(f"{path.name} is of another version of ROS and cannot be read with {asked.name}")
+            lacking.append(f"{path.name} is of another version of ROS and cannot be read with {named.name}")
             for one in own:
                 one.close()
                 sources.remove(one)
@@ -86,11 +86,11 @@ _ENDS_EARLY = (
 def what_is_wrong(path: Path, error: Exception) -> str:
     if isinstance(error, PermissionError) or isinstance(error.__cause__, PermissionError):
         return f"{path} may not be read by this user: permission denied"
-    said = " ".join(str(error).split()).rstrip(".")
+    reason = " ".join(str(error).split()).rstrip(".")
     if isinstance(error, PartTooLarge):
-        return f"{path} cannot be read: of a part of it, {said}"
-    if any(words in said for words in _ENDS_EARLY):
+        return f"{path} cannot be read: of a part of it, {reason}"
+    if any(text in reason for text in _ENDS_EARLY):
         return f"{path} is not complete: it ends too early"
-    if not said or len(said) > 200 or isinstance(error, KeyError | AssertionError | TypeError | IndexError):
+    if not reason or len(reason) > 200 or isinstance(error, KeyError | AssertionError | TypeError | IndexError):
         return f"{path} is damaged or not complete"
-    return f"{path} is damaged or not complete: {said}"
+    return f"{path} is damaged or not complete: {reason}"

@@ -179,7 +179,7 @@ class Recording:
 
     def own(self, topic: str) -> Iterator[tuple[float, dict[str, Any]]]:
         """What catgraph itself wrote on one of its channels ("/catgraph/alarms"), in time order: seconds since 1970,
-        and what it says. None of it is among `topics` and `messages()`, and `damage` stays that of the newest reading
+        and its fields. None of it is among `topics` and `messages()`, and `damage` stays that of the newest reading
         of those."""
         streams = [
             Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=self._own(source, topic))

@@ -138,7 +138,7 @@ def _missing(names: Sequence[str], beside: str) -> str:
 
 
 def _files_in(folder: Path) -> list[Path]:
-    """The recorded files in a folder; of one that stands there packed and unpacked, the unpacked one."""
+    """The recorded files in a folder; of one that is there packed and unpacked, the unpacked one."""
     inside = sorted(file for file in folder.iterdir() if _plain(file.name).suffix in _SUFFIXES)
     names = {file.name for file in inside}
     return [file for file in inside if not (file.suffix == PACKED_SUFFIX and file.stem in names)]
@@ -168,7 +168,7 @@ def _found(path: Path) -> Found:
         raise RecordingUnreadable(f"{path} is empty: it has 0 bytes")
     kind = _kind(start)
     if kind is None:
-        raise RecordingUnreadable(f"{path} is not a recording: it is {_in_words(start)}")
+        raise RecordingUnreadable(f"{path} is not a recording: it is {_as_text(start)}")
     return Found(path=path, kind=kind)
 
 
@@ -184,10 +184,10 @@ def _first_unpacked(file: IO[bytes]) -> bytes:
         return b""
 
 
-def _in_words(start: bytes) -> str:
-    for magic, words in _OTHERS.items():
+def _as_text(start: bytes) -> str:
+    for magic, text in _OTHERS.items():
         if start.startswith(magic):
-            return words
+            return text
     try:
         text = start.decode("utf-8")
     except UnicodeDecodeError as error:

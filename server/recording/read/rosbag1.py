@@ -185,7 +185,7 @@ class Bag1:
             try:
                 raw = _message(chunk, offset)
             except (struct.error, IndexError):
-                raise RecordingUnreadable(f"{self.path.name} is damaged: a message lies outside its chunk") from None
+                raise RecordingUnreadable(f"{self.path.name} is damaged: a message is outside its chunk") from None
             yield time_ns, number, raw
 
     def arrivals(self) -> Iterator[Arrivals]:

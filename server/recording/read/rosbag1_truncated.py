@@ -64,7 +64,7 @@ class CutBag1(Bag1):
 
 
 class _Record(NamedTuple):
-    """The header of one record, and where its data lies."""
+    """The header of one record, and the place of its data."""
 
     op: int
     fields: dict[bytes, bytes]
@@ -171,7 +171,7 @@ class _Scan:
 
 
 def _begin(file: BinaryIO) -> int:
-    """Where the first record stands."""
+    """The place of the first record."""
     file.seek(0)
     return len(file.readline(64))
 

@@ -69,22 +69,22 @@ class Damage:
 
     def sentences(self, name: str, origin_ns: int, end_ns: int) -> list[str]:
         """What is missing and when, for a person."""
-        said = []
+        sentences = []
         if self.lost:
             which = "1 part" if len(self.lost) == 1 else f"{len(self.lost)} parts"
             what = "holds parts that are larger than may be read" if self.too_large else "is damaged"
-            said.append(
+            sentences.append(
                 f"{name} {what}: {which} of {self.parts}{self._when(origin_ns, end_ns)} "
                 f"{'is' if len(self.lost) == 1 else 'are'} left out"
             )
         if self.pieces:
             which = "1 piece of it is" if self.pieces == 1 else f"{self.pieces} pieces of it are"
-            said.append(f"{name} is damaged: {which} left out")
+            sentences.append(f"{name} is damaged: {which} left out")
         if self.is_cut:
-            said.append(
+            sentences.append(
                 f"{name} was never closed: it is read to its last whole part, {(end_ns - origin_ns) / 1e9:.1f} s"
             )
-        return said
+        return sentences
 
     def _when(self, origin_ns: int, end_ns: int) -> str:
         """When the lost parts were recorded; nothing where the times that they declare are damaged too."""

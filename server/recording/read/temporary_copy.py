@@ -25,7 +25,7 @@ _PACKED_BLOCK = 4096  # bytes; they hold at most a thousand blocks of zstd, of 1
 
 
 class TemporaryCopy:
-    """A folder with copies, which goes with `close`. The disk keeps room for others that record meanwhile."""
+    """A folder with copies, which `close` removes. The disk keeps room for others that record meanwhile."""
 
     def __init__(self) -> None:
         with _room():

@@ -1,6 +1,6 @@
 """Unpacks one part or message of a recording, and never more of it than fits.
 
-rosbag2 may compress messages one by one (`--compression-mode message`). Nothing in a bag's file says so, only
+rosbag2 may compress messages one by one (`--compression-mode message`). Nothing in a bag's file shows that, only
 `metadata.yaml` beside it, which a copy may lack. A message in CDR begins with a zero byte, so that the first bytes of a
 zstd frame cannot be confused with one.
 """
@@ -50,7 +50,7 @@ def unpack(compression: str, packed: bytes, size: int, most: int = MOST_BYTES) -
         case other:
             raise ValueError(f"packed as {other[:20]!r}, which is not supported")
     if len(data) != size:
-        raise ValueError("another size than it says")
+        raise ValueError("another size than it declares")
     return data
 
 
@@ -97,7 +97,7 @@ def _streamed(unpacker: Any, packed: bytes, size: int) -> bytes:
 def _zstd(packed: bytes, size: int) -> bytes:
     declared = zstandard.frame_content_size(packed)
     if declared >= 0 and declared != size:  # the declared size is reserved before unpacking
-        raise ValueError("another size than it says")
+        raise ValueError("another size than it declares")
     return zstandard.ZstdDecompressor().decompress(packed, max_output_size=max(1, size))
 
 

@@ -1,4 +1,4 @@
-"""Where the store is and by which login: a bucket of an S3-compatible service. The login never stands in a command."""
+"""Where the store is and by which login: a bucket of an S3-compatible service. The login is never part of a command."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def store_address(
     endpoint = endpoint or environment.get("AWS_ENDPOINT_URL_S3") or environment.get("AWS_ENDPOINT_URL") or None
     region = region or environment.get("AWS_REGION") or environment.get("AWS_DEFAULT_REGION") or USUAL_REGION
     if not _REGION.fullmatch(region):
-        raise BadStore("The region of the store is a word such as eu-central-1.")
+        raise BadStore("The region of the store is a name such as eu-central-1.")
     return StoreAddress(
         bucket=bucket,
         prefix=prefix,

@@ -17,12 +17,13 @@ from server.recording.catalog.annotations import NONE, Annotations
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.discovery import why_not_one_file
 from server.recording.catalog.entries import NotThere, Refused
-from server.recording.store import names, row, said
+from server.recording.store import names, row
+from server.recording.store import said as annotation_upload
 from server.recording.store.clips import ClipMaker
 from server.recording.store.object_store import FileChanged, ObjectStore, Pace
 from server.recording.store.plan import is_another
 from server.recording.store.rules import moments_of
-from server.recording.store.said import Said
+from server.recording.store.said import AnnotationSet
 from server.recording.store.trouble import Kind, StoreTrouble
 from server.recording.store.uploads import SentClip, SentPart, Upload, Uploads, Verified
 
@@ -52,17 +53,17 @@ class Copying:
             return
         self._put_row(recording, upload)
 
-    def _put_row(self, recording: Recording, upload: Upload) -> Said:
-        """What people said of it, which is in the store from now on. Raises OSError too."""
+    def _put_row(self, recording: Recording, upload: Upload) -> AnnotationSet:
+        """Its annotations, which are in the store from now on. Raises OSError too."""
         if is_another(recording, upload):
             raise Refused(ANOTHER)
         id, digest = recording["id"], row.digest_of(recording, upload)
         path = self.catalog.path(id)
-        sent = said.NOTHING if path is None else said.said_of(path)
-        is_silent = sent == said.NOTHING and _annotations(recording) == _annotations(None)
+        sent = annotation_upload.NOTHING if path is None else annotation_upload.annotation_set(path)
+        is_silent = sent == annotation_upload.NOTHING and _annotations(recording) == _annotations(None)
         if not upload.is_deleted or not is_silent:  # what came back may have lost them
-            all_said = None if path is None else said.send(self.store, recording["vehicle"], id, path)
-            self.store.put(names.row_key(recording["vehicle"], id), row.made(recording, upload, all_said))
+            annotations = None if path is None else annotation_upload.send(self.store, recording["vehicle"], id, path)
+            self.store.put(names.row_key(recording["vehicle"], id), row.made(recording, upload, annotations))
 
         def keep(upload: Upload) -> None:
             upload.row = digest
@@ -170,8 +171,8 @@ class Copying:
         return digest.hexdigest() == sha256
 
     def delete_here(self, id: str, pace: Pace) -> None:
-        """Deletes the recording on this machine for good, where its copy is proved and what people said of it is in
-        the store. Raises NotTheSame, FileChanged, Refused, OSError, and what the pace raises; then nothing was deleted.
+        """Deletes the recording on this machine for good, where its copy is proved and its annotations are in the
+        store. Raises NotTheSame, FileChanged, Refused, OSError, and what the pace raises; then nothing was deleted.
         """
         _, path = self._need(id)
         _need_one_file(path)
@@ -190,13 +191,13 @@ class Copying:
         with contextlib.suppress(NotThere):
             self._destroy(recording, sent, pace)
 
-    def _destroy(self, recording: Recording, sent: Said, pace: Pace) -> None:
-        """Where nobody said anything of it since its row was sent, and nobody took the request back."""
+    def _destroy(self, recording: Recording, sent: AnnotationSet, pace: Pace) -> None:
+        """Where nobody changed its annotations since its row was sent, and nobody withdrew the request."""
         moved = self.catalog.put_in_trash(recording["id"])
         try:
             pace.check()
             _need_one_file(self.catalog.folder / moved.path)
-            now = said.said_of(self.catalog.folder / moved.path)
+            now = annotation_upload.annotation_set(self.catalog.folder / moved.path)
             is_as_sent = now == sent and _annotation_fields(now.annotations) == _annotations(recording)
             if is_as_sent:
                 self.uploads.change(recording["id"], _note_deleted)
@@ -250,14 +251,14 @@ def _begin(upload: Upload, size: int, changed_ns: int) -> None:
 
 
 def _annotations(recording: Recording | None) -> tuple[str, str, str, tuple[str, ...]]:
-    """As the row has them; None: of one of which nothing was said."""
+    """As the row has them; None: of one without annotations."""
     if recording is None:
         return _annotation_fields(NONE)
     return recording["title"], recording["note"], recording["weather"], tuple(recording["tags"])
 
 
-def _annotation_fields(said: Annotations) -> tuple[str, str, str, tuple[str, ...]]:
-    return said.title, said.note, said.weather, said.tags
+def _annotation_fields(beside: Annotations) -> tuple[str, str, str, tuple[str, ...]]:
+    return beside.title, beside.note, beside.weather, beside.tags
 
 
 def _note_deleted(upload: Upload) -> None:

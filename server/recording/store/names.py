@@ -4,7 +4,7 @@ catalogue/<vehicle>/<id>.json              the row of a recording, its alarms an
 files/<vehicle>/<id>/<id>.mcap             its file, or, where it is larger than PART_BYTES:
 files/<vehicle>/<id>/<id>.mcap.part-00001  … in parts; one after the other they are the file
 files/<vehicle>/<id>/clip_<time>.mcap      the time around an alarm
-files/<vehicle>/<id>/annotations.json      what was said of it, late marks too: the <id>.mcap.json beside its file
+files/<vehicle>/<id>/annotations.json      its annotations, late marks too: the <id>.mcap.json beside its file
 files/<vehicle>/<id>/marks/<mark>.<kind>   a voice note or photo that came after it was complete
 """
 
@@ -55,7 +55,7 @@ def annotations_key(vehicle: str, id: str) -> str:
 
 
 def part_count(size: int) -> int:
-    """Into how many objects a file of so many bytes goes."""
+    """The number of objects for a file of `size` bytes."""
     return max(1, -(-size // PART_BYTES))
 
 

@@ -23,7 +23,7 @@ from urllib3.exceptions import HTTPError, SSLError
 from server.recording.store.address import StoreAddress
 from server.recording.store.trouble import Kind, StoreTrouble, code_of, of_answer, unreachable, untrusted
 
-_STEP_S = 0.2  # after which it is asked again whether the transfer may go on
+_STEP_S = 0.2  # between two checks whether the transfer may continue
 
 PORTION = 64 * 1024  # sent at once
 READ_PORTION = 2**20  # a request
@@ -34,7 +34,7 @@ T = TypeVar("T")
 
 
 class Pace:
-    """Holds a transfer to so many bytes a second, and ends it when it must end.
+    """Limits a transfer to a number of bytes a second, and ends it when it must end.
 
     `may_go_on` is called before each portion and raises where the transfer must end.
     """
@@ -58,7 +58,7 @@ class Pace:
         self._may_go_on()
 
     def take(self, count: int) -> None:
-        """Returns when so many more bytes may be sent or received."""
+        """Return when that number of further bytes may be sent or received."""
         self._may_go_on()
         rate = self._bytes_per_s()
         if rate <= 0:
@@ -104,7 +104,7 @@ class ObjectStore:
             secret_access_key=address.login.secret,
             virtual_hosted_style_request=address.endpoint is None,
             client_options=options,  # type: ignore[arg-type]
-            retry_config={"max_retries": 0},  # the uploader retries, and says so
+            retry_config={"max_retries": 0},  # the uploader retries, and shows that
             **config,
         )
         self._pool = urllib3.PoolManager(
@@ -128,7 +128,7 @@ class ObjectStore:
             )
         except SSLError:
             raise untrusted(self.address.host) from None
-        except (HTTPError, OSError):  # its words hold the address with the signature
+        except (HTTPError, OSError):  # its text holds the address with the signature
             raise unreachable(self.address.host) from None
         if answer.status != 200:
             raise self._refused(answer.status, code_of(answer.data[:4000].decode("utf-8", "replace")))

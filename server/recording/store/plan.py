@@ -44,7 +44,7 @@ def is_deletion_due(rule: StoreRule, upload: Upload) -> bool:
 
 
 def backoff_ms(tries: int) -> int:
-    """How long nothing is tried after so many failures in succession."""
+    """The pause after that number of failures in succession."""
     return min(LAST_BACKOFF_MS, FIRST_BACKOFF_MS << min(tries - 1, 20))
 
 
@@ -60,7 +60,7 @@ class Plan:
         *,
         wall_ms: Callable[[], int],
     ) -> None:
-        """`why_not` says why the whole file is not sent now; None: it is."""
+        """`why_not` returns why the whole file is not sent now; None: it is."""
         self._catalog = catalog
         self._uploads = uploads
         self._situation = situation

@@ -102,7 +102,7 @@ def digest_of(row: Recording, upload: Upload) -> str:
 
 def made(row: Recording, upload: Upload, annotations: dict[str, Any] | None = None) -> bytes:
     """The object: all that the agent's list has of it, and the files of it that are in the store; `annotations`: the
-    object with all that people said."""
+    object with all annotations."""
     verified = upload.verified
     name = f"{row['id']}.{row['format']}"
     file: dict[str, Any] | None = None

@@ -1,5 +1,4 @@
-"""What people said of a recording, as it goes into the store: all words and marks beside its file, voice notes and
-photos."""
+"""The annotations of a recording, as they are stored: all texts and marks beside its file, voice notes and photos."""
 
 from __future__ import annotations
 
@@ -16,27 +15,27 @@ from server.recording.store.object_store import ObjectStore
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Said:
-    """What is beside a file. Another value: something else was said."""
+class AnnotationSet:
+    """What is beside a file. Another value: it was changed."""
 
     annotations: Annotations = NONE
     media: tuple[tuple[str, int, int], ...] = ()  # name, size and time of change
 
 
-NOTHING = Said()
+NOTHING = AnnotationSet()
 
 
-def said_of(path: Path) -> Said:
+def annotation_set(path: Path) -> AnnotationSet:
     """What is beside a recording now. Raises OSError."""
     stats = [(file.name, file.stat()) for file in late_media(path)]
-    return Said(
+    return AnnotationSet(
         annotations=annotation_store.read(path),
         media=tuple((name, stat.st_size, stat.st_mtime_ns) for name, stat in stats),
     )
 
 
 def send(store: ObjectStore, vehicle: str, id: str, path: Path) -> dict[str, Any] | None:
-    """Puts it all into the store; the object of the words and marks, for the row, None: there are none. Raises
+    """Put it all into the store; return the object of the texts and marks, for the row, None: there are none. Raises
     StoreTrouble, OSError."""
     for file in late_media(path):
         store.put(names.mark_key(vehicle, id, file.name), file.read_bytes())

@@ -19,9 +19,9 @@ from server.recording.store.trouble import Kind, StoreTrouble
 
 log = logging.getLogger("catgraph.store")
 
-FAILED_S = 5.0  # after a failure the store is not asked for its list
-_WAITS_S = 2.0  # for the list that another request asks for
-FRESH_S = 10.0  # a list is asked of the store again after this time
+FAILED_S = 5.0  # after a failure the list is not requested from the store
+_WAITS_S = 2.0  # for the list that another request fetches
+FRESH_S = 10.0  # the list is requested from the store again after this time
 MOST_LISTED = 50_000
 MAX_ROWS = 100  # a page
 MOST_KEPT = 5_000  # rows in memory

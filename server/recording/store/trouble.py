@@ -1,4 +1,4 @@
-"""What goes wrong with a store, as sentences."""
+"""The faults of a store, as sentences."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ from server.system.supervision import Supervisor
 
 log = logging.getLogger("catgraph.store")
 
-LOOK_S = 10.0  # between two looks at the list of recordings, if nothing is asked for
+LOOK_S = 10.0  # between two looks at the list of recordings, if nothing is requested
 SOON_S = 1.0  # while recordings are being read, or the store is away
 OBSERVE_S = 1.0
 _STOPS_WITHIN_S = 3.0
@@ -118,11 +118,11 @@ class Uploader:
         if is_another(row, self._uploads.get(id)):
             raise Refused(ANOTHER)
         self._change(id, lambda upload: _note_request(upload, deletes=deletes))
-        self._trouble = None  # who asks wants it tried now
+        self._trouble = None  # a request is tried now
         self.rouse()
 
     def withdraw(self, id: str) -> None:
-        """The whole file is not asked for any more, nor its deletion here. Raises Refused."""
+        """The whole file is not requested any more, nor its deletion here. Raises Refused."""
         self._change(id, _forget_request)
         self.rouse()
 

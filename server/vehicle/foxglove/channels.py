@@ -90,7 +90,7 @@ class Offered:
             case "/rosapi/topic_type" if (type := self.type_of(topic)) is not None:
                 return {"type": type}
             case "/rosapi/get_time":
-                return {}  # the server is there; it has no clock that can be asked for
+                return {}  # the server is there; it has no clock that can be read
             case "/rosapi/publishers" if self.has_graph or topic not in self._ours:
                 return {"publishers": self._nodes_that_publish(topic)}
             case "/rosapi/subscribers" if self.has_graph:

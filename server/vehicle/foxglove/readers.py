@@ -1,4 +1,4 @@
-"""The readers of a server's channels: each reads messages into dicts as rosbridge's JSON has them, or says why not.
+"""The readers of a server's channels: each decodes messages into dicts as in rosbridge's JSON, or gives a reason.
 
 Making one takes milliseconds, so they are made in a thread, one after the other, and kept over all openings; the
 decoders are those that read recordings.

@@ -18,7 +18,7 @@ GRAPH = "connectionGraph"
 FIRST_CHANNELS_S = 0.5  # after it has named itself, a server names what it offers
 
 
-class Asked(Protocol):
+class CallSource(Protocol):
     @property
     def is_open(self) -> bool: ...
     async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any: ...
@@ -32,7 +32,7 @@ class Answers:
 
     unanswered = 0
 
-    def __init__(self, source: Asked) -> None:
+    def __init__(self, source: CallSource) -> None:
         self._source = source
 
     @property
@@ -55,7 +55,7 @@ class Answers:
 class Subscribed:
     """What is wanted of a server, topic by topic, and under which numbers it is subscribed to.
 
-    Over all openings; the table is kept. `send(frame)` sends now; `sent(topic, number)` goes before each.
+    Over all openings; the table is kept. `send(frame)` sends now; `sent(topic, number)` is called before each.
     """
 
     def __init__(self, send: Callable[[bytes], None], sent: Callable[[str, int], None]) -> None:
@@ -111,8 +111,8 @@ class ServerState:
         self._timer: asyncio.TimerHandle | None = None
 
     def introduced(self, info: ServerInfo) -> bool:
-        """A server named itself, for the first time or with another session: what it offers stays. Whether its nodes
-        are to be asked for."""
+        """A server named itself, for the first time or with another session: what it offers stays. Return whether its
+        nodes are to be requested."""
         if self.commands is None:
             self.commands = Commands(info)
             self._timer = asyncio.get_running_loop().call_later(FIRST_CHANNELS_S, self._is_known.set)

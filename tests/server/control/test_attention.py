@@ -78,11 +78,11 @@ def test_a_car_that_needs_nobody_has_no_item(act: Callable[[Attention], ItemAct 
         ("release", "This car is unassigned"),
         ("offer", "This car is unassigned"),
         ("withdraw", "This car is unassigned"),
-        ("accept", "You are not asked to take over"),
-        ("decline", "You are not asked to take over"),
+        ("accept", "You have no offer to take over"),
+        ("decline", "You have no offer to take over"),
     ],
 )
-def test_what_only_a_holder_or_who_is_asked_may_do(act: str, why: str) -> None:
+def test_what_only_a_holder_or_who_has_an_offer_may_do(act: str, why: str) -> None:
     with pytest.raises(Refused, match=why):
         ACTS[act](begun())
 
@@ -124,12 +124,12 @@ def test_an_offer_leaves_it_where_it_is_until_it_is_accepted() -> None:
     attention.take(ANN, 1.0)
     offered = attention.offer(ANN, BEN, 2.0)
     assert offered is not None
-    assert (offered.change, offered.text, offered.holder) == ("offered", "Ann asks Ben to take over.", ANN)
-    assert attention.offer(ANN, BEN, 2.5) is None, "asked already"
-    with pytest.raises(Refused, match="You are not asked"):
+    assert (offered.change, offered.text, offered.holder) == ("offered", "Ann offered it to Ben.", ANN)
+    assert attention.offer(ANN, BEN, 2.5) is None, "offered already"
+    with pytest.raises(Refused, match="You have no offer"):
         attention.answer(CEM, 3.0, accept=True)
     accepted = attention.answer(BEN, 3.0, accept=True)
-    assert (accepted.text, accepted.holder, accepted.before) == ("Assigned to Ben: Ann had asked.", BEN, ANN)
+    assert (accepted.text, accepted.holder, accepted.before) == ("Assigned to Ben: Ann had offered it.", BEN, ANN)
     assert attention.item is not None
     assert attention.item.offered is None
 
@@ -145,7 +145,7 @@ def test_an_offer_ends(how: str) -> None:
         case "withdraw":
             act = attention.withdraw(ANN)
             assert act is not None
-            assert act.text == "Ann does not ask Ben any more."
+            assert act.text == "Ann withdrew the offer to Ben."
             assert attention.withdraw(ANN) is None
         case "release":
             assert attention.release(ANN).text == "Ann gave it back: unassigned."
@@ -159,7 +159,7 @@ def test_an_offer_ends(how: str) -> None:
         attention.answer(BEN, 4.0, accept=True)
 
 
-def test_who_is_asked_may_simply_take_it() -> None:
+def test_who_has_an_offer_may_simply_take_it() -> None:
     attention = begun()
     attention.take(ANN, 1.0)
     attention.offer(ANN, BEN, 2.0)
@@ -168,7 +168,7 @@ def test_who_is_asked_may_simply_take_it() -> None:
     assert (act.change, act.holder) == ("accepted", BEN)
 
 
-def test_nobody_asks_himself() -> None:
+def test_nobody_makes_an_offer_to_himself() -> None:
     attention = begun()
     attention.take(ANN, 1.0)
     with pytest.raises(Refused, match="This car is assigned to you: ask another person"):
@@ -219,8 +219,8 @@ def test_taking_stops_the_timer_and_releasing_begins_it_anew() -> None:
 def test_a_silent_page_loses_it_and_the_timer_begins_anew() -> None:
     attention = begun()
     attention.take(ANN, 1.0)
-    attention.hear(BEN, 9.0)  # another's page keeps nothing
-    attention.hear(ANN, 5.0)
+    attention.mark_present(BEN, 9.0)  # another's page keeps nothing
+    attention.mark_present(ANN, 5.0)
     assert attention.advance(CRITICAL, 5.0 + UNHEARD_S) == []
     acts = attention.advance(CRITICAL, 15.1)
     assert [(act.change, act.text, act.by, act.holder, act.before) for act in acts] == [
@@ -236,11 +236,11 @@ def test_after_a_stall_a_silent_page_loses_it_and_nothing_is_escalated_at_once()
     assert changes(attention.advance(CRITICAL, 1000.0 + ESCALATES_S)) == ["escalated"]
 
 
-def test_a_page_that_is_heard_keeps_it_for_hours() -> None:
+def test_a_page_that_reports_keeps_it_for_hours() -> None:
     attention = begun()
     attention.take(ANN, 0.0)
     for second in range(1, 7200):
-        attention.hear(ANN, float(second))
+        attention.mark_present(ANN, float(second))
         assert attention.advance(CRITICAL, second + 0.5) == []
     assert attention.holder == ANN
 
@@ -249,7 +249,7 @@ def test_an_offer_to_a_page_that_is_gone_ends() -> None:
     attention = begun()
     attention.take(ANN, 0.0)
     attention.offer(ANN, BEN, 1.0)
-    attention.hear(ANN, 11.0)
+    attention.mark_present(ANN, 11.0)
     acts = attention.advance(CRITICAL, 11.1)
     assert [(act.change, act.text, act.holder) for act in acts] == [
         ("withdrawn", "The page of Ben is silent: the offer of Ann has ended.", ANN)
@@ -259,7 +259,7 @@ def test_an_offer_to_a_page_that_is_gone_ends() -> None:
 def test_the_name_that_a_page_gives_itself_later_is_shown() -> None:
     attention = begun()
     attention.take(ANN, 0.0)
-    attention.hear(Operator(page=ANN.page, who=ANN.who, name="Anna"), 1.0)
+    attention.mark_present(Operator(page=ANN.page, who=ANN.who, name="Anna"), 1.0)
     assert attention.holder is not None
     assert attention.holder.name == "Anna"
 
@@ -316,8 +316,8 @@ class AnyCourse(RuleBasedStateMachine):
         self.note(self.attention.advance(need, self.now_s))
 
     @rule(who=people)
-    def heard(self, who: Operator) -> None:
-        self.attention.hear(who, self.now_s)
+    def page_reports(self, who: Operator) -> None:
+        self.attention.mark_present(who, self.now_s)
         if who == self.holder:
             self.heard_s = self.now_s
 

@@ -1,4 +1,4 @@
-"""The gate of a vehicle's orders: pages, programs and this machine's own console, and what the log says of it."""
+"""The authorization of a vehicle's commands: pages, programs, this machine's console, and its log lines."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ class Vehicle:
 
     def see(self, *pages: Caller, now_s: float, **more: Any) -> None:
         for page in pages:
-            word = commands.read(READY | more)
-            assert isinstance(word, commands.PresentWord)
-            self.gate.hear(word, page, now_s)
+            status = commands.read(READY | more)
+            assert isinstance(status, commands.PresentWord)
+            self.gate.update_status(status, page, now_s)
 
     def do(self, page: Caller, what: str, now_s: float, **more: Any) -> int | None:
         command = commands.read({"kind": "control", "do": what} | more)
         assert isinstance(command, commands.TakeControl)
-        return self.gate.obey(command, page, now_s)
+        return self.gate.execute(command, page, now_s)
 
     def shown(self, now_s: float) -> dict[str, Any]:
         found: dict[str, Any] = self.gate.as_json(now_s, 1_700_000_000_000)["control"]
@@ -56,7 +56,7 @@ PROGRAM = Caller(name="api · curl", who="program")
 CONSOLE = Caller(name="api · curl", who="local", is_console=True)
 
 
-def test_the_first_order_of_a_page_that_is_seen_takes_control_and_says_so() -> None:
+def test_the_first_order_of_a_page_that_is_seen_takes_control_and_is_logged() -> None:
     car = Vehicle()
     car.see(ANN, BEN, now_s=0.0)
     car.gate.admit(PAUSE, ANN, 0.5)
@@ -82,7 +82,7 @@ def test_a_page_that_nobody_sees_is_served_and_has_no_lease() -> None:
         car.do(ANN, "take", 1.0)
 
 
-def test_what_any_operator_may_do_asks_nobody() -> None:
+def test_what_any_operator_may_do_needs_no_control() -> None:
     car = Vehicle()
     car.see(ANN, now_s=0.0)
     car.do(ANN, "take", 0.0)
@@ -142,7 +142,7 @@ def test_lost_by_sleep_taken_by_another_and_the_sleeper_s_order_is_refused() -> 
     assert car.acts == ["taken", "lapsed", "taken"]
 
 
-def test_back_within_30_s_it_is_the_same_page_s_again_and_the_log_says_so() -> None:
+def test_back_within_30_s_it_is_the_same_page_s_again_and_that_is_logged() -> None:
     car = Vehicle()
     car.see(ANN, now_s=0.0)
     car.do(ANN, "take", 0.0)
@@ -198,7 +198,7 @@ def test_a_page_that_is_closed_keeps_nobody_waiting_and_one_that_is_loaded_anew_
     assert car.shown(3.3)["holder"] == "Ben"
 
 
-def test_whoever_asked_has_control_as_soon_as_the_holder_has_left() -> None:
+def test_who_requested_it_has_control_as_soon_as_the_holder_has_left() -> None:
     car = Vehicle()
     car.see(ANN, BEN, now_s=0.0)
     car.do(ANN, "take", 0.0)
@@ -207,7 +207,7 @@ def test_whoever_asked_has_control_as_soon_as_the_holder_has_left() -> None:
     assert car.shown(2.0)["holder"] == "Ben"
 
 
-def test_a_page_that_shows_a_replay_keeps_control_and_hears_no_alarm() -> None:
+def test_a_page_that_shows_a_replay_keeps_control_and_sounds_no_alarm() -> None:
     car = Vehicle()
     car.see(page("Ann", is_replaying=True), now_s=0.0)
     assert (car.gate.facts(0.0).can, car.gate.facts(0.0).why) == (0, "shows a replay")

@@ -1,4 +1,4 @@
-"""The departure check: what turns by itself, what is seen, what a person says, and the signature; in virtual time."""
+"""The departure check: what turns by itself, what is seen, what a person enters, and the signature; in virtual time."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def item(kind: DepartureKind = "manual", of: str = "", need: float | None = None
         (item("disk"), replace(READY, room_gb=None), ("open", "known once it records")),
         (item("clock"), READY, ("done", "differs 0.02 s")),
         (item("clock"), replace(READY, ahead_s=-0.84), ("failed", "differs 0.84 s")),
-        (item("clock"), replace(READY, ahead_s=None), ("open", "the car does not tell its time")),
+        (item("clock"), replace(READY, ahead_s=None), ("open", "the car does not send its time")),
     ],
     ids=lambda value: value.kind if isinstance(value, Item) else value[1] if isinstance(value, tuple) else "",
 )  # fmt: skip
@@ -95,7 +95,7 @@ def test_automatic_items_turn_by_what_is_known(one: Item, seen: Seen, result: tu
     assert walk.result(one) == result
 
 
-def test_a_failed_item_that_is_fixed_turns_by_itself_and_says_so() -> None:
+def test_a_failed_item_that_is_fixed_turns_by_itself_and_is_marked_as_fixed() -> None:
     recorder = item("recorder")
     walk = Walk(recorder)
     walk.see(replace(READY, is_recording=False), 1.9)
@@ -138,7 +138,7 @@ def test_a_pedal_passes_as_soon_as_it_was_pressed_far_enough_and_holds_its_peak(
     assert walk.result(pedal) == ("done", "34 %")
 
 
-def test_what_a_person_says_failed_stays_until_it_is_taken_back_and_done_again() -> None:
+def test_what_a_person_marks_as_failed_stays_until_it_is_taken_back_and_done_again() -> None:
     pedal = item("brake", need=20.0)
     walk = Walk(pedal)
     pressed = replace(READY, brake_percent=34.0)
@@ -238,7 +238,7 @@ def test_it_is_signed_only_when_nothing_is_failed_or_open() -> None:
     assert walk.check.counts() == {"done": 0, "failed": 0, "not_applicable": 0, "of": 3}
 
 
-def test_nothing_is_said_of_a_check_that_is_not_begun() -> None:
+def test_nothing_is_logged_of_a_check_that_is_not_begun() -> None:
     check = DepartureCheck([item()])
     for doing in (
         lambda: check.set_item("manual", "done", "", "Ann", 0),
@@ -274,7 +274,7 @@ def test_results_do_not_pass_to_other_items_of_a_list_that_is_changed_while_it_i
     walk.check.reopen()
     walk.see(READY)
     assert walk.result(tyres)[0] == "open"
-    assert walk.result(brake)[0] == "done", "how it is fixed is not what it asks"
+    assert walk.result(brake)[0] == "done", "how it is fixed is not what it requires"
     walk.say(tyres, "done")
     assert walk.result(tyres)[0] == "done"
 
@@ -340,7 +340,7 @@ def test_a_bad_list_is_refused_with_a_sentence(text: str, why: str) -> None:
     assert refused.value.reason.isprintable()
 
 
-def test_an_interval_is_no_part_of_what_an_item_asks() -> None:
+def test_an_interval_is_no_part_of_what_an_item_requires() -> None:
     plain, often = of_rows([ROW]), of_rows([{**ROW, "every_days": 30, "every_km": 500}])
     assert from_toml(to_toml(often)) == often
     assert (plain[0].is_recurring, often[0].is_recurring) == (False, True)

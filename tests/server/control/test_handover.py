@@ -73,7 +73,7 @@ def test_only_the_taker_reads_back(offered: Handover) -> None:
     assert offered.end(BEN).by == ANN
 
 
-def test_words_of_a_measured_value_do_not_change_the_version() -> None:
+def test_the_text_of_a_measured_value_does_not_change_the_version() -> None:
     assert version_of(LINES) == version_of([LIMIT, replace(SPEED, text="12.1 of 11.0 m/s")])
     assert version_of(LINES) != version_of([SPEED])
 

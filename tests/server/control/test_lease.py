@@ -52,7 +52,7 @@ def test_an_order_of_another_lease_is_refused_even_the_holder_s_own(fence: int) 
 
 
 @pytest.mark.parametrize("fence", [7, None])
-def test_another_page_s_order_is_refused_and_says_who_is_in_control(fence: int | None) -> None:
+def test_another_page_s_order_is_refused_and_names_who_is_in_control(fence: int | None) -> None:
     with pytest.raises(NotInControl) as refused:
         held().admit(BEN, fence)
     assert refused.value.reason == "Ann is in control."
@@ -95,7 +95,7 @@ def test_a_page_that_is_seen_keeps_it_and_a_silent_one_loses_it_after_3_s() -> N
     assert control.lease is None
 
 
-def test_another_page_s_word_renews_nothing() -> None:
+def test_another_page_s_status_renews_nothing() -> None:
     control = held()
     control.present(BEN, 2.9)
     assert changes(control.advance(3.1, everybody)) == ["lapsed"]
@@ -175,9 +175,9 @@ def kept_alive(control: Control, until_s: float, holder: Operator = ANN) -> list
 
 def test_silence_grants_after_10_s_and_not_before() -> None:
     control = held()
-    asked = control.request(BEN, 0.0)
-    assert asked is not None
-    assert (asked.change, asked.text, asked.holder) == ("requested", "Ben requests control from Ann.", ANN)
+    requested = control.request(BEN, 0.0)
+    assert requested is not None
+    assert (requested.change, requested.text, requested.holder) == ("requested", "Ben requests control from Ann.", ANN)
     assert control.request(BEN, 1.0) is None  # once
     assert kept_alive(control, ANSWER_S - 0.1) == []
     (act,) = control.advance(ANSWER_S, everybody)
@@ -195,7 +195,7 @@ def test_the_holder_keeps_it_and_the_request_is_over() -> None:
         control.keep(ANN, 7, BEN.page)
 
 
-def test_the_holder_hands_it_over_to_who_asked_or_to_another() -> None:
+def test_the_holder_hands_it_over_to_who_requested_it_or_to_another() -> None:
     control = held()
     control.request(BEN, 0.0)
     granted = control.hand_over(ANN, 7, BEN, 1.0)
@@ -219,7 +219,7 @@ def test_a_request_ends_with_the_page_that_made_it_or_when_it_is_taken_back() ->
 
 
 @pytest.mark.parametrize("end", ["lapse", "release"])
-def test_who_asked_has_it_where_the_holder_goes(end: str) -> None:
+def test_who_requested_it_has_it_where_the_holder_leaves(end: str) -> None:
     control = held()
     control.request(BEN, 2.0)
     control.request(CEM, 2.5)
@@ -291,13 +291,13 @@ class AnyCourse(RuleBasedStateMachine):
     def time_passes(self, seconds: float) -> None:
         self.now_s += seconds
         before = self.control.holder
-        asked = [request.of for request in self.control.requests if self.is_here(request.of)]
+        requested = [request.of for request in self.control.requests if self.is_here(request.of)]
         acts = self.control.advance(self.now_s, self.is_here)
         assert not acts or acts[-1].holder == self.control.holder
         for act in acts:
             self.note(act)
             assert act.change in ("lapsed", "granted")
-            assert act.change != "granted" or act.holder == asked[0]
+            assert act.change != "granted" or act.holder == requested[0]
         if before is not None and self.control.holder == before:
             assert self.now_s - self.seen_s[before] <= LEASE_S
 
@@ -336,7 +336,7 @@ class AnyCourse(RuleBasedStateMachine):
         assert self.control.holder == one
 
     @rule(one=people)
-    def asks(self, one: Operator) -> None:
+    def requests(self, one: Operator) -> None:
         was = self.control.holder
         self.note(self.control.request(one, self.now_s))
         assert self.control.holder == (one if was is None else was)

@@ -11,8 +11,8 @@ from server.control.lease import ANSWER_S, LEASE_S, RETURN_S, Act, Control, Leas
 from tests.server.control.test_lease import ANN, BEN, CEM, everybody, held
 
 
-def asked() -> Control:
-    """Ann is in control since 0 s; Ben asks since 1 s, Cem since 2 s."""
+def requested() -> Control:
+    """Ann is in control since 0 s; Ben requests it since 1 s, Cem since 2 s."""
     control = held()
     control.request(BEN, 1.0)
     control.request(CEM, 2.0)
@@ -48,13 +48,13 @@ def test_who_did_what_and_who_has_it_by_which_number(
     fence: int | None,
     before: Operator | None,
 ) -> None:
-    control = asked()
+    control = requested()
     act = last(do(control))
     assert act is not None
     assert (act.change, act.holder, act.fence, act.before) == (change, holder, fence, before)
     assert (act.by.name if isinstance(by, str) and act.by else act.by) == by
     if holder is not None and holder != ANN:
-        assert control.requests == ()  # whoever asks must ask the new holder anew
+        assert control.requests == ()  # a request to the former holder ends
         assert control.lease is not None
         assert control.lease.since_s == control.lease.renewed_s >= 3.0
         assert control.lapsed is None
@@ -73,7 +73,7 @@ def test_a_lease_is_renewed_with_its_number_and_its_beginning() -> None:
     )
 
 
-def test_it_lapses_at_the_limit_and_says_for_how_long_it_was_silent() -> None:
+def test_it_lapses_at_the_limit_and_names_for_how_long_it_was_silent() -> None:
     control = held()
     assert control.advance(LEASE_S, everybody) == []
     (act,) = control.advance(7.4, everybody)
@@ -105,7 +105,7 @@ def test_the_return_is_over_with_time_alone(after_s: float, returns: bool) -> No
 
 @pytest.mark.parametrize(("after_s", "granted"), [(ANSWER_S - 0.001, False), (ANSWER_S, True)])
 def test_of_two_who_ask_the_first_has_it_after_its_time(after_s: float, granted: bool) -> None:
-    control = asked()
+    control = requested()
     control.present(ANN, 1.0 + after_s)
     acts = control.advance(1.0 + after_s, everybody)
     assert [(act.change, act.by, act.holder, act.before) for act in acts] == (
@@ -114,7 +114,7 @@ def test_of_two_who_ask_the_first_has_it_after_its_time(after_s: float, granted:
 
 
 def test_a_request_of_a_page_that_is_away_is_forgotten_and_the_next_one_counts() -> None:
-    control = asked()
+    control = requested()
     control.present(ANN, 12.0)
     (act,) = control.advance(12.0, lambda one: one != BEN)
     assert act.holder == CEM
@@ -140,17 +140,17 @@ def test_what_is_refused_names_the_holder() -> None:
 
 
 def test_handed_to_itself_nothing_happens() -> None:
-    control = asked()
+    control = requested()
     assert control.hand_over(ANN, 7, ANN, 3.0) is None
     assert [one.of for one in control.requests] == [BEN, CEM]
     assert [one.asked_s for one in control.requests] == [1.0, 2.0]
 
 
 def test_a_kept_or_withdrawn_request_leaves_the_others() -> None:
-    control = asked()
+    control = requested()
     control.keep(ANN, 7, BEN.page)
     assert [one.of for one in control.requests] == [CEM]
-    control = asked()
+    control = requested()
     control.withdraw(CEM)
     assert [one.of for one in control.requests] == [BEN]
 

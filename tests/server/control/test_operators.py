@@ -26,7 +26,7 @@ SEEN = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready", 
 
 
 async def be_seen(one: Viewer) -> None:
-    """As a page says it once a second."""
+    """As a page reports it once a second."""
     with contextlib.suppress(websockets.ConnectionClosed):
         while True:
             await one.send(SEEN)
@@ -102,7 +102,7 @@ async def test_this_machine_s_own_console_is_never_refused_and_named(server: str
 
 
 @pytest.mark.virtual_time
-async def test_what_a_page_says_of_who_it_is_counts_for_nothing(server: str) -> None:
+async def test_the_name_that_a_page_claims_does_not_count(server: str) -> None:
     async with operator(server, "Ann", "page-ann") as ann, operator(server, "Ben", "page-ben") as ben:
         assert (await ann.ask(kind="control", do="take"))["ok"]
         answer = await ben.ask(kind="pause", by="Ann", who="local", page="page-ann", console=True)
@@ -113,7 +113,7 @@ async def test_what_a_page_says_of_who_it_is_counts_for_nothing(server: str) -> 
 async def test_nonsense_about_presence_is_answered(server: str) -> None:
     async with operator(server, "Ann", "page-ann") as ann:
         await ann.send(SEEN | {"sound": "deafening"})
-        await ann.until(lambda: any(said["kind"] == "problem" and "sound" in said["reason"] for said in ann.other))
+        await ann.until(lambda: any(one["kind"] == "problem" and "sound" in one["reason"] for one in ann.other))
         assert (await ann.state())["reach"]["can"] == 1
 
 
@@ -132,7 +132,7 @@ async def test_a_page_that_is_closed_is_not_waited_for_and_one_that_breaks_off_i
 
 
 @pytest.mark.virtual_time
-async def test_nobody_hears_alarms_on_a_server_that_nobody_looks_at(bridge: RosBridge, server: str) -> None:
+async def test_alarms_reach_nobody_on_a_server_without_pages(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), http_client(base_url=server) as program:
         async with asyncio.timeout(30):
             while True:
@@ -165,7 +165,7 @@ async def test_a_choice_of_phone_outlasts_connection_and_server(bridge: RosBridg
         assert (await ann.state(lambda s: s["phone"] is None))["phones"] == []
 
 
-async def test_the_recording_says_who_ordered_from_which_page(bridge: RosBridge, tmp_path: Path) -> None:
+async def test_the_recording_holds_who_ordered_from_which_page(bridge: RosBridge, tmp_path: Path) -> None:
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)  # type: ignore[attr-defined]
     async with driving(bridge), serving(config) as base, operator(base, "Ann", "page-ann") as ann:
         await ann.state(lambda s: s["recording"]["state"] == "recording")
@@ -195,7 +195,7 @@ async def test_the_recording_says_who_ordered_from_which_page(bridge: RosBridge,
 # -- where devices are paired ------------------------------------------------------------------------------------------
 
 
-async def test_a_program_is_refused_while_a_page_is_in_control_and_told_by_whom(tmp_path: Path) -> None:
+async def test_a_program_is_refused_while_a_page_is_in_control_with_its_name(tmp_path: Path) -> None:
     async with paired_server(keyed(tmp_path)) as served, served.paired(Role.OPERATOR, "Pixel 7") as browser:
         program = {"Authorization": f"Bearer {OPERATOR_KEY}"}
         async with served.browser() as outside:
@@ -209,7 +209,7 @@ async def test_a_program_is_refused_while_a_page_is_in_control_and_told_by_whom(
                 assert taken["ok"], taken
                 refused = await outside.post("/api/pause", headers=program)
                 assert (refused.status_code, refused.json()["detail"]) == (409, "Pixel 7 is in control.")
-                assert refused.json()["held_by"] == "Pixel 7"  # as the list of devices has it, whatever the page says
+                assert refused.json()["held_by"] == "Pixel 7"  # as the list of devices has it, whatever the page claims
                 by_page = await browser.post("/api/pause", headers={"X-Catgraph-Fence": str(taken["fence"])})
                 assert by_page.status_code == 200
                 old = await browser.post("/api/resume", headers={"X-Catgraph-Fence": str(taken["fence"] - 1)})

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from server.rosbridge.sent_rows import SentRows
-from server.vehicle.car_marks import TOPIC, Asked, CarMarks
+from server.vehicle.car_marks import TOPIC, ButtonSubscription, CarMarks
 from server.vehicle.delivery import Delivery
 from server.vehicle.message_intake import MessageIntake
 from server.vehicle.subscription_table import BY_NAME_AGAIN_S, SubscriptionTable
@@ -46,11 +46,11 @@ def test_where_a_second_subscription_is_not_possible_none_is_expected_to_be_answ
     rows = cast("Any", topics.table._link)
     topics.now_s += 10.0
     assert topics.table.probe(TOPIC)
-    assert topics.table.button == Asked(110.0, is_renewal=True)
+    assert topics.table.button == ButtonSubscription(110.0, is_renewal=True)
     rows.again = lambda topic: False
     topics.now_s += 10.0
     assert not topics.table.probe(TOPIC)
-    assert topics.table.button == Asked(110.0, is_renewal=True)
+    assert topics.table.button == ButtonSubscription(110.0, is_renewal=True)
 
 
 def test_a_quiet_row_that_is_renewed_is_no_first_subscription() -> None:
@@ -58,25 +58,29 @@ def test_a_quiet_row_that_is_renewed_is_no_first_subscription() -> None:
     topics = Topics()
     topics.opened()
     topics.table.subscribe_by_name({})
-    assert topics.table.button == Asked(100.0)
+    assert topics.table.button == ButtonSubscription(100.0)
     for _ in range(3):
         topics.now_s += 8 * BY_NAME_AGAIN_S
         topics.table.renew_by_name()
-        assert topics.table.button == Asked(topics.now_s, is_renewal=True), "a publisher that came late is found"
-    topics.delivery.heard(TOPIC, topics.now_s)
+        assert topics.table.button == ButtonSubscription(topics.now_s, is_renewal=True), (
+            "a publisher that came late is found"
+        )
+    topics.delivery.received(TOPIC, topics.now_s)
     found = topics.table.button
     topics.now_s += 100.0
     topics.table.renew_by_name()
     topics.table.subscribe_by_name({})
     assert topics.table.button == found, "it has come: nothing is renewed"
     topics.table.renew_all()
-    assert topics.table.button == Asked(topics.now_s)
+    assert topics.table.button == ButtonSubscription(topics.now_s)
     topics.now_s += 1.0
     topics.opened()
-    assert topics.table.button == Asked(topics.now_s)
+    assert topics.table.button == ButtonSubscription(topics.now_s)
     topics.now_s += 1.0
     topics.table.subscribe({}, {TOPIC: "std_msgs/Bool"}, needs_client_count=False)
-    assert topics.table.button == Asked(topics.now_s), "of another type: the bridge gives what is latched again"
+    assert topics.table.button == ButtonSubscription(topics.now_s), (
+        "of another type: the bridge gives what is latched again"
+    )
 
 
 def test_what_is_no_mark_is_recorded_as_a_message() -> None:
@@ -86,12 +90,12 @@ def test_what_is_no_mark_is_recorded_as_a_message() -> None:
     reception, transport = SimpleNamespace(unasked=0), SimpleNamespace(read_s=lambda sent_s: sent_s)
 
     def button(now_s: float, *, read_s: Any) -> CarMarks:
-        def place(id: str, said: str, suffix: str) -> None:
-            marks.append(said)
+        def place(id: str, text: str, suffix: str) -> None:
+            marks.append(text)
 
         return CarMarks(place, lambda _: None, is_known=lambda _: True, read_s=read_s, now_s=now_s)
 
-    table = SimpleNamespace(button=Asked(10.0), transforms=frozenset())
+    table = SimpleNamespace(button=ButtonSubscription(10.0), transforms=frozenset())
     now_s = [10.1]
     intake = MessageIntake(
         "car",

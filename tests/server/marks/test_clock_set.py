@@ -76,7 +76,9 @@ class World:
         self.ahead_ms += by_ms
 
     def deliver(self, mark: str, at_ms: float, *, age_ms: float | None = None, **said: Any) -> None:
-        self.marks.obey(PlaceMark(kind="mark", mark=mark, at_ms=at_ms, age_ms=age_ms, **said), by="Ana", source="page")
+        self.marks.execute(
+            PlaceMark(kind="mark", mark=mark, at_ms=at_ms, age_ms=age_ms, **said), by="Ana", source="page"
+        )
 
 
 def begun(tmp_path: Path) -> World:

@@ -9,7 +9,7 @@ import pytest
 from monitor.alarm import Refused
 from server.bus.journal import Journal
 from server.protocol.drive_commands import PlaceMark, RemoveMark
-from server.vehicle.car_marks import Asked
+from server.vehicle.car_marks import ButtonSubscription
 from server.vehicle.marks import MOST, MOST_OF_CAR, Marks, MarksPlace
 
 NOW_MS = 1_700_000_000_000
@@ -46,7 +46,7 @@ class World:
 
 
 def placed(marks: Marks, mark: str, **said: Any) -> None:
-    marks.obey(PlaceMark(kind="mark", mark=mark, **said), by="Ana", source="page")
+    marks.execute(PlaceMark(kind="mark", mark=mark, **said), by="Ana", source="page")
 
 
 def ids(marks: Marks) -> list[str]:
@@ -61,7 +61,7 @@ def test_a_drive_has_so_many_and_no_more() -> None:
     with pytest.raises(Refused, match="2000 marks, which is the most there can be: take one back first"):
         placed(marks, "more")
     placed(marks, "m-7", words="changed")
-    marks.obey(RemoveMark(kind="remove_mark", mark="m-8"), by="Ana", source="page")
+    marks.execute(RemoveMark(kind="remove_mark", mark="m-8"), by="Ana", source="page")
     placed(marks, "more")
     assert marks.count == MOST
     marks.begin_drive()
@@ -101,7 +101,7 @@ def test_the_log_gives_back_this_drive_and_knows_the_ones_before() -> None:
     for mark in ("a", "b", "c"):
         placed(marks, mark, at_ms=NOW_MS - 5000.0)
     placed(marks, "b", words="changed", at_ms=NOW_MS - 9000.0)
-    marks.obey(RemoveMark(kind="remove_mark", mark="c"), by="Ana", source="page")
+    marks.execute(RemoveMark(kind="remove_mark", mark="c"), by="Ana", source="page")
     before = marks.rows()
     for _ in range(2):
         again = world.marks()
@@ -135,11 +135,11 @@ def test_what_the_button_said_before_is_known_after_a_restart() -> None:
     marks.place("car-1", " door ")
     marks.place("car-2", "gate")
     placed(marks, "car-1", words="changed")
-    marks.obey(RemoveMark(kind="remove_mark", mark="car-2"), by="Ana", source="page")
+    marks.execute(RemoveMark(kind="remove_mark", mark="car-2"), by="Ana", source="page")
     button = world.marks().button(0.0, read_s=lambda sent_s: sent_s)
     before = world.journal.last("car")
     for n, words in enumerate(("door", "gate", "gate  ", "door\t")):
-        assert not button.receive({"data": words}, 10.3 + n * 0.01, Asked(10.0))
+        assert not button.receive({"data": words}, 10.3 + n * 0.01, ButtonSubscription(10.0))
     events = world.past_events("car", change="mark_refused")
     assert len(events) == 1
     assert world.journal.last("car") == before + 1

@@ -45,7 +45,7 @@ def zeros(kind: Kind, size: int) -> bytes:
 
 
 def bag(path: Path, kind: Kind, size: int, says: int | None = None) -> Path:
-    """A ROS 1 bag with one chunk of `size` zeros, which says that it has `says` bytes."""
+    """A ROS 1 bag with one chunk of `size` zeros, which declares `says` bytes."""
     u4, u8 = struct.Struct("<I").pack, struct.Struct("<Q").pack
     at = struct.pack("<II", TIME_NS // 10**9, 0)
     packed = zeros(kind, size)
@@ -80,8 +80,8 @@ def mcap(
     chunk_at: int | None = None,
     messages: int = 1,
 ) -> Path:
-    """An MCAP file with one chunk of `size` zeros. Its index says that the chunk has `says` bytes, is at `chunk_at`,
-    and that there are so many `messages`."""
+    """An MCAP file with one chunk of `size` zeros. Its index declares `says` bytes for the chunk, its place
+    `chunk_at`, and the number of `messages`."""
     magic, packed, claimed = b"\x89MCAP0\r\n", zeros(kind, size), size if says is None else says
     times = struct.pack("<QQ", TIME_NS, TIME_NS + 10**9)
     chunk = _record(6, times + struct.pack("<QI", claimed, 0) + _text(kind) + struct.pack("<Q", len(packed)) + packed)

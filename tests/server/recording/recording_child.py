@@ -1,6 +1,6 @@
-"""A process that records the simulated car at full load until it is killed, and says what it has handed over.
+"""A process that records the simulated car at full load until it is killed, and reports what it has passed on.
 
-Every message has its number as its time, so that what is readable afterwards is told by counting alone.
+Every message has its number as its time, so that counting alone shows what is readable afterwards.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MISSING = {"left_out": "/camera", "left_out_count": "1", "not_received": "/imu",
 
 
 def record_until_killed(root: Path, reports: Connection, part_s: float) -> None:
-    """A new part begins every `part_s`, and says 0.1 s later what is MISSING in it.
+    """A new part begins every `part_s`, and notes 0.1 s later what is MISSING in it.
 
     Reports the monotonic time [ns], which all processes share, and how many messages were handed over before it."""
     folder = RecordingsFolder(root)

@@ -149,7 +149,7 @@ def test_a_recording_that_was_made_anew_is_not_the_one_that_the_next_one_names(t
     assert main(["verify", str(tmp_path)]) == 0
     first.unlink()
     closed(first, [[7], [8]])
-    assert verify(first).state == "intact", "alone it cannot be told"
+    assert verify(first).state == "intact", "alone it cannot be detected"
     assert compare(first, Beside(first.parent)).problems == (
         "It is not as it was when car_2 began, which names it as the recording before it.",
     )

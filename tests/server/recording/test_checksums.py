@@ -18,7 +18,7 @@ from tests.server.recording.made import BEGAN_MS, record
 
 MESSAGES = 400
 EVERY_NS = 10_000_000
-WORDS = "word " * 30
+FILLER = "text " * 30
 
 
 def written(
@@ -43,7 +43,7 @@ def written(
             schema = writer.register_schema("std_msgs/String", "jsonschema", b"{}")
             channel = writer.register_channel("/text", "json", schema)
         for n in range(MESSAGES):
-            text = f"{n:04d} {WORDS}".encode()
+            text = f"{n:04d} {FILLER}".encode()
             data = (
                 b"\0\1\0\0" + (len(text) + 1).to_bytes(4, "little") + text + b"\0"
                 if profile == "ros2"
@@ -55,7 +55,7 @@ def written(
 
 
 def numbers(path: Path) -> tuple[list[int], list[str]]:
-    """Which messages come, and what is said to be damaged."""
+    """Which messages come, and what is reported as damaged."""
     with open_recording([path]) as recording:
         came = [int(cast("Any", one.message)["data"][:4]) for one in recording.messages()]
         return came, recording.damage
@@ -64,9 +64,9 @@ def numbers(path: Path) -> tuple[list[int], list[str]]:
 def hurt(path: Path, number: int) -> None:
     """One letter of one message becomes another: nothing about its shape is wrong."""
     content = path.read_bytes()
-    mark = f"{number:04d} word".encode()
+    mark = f"{number:04d} text".encode()
     assert content.count(mark) == 1
-    path.write_bytes(content.replace(mark, f"{number:04d} ward".encode()))
+    path.write_bytes(content.replace(mark, f"{number:04d} test".encode()))
 
 
 PROFILES = pytest.mark.parametrize("profile", ["", "ros2"], ids=["JSON", "ROS 2"])
@@ -124,8 +124,8 @@ def test_a_part_that_cannot_be_unpacked(tmp_path: Path, profile: str, compressio
 
 
 @PROFILES
-def test_without_checksums_nothing_can_be_told(tmp_path: Path, profile: str) -> None:
-    """The format allows it: zero says that there is none."""
+def test_without_checksums_nothing_can_be_detected(tmp_path: Path, profile: str) -> None:
+    """The format allows it: zero means that there is none."""
     path = written(tmp_path / "a.mcap", profile=profile, enable_crcs=False)
     hurt(path, 200)
     assert numbers(path) == (list(range(MESSAGES)), [])
@@ -149,7 +149,7 @@ def test_parts_that_overlap_in_time_come_in_order(tmp_path: Path, profile: str) 
 @PROFILES
 def test_a_file_of_which_nothing_is_whole(tmp_path: Path, profile: str) -> None:
     path = written(tmp_path / "a.mcap", profile=profile)
-    path.write_bytes(path.read_bytes().replace(b" word word", b" ward word"))
+    path.write_bytes(path.read_bytes().replace(b" text text", b" test text"))
     with pytest.raises(RecordingUnreadable, match=r"a\.mcap is damaged: none of its \d+ parts is whole$"):
         numbers(path)
 
@@ -180,14 +180,14 @@ def test_reading_the_alarms_leaves_what_else_is_damaged(tmp_path: Path, capsys: 
     hurt_last_part(path)
     with open_recording([path]) as recording:
         list(recording.messages())
-        (said,) = recording.damage
+        (sentence,) = recording.damage
         assert len(list(recording.own("/catgraph/alarms"))) == 2
-        assert recording.damage == [said]
+        assert recording.damage == [sentence]
     found = survey(path)
-    assert found["damage"] == [f"{said}."]
+    assert found["damage"] == [f"{sentence}."]
     assert found["alarms"]["critical"] == 1
     assert main(["export", str(path), "--format", "bag", "--out", str(tmp_path / "a.bag")]) == 1
-    assert said in capsys.readouterr().err
+    assert sentence in capsys.readouterr().err
 
 
 def test_what_catgraph_wrote_into_several_files_comes_in_the_order_of_time(tmp_path: Path) -> None:

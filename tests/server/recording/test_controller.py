@@ -46,8 +46,8 @@ def files(data: Path) -> list[str]:
     return sorted(path.name for path in (data / "recordings").rglob("*.mcap*") if path.suffix != ".json")
 
 
-def said_so_far(path: Path) -> Mapping[str, str]:
-    """What the file says of itself that is being written."""
+def metadata_so_far(path: Path) -> Mapping[str, str]:
+    """The metadata of the file that is being written."""
     with path.open("rb") as file:
         walk = Walk(file, path.stat().st_size)
         for _ in walk.chunks():
@@ -60,7 +60,7 @@ async def listed(base: str) -> list[str]:
         return [row["id"] for row in (await client.get("/api/recordings")).json()["recordings"]]
 
 
-async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator_said(
+async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator_sent(
     bridge: RosBridge, tmp_path: Path
 ) -> None:
     bridge.advertise("/rosout_like", "std_msgs/String")
@@ -72,10 +72,10 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         assert state["recording"]["left_out"] == ["/camera"]
         assert state["recording"]["left_out_count"] == 1
         assert state["recording"]["reason"] is None
-        assert state["link"]["topics_subscribed"] == 2, "what is heard for the recorder alone counts for nobody else"
+        assert state["link"]["topics_subscribed"] == 2, "what is received for the recorder alone counts for nobody else"
         received = state["session"]["received"]
         recorded_only = [bridge.graph.find(topic) for topic in ("/custom", "/rosout_like")]
-        async with asyncio.timeout(10):  # definitions are asked for first
+        async with asyncio.timeout(10):  # definitions are requested first
             while not all(topic is not None and topic.subscribers for topic in recorded_only):
                 await asyncio.sleep(0.02)
         for n in range(5):
@@ -87,7 +87,7 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         name = state["recording"]["name"]
         (writing,) = (tmp_path / "recordings").rglob("*.writing")
         async with asyncio.timeout(SOON_S):  # a kill leaves what is in the file by now
-            while said_so_far(writing).get("left_out") != "/camera":
+            while metadata_so_far(writing).get("left_out") != "/camera":
                 await asyncio.sleep(0.1)
         assert (await one.ask(kind="set", values={"speed_limit.max_mps": 12.0}))["ok"]
         assert (await one.ask(kind="pause"))["ok"]
@@ -120,10 +120,10 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         assert metadata["address"] == bridge.address  # type: ignore[attr-defined]
         assert (metadata["part"], metadata["ended"], metadata["why"]) == ("1", "closed", "Monitoring was stopped.")
         assert (metadata["left_out"], metadata["left_out_count"]) == ("/camera", "1")
-        changes = [said["change"] for _, said in recording.own("/catgraph/alarms")]
+        changes = [entry["change"] for _, entry in recording.own("/catgraph/alarms")]
         assert [c for c in changes if c in ("started", "connected", "paused")] == ["started", "connected", "paused"]
         assert "settings" in changes[changes.index("connected") : changes.index("paused")]
-        assert all(said["n"] > 0 for _, said in recording.own("/catgraph/alarms"))
+        assert all(entry["n"] > 0 for _, entry in recording.own("/catgraph/alarms"))
         operator = [(s["kind"], s["by"], s["ok"]) for _, s in recording.own("/catgraph/operator")]
         assert operator == [("set", "Ann", True), ("pause", "Ann", True), ("record", "Ann", False)]
         assert [(s["by"], s["why"]) for _, s in recording.own("/catgraph/phone")] == [("Ann", "denied")]
@@ -175,15 +175,15 @@ async def test_a_second_part_tells_which_alarms_stand_when_it_begins(bridge: Ros
     with open_recording([tmp_path / "recordings" / "car" / first]) as recording:
         assert read_standing(recording.metadata) == []
         (raised,) = (
-            said
-            for _, said in recording.own("/catgraph/alarms")
-            if (said["alarm"], said["change"]) == ("speed_limit", "raised")
+            entry
+            for _, entry in recording.own("/catgraph/alarms")
+            if (entry["alarm"], entry["change"]) == ("speed_limit", "raised")
         )
     with open_recording([tmp_path / "recordings" / "car" / second]) as recording:
         stood = {event["alarm"]: event for event in read_standing(recording.metadata)}
         assert stood["speed_limit"]["occurrence"] == raised["occurrence"]
-        numbers = {said["n"] for _, said in recording.own("/catgraph/alarms")}
-        assert not numbers & {event["n"] for event in stood.values()}, "none is told twice"
+        numbers = {entry["n"] for _, entry in recording.own("/catgraph/alarms")}
+        assert not numbers & {event["n"] for event in stood.values()}, "none is recorded twice"
         recorded = read_recorded_log(recording)
         assert recorded is not None
         assert [e.raised_s for e in recorded.episodes if e.alarm_id == "speed_limit"] == [0.0]
@@ -257,7 +257,9 @@ async def test_by_hand_it_begins_and_ends_and_stays_ended(bridge: RosBridge, tmp
         assert recording.metadata["why"] == "Recording was stopped by Ann."
 
 
-async def test_where_it_cannot_record_it_says_so_and_monitors_all_the_same(bridge: RosBridge, tmp_path: Path) -> None:
+async def test_where_it_cannot_record_it_reports_that_and_monitors_all_the_same(
+    bridge: RosBridge, tmp_path: Path
+) -> None:
     (tmp_path / "recordings").mkdir()
     (tmp_path / "recordings" / "car").write_text("in the way")
     async with watched(bridge, tmp_path) as (_, one), driving(bridge):
@@ -271,7 +273,7 @@ async def test_where_it_cannot_record_it_says_so_and_monitors_all_the_same(bridg
         assert refused["reason"] == "Recording cannot begin: the folder for recordings is not a folder."
 
 
-async def test_a_server_that_keeps_nothing_says_so(server: str, bridge: RosBridge) -> None:
+async def test_a_server_that_keeps_nothing_reports_that(server: str, bridge: RosBridge) -> None:
     async with viewer(server) as one, driving(bridge):
         state = await one.state(lambda s: s["session"]["phase"] == "monitoring", within_s=SOON_S)
         assert state["recording"]["state"] == "off"
@@ -324,8 +326,8 @@ def test_which_topics_are_recorded_besides(also: Any, expected: dict[str, str], 
         "/untyped": "",
         "/catgraph/alarms": "std_msgs/msg/String",
     }
-    asked = {"geometry_msgs/msg/Twist", "x/A", "sensor_msgs/msg/PointCloud2", "std_msgs/msg/String"}
-    assert choose(offered, without={"/vel"}, also=also, asked=asked) == (expected, left_out)
+    requested = {"geometry_msgs/msg/Twist", "x/A", "sensor_msgs/msg/PointCloud2", "std_msgs/msg/String"}
+    assert choose(offered, without={"/vel"}, also=also, requested=requested) == (expected, left_out)
 
 
 @pytest.mark.world(n=4)

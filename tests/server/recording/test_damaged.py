@@ -30,10 +30,10 @@ MAKERS: dict[str, Callable[[Path], Path]] = {
 def why_unreadable(*paths: Path) -> str:
     with pytest.raises(RecordingUnreadable) as error, open_recording(list(paths)) as recording:
         list(recording.messages())
-    said = str(error.value)
-    assert "\n" not in said
-    assert len(said) < 400
-    return said
+    sentence = str(error.value)
+    assert "\n" not in sentence
+    assert len(sentence) < 400
+    return sentence
 
 
 @pytest.mark.parametrize(
@@ -58,9 +58,9 @@ def why_unreadable(*paths: Path) -> str:
 def test_foreign_files_are_called_by_their_name(tmp_path: Path, content: bytes, why: str, name: str) -> None:
     file = tmp_path / name
     file.write_bytes(content)
-    said = why_unreadable(file)
-    assert why in said
-    assert said.startswith(f"{file} is ")
+    sentence = why_unreadable(file)
+    assert why in sentence
+    assert sentence.startswith(f"{file} is ")
 
 
 def test_what_is_not_there_or_no_file(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_what_is_not_there_or_no_file(tmp_path: Path) -> None:
     assert "cannot be read" in why_unreadable(tmp_path / ("x" * 256))
 
 
-def test_a_folder_with_several_recordings_asks_which(tmp_path: Path) -> None:
+def test_a_folder_with_several_recordings_needs_a_choice(tmp_path: Path) -> None:
     for name in ("a.bag", "b.bag"):
         write_ros1(tmp_path / name, LONG)
     assert why_unreadable(tmp_path).endswith("holds several recordings (a.bag, b.bag): name the one to read")
@@ -96,20 +96,20 @@ def test_a_recording_cut_short(tmp_path: Path, kind: str, part: float) -> None:
     content = file.read_bytes()
     file.write_bytes(content[: max(20, int(len(content) * part))])
     with contextlib.suppress(RecordingUnreadable), open_recording([file]) as recording:
-        heard = [(one.at_s - BEGIN_S, one.message) for one in recording.messages()]
-        assert [said for _, said in heard] == [said for *_, said in LONG.messages[: len(heard)]]
-        assert len(heard) == len(LONG.messages) or kind.startswith("bag")  # which has several parts
-        end_s = heard[-1][0]
-        (said,) = recording.damage
-        assert said.startswith(f"{file.name} was never closed: it is read to its last whole part, ")
-        assert float(said.split()[-2]) == pytest.approx(end_s, abs=0.051)
+        received = [(one.at_s - BEGIN_S, one.message) for one in recording.messages()]
+        assert [message for _, message in received] == [message for *_, message in LONG.messages[: len(received)]]
+        assert len(received) == len(LONG.messages) or kind.startswith("bag")  # which has several parts
+        end_s = received[-1][0]
+        (sentence,) = recording.damage
+        assert sentence.startswith(f"{file.name} was never closed: it is read to its last whole part, ")
+        assert float(sentence.split()[-2]) == pytest.approx(end_s, abs=0.051)
         return
     assert re.search(r"is damaged|not complete|ends too early|is no recording|no index", why_unreadable(file))
 
 
 @pytest.mark.parametrize("kind", list(MAKERS))
 def test_damage_anywhere_is_an_answer_or_one_sentence(tmp_path: Path, kind: str) -> None:
-    """Whatever bytes are hurt: messages come, or are counted as rejected, or it is said that the file is damaged."""
+    """Whatever bytes are hurt: messages come, or are counted as rejected, or the file is reported as damaged."""
     file = MAKERS[kind](tmp_path)
     content = file.read_bytes()
     dice = random.Random(7)
@@ -121,12 +121,12 @@ def test_damage_anywhere_is_an_answer_or_one_sentence(tmp_path: Path, kind: str)
         file.write_bytes(hurt)
         try:
             with open_recording([file]) as recording:
-                heard = sum(1 for _ in recording.messages())
-            assert heard <= 400
+                count = sum(1 for _ in recording.messages())
+            assert count <= 400
         except RecordingUnreadable as error:
             sentences.append(str(error))
     assert len(sentences) > 5
-    assert all(file.name in said and "\n" not in said for said in sentences)
+    assert all(file.name in one and "\n" not in one for one in sentences)
 
 
 def test_metadata_that_is_no_metadata(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A small disk that fills up, and one that can only be read: said clearly, and nothing that was kept is lost.
+"""A small disk that fills up, and one that can only be read: reported clearly, and nothing that was kept is lost.
 
 The disks are real: mounted for the test, which needs a user who may.
 """
@@ -111,7 +111,7 @@ def test_what_was_left_waits_for_room_to_be_recovered(disk: Path) -> None:
 
 
 @pytest.mark.parametrize("disk", [200_000_000], indirect=True)
-async def test_a_disk_that_can_only_be_read_is_said_and_monitoring_goes_on(disk: Path, bridge: RosBridge) -> None:
+async def test_a_disk_that_can_only_be_read_is_reported_and_monitoring_continues(disk: Path, bridge: RosBridge) -> None:
     (disk.parent / "settings").mkdir()
     (disk.parent / "settings" / "car.toml").write_text("[limits.recording]\nmin_free_gb = 0.05\n")
     async with driving(bridge), watched(bridge, disk.parent) as (_, one):
@@ -125,7 +125,7 @@ async def test_a_disk_that_can_only_be_read_is_said_and_monitoring_goes_on(disk:
             assert refused["reason"] == "Recording cannot begin: the folder for recordings is read-only."
             state = await one.state(lambda s: any(a["id"] == "recording_stopped" for a in s["alarms"]))
             assert state["session"]["phase"] == "monitoring"
-            # A busy machine may be late with one state; a car that is no longer heard is never fresh again.
+            # A busy machine may be late with one state; a car that is no longer received is never fresh again.
             state = await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
             count = state["signals"]["speed"]["count"]
             await one.state(lambda s: s["signals"]["speed"]["count"] > count + 10)

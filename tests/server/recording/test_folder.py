@@ -18,7 +18,7 @@ def put(folder: RecordingsFolder, name: str, vehicle: str = "car") -> Path:
     return path
 
 
-def test_a_name_says_whose_and_when(tmp_path: Path) -> None:
+def test_a_name_holds_whose_and_when(tmp_path: Path) -> None:
     folder = RecordingsFolder(tmp_path / "recordings")
     assert folder.new_id("car", AT_MS) == "car_20231114T221320Z"
     assert not folder.root.exists(), "asking for a name makes nothing"
@@ -65,7 +65,7 @@ def test_no_name_leads_out(tmp_path: Path, id: str) -> None:
         folder.place("car", id)
 
 
-def test_what_is_finished_is_told_from_what_is_not(tmp_path: Path) -> None:
+def test_what_is_finished_is_distinguished_from_what_is_not(tmp_path: Path) -> None:
     folder = RecordingsFolder(tmp_path)
     done = put(folder, "a_p2.mcap")
     other = put(folder, "b.mcap", vehicle="bus")

@@ -106,7 +106,7 @@ def test_killed_while_one_part_ends_and_the_next_begins_nothing_is_damaged(tmp_p
 
 @pytest.mark.world(n=4)
 @pytest.mark.slow
-def test_what_is_missing_in_a_recording_is_said_by_one_that_was_recovered(tmp_path: Path) -> None:
+def test_what_is_missing_in_a_recording_is_kept_in_one_that_was_recovered(tmp_path: Path) -> None:
     multiprocessing.get_context("forkserver").set_forkserver_preload(["tests.server.recording.recording_child"])
     found = kill_once(tmp_path, 1.0)
     assert found.metadata["ended"] == "recovered"

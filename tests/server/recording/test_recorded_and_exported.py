@@ -2,9 +2,9 @@
 
 What is compared: for every topic all messages in their order, with their type and every field, NaN included, stamps in
 headers to the nanosecond; and the order of all topics together, but for messages that the replay sends within
-REORDERED_WITHIN_S: a subscription with a queue asks for a throttle of 1 ms (docs/decisions.md), and a bridge sends what
+REORDERED_WITHIN_S: a subscription with a queue requests a throttle of 1 ms (docs/decisions.md), and a bridge sends what
 it throttled after what came in that time on other topics. Not compared is when a message was received: the
-original says when it was recorded in the car, ours when it was heard. A bridge says NaN and ±Inf as null in JSON, so
+original has the time of recording in the car, ours of reception. A bridge sends NaN and ±Inf as null in JSON, so
 where the original has ±Inf a recording made over JSON has NaN.
 """
 
@@ -103,9 +103,9 @@ async def test_infinities_and_nan_of_scans_stay_apart(tmp_path: Path, version: i
         assert write_bag(recording, tmp_path / "out.bag").notes == []
     with open_recording([source]) as before, open_recording([tmp_path / "out.bag"]) as after:
         sent = {message.message["header"]["stamp"][SECONDS[version]]: message.message for message in before.messages()}
-        heard = [message.message for message in after.messages() if message.topic == "/scan"]
-    assert len(heard) > 40
-    for message in heard:
+        received = [message.message for message in after.messages() if message.topic == "/scan"]
+    assert len(received) > 40
+    for message in received:
         original = sent[message["header"]["stamp"]["secs"]]
         assert [where for where, a, b in leaves(original, message, "scan") if not same(a, b)] == []
         assert np.signbit(message["ranges"][3])
@@ -128,8 +128,8 @@ async def recorded(source: Path, data: Path, quicker: int = QUICKER) -> Path:
         address = ""
         async with asyncio.timeout(30):
             while not address:
-                words = (await bridge.stdout.readline()).decode().split()
-                address = next((word for word in words if word.startswith("ws://")), "").rstrip(".,")
+                parts = (await bridge.stdout.readline()).decode().split()
+                address = next((part for part in parts if part.startswith("ws://")), "").rstrip(".,")
         async with serving(Config(vehicles=(Vehicle(name="car", address=address),), data=data)):
             async with asyncio.timeout(120):
                 await bridge.stdout.read()

@@ -1,4 +1,4 @@
-"""The recorder's thread: what is handed over is on the disk, in order; what is not is counted and said."""
+"""The recorder's thread: what is handed over is on the disk, in order; what is not is counted and reported."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class RecorderUser:
         return Part(path=self.folder.place("car", id), version=version, metadata={"part": str(n)})
 
     def say(self, n: int, topic: str = "/vel", type: str | None = "geometry_msgs/Twist", message: Any = None) -> None:
-        said = {"linear": V | {"x": float(n)}, "angular": V} if message is None else message
-        self.recorder.take(topic, type, said, AT_NS + n * 1_000_000, 100, n / 1000)
+        content = {"linear": V | {"x": float(n)}, "angular": V} if message is None else message
+        self.recorder.take(topic, type, content, AT_NS + n * 1_000_000, 100, n / 1000)
 
     async def end(self, **ended: str) -> None:
         done = asyncio.Event()
@@ -91,7 +91,7 @@ async def test_what_was_handed_over_before_the_end_is_in_the_file(tmp_path: Path
             ("/untyped", {"b": 1}),
         ]
         own = list(recording.own("/catgraph/alarms"))
-        assert [said for _, said in own] == [{"time_ms": AT_NS // 1_000_000 + n, "n": n} for n in range(0, 1000, 100)]
+        assert [entry for _, entry in own] == [{"time_ms": AT_NS // 1_000_000 + n, "n": n} for n in range(0, 1000, 100)]
     await user.stop()
 
 
@@ -123,7 +123,7 @@ async def test_a_definition_that_the_bridge_gave_counts_from_then_on(tmp_path: P
 
 
 @pytest.mark.field
-async def test_it_is_on_the_disk_within_half_a_second_without_being_asked(tmp_path: Path) -> None:
+async def test_it_is_on_the_disk_within_half_a_second_without_a_request(tmp_path: Path) -> None:
     user = RecorderUser(tmp_path)
     part = user.part()
     user.recorder.begin(part)
@@ -214,7 +214,7 @@ async def test_at_the_limit_it_stops_and_what_was_recorded_is_saved(
 
 @pytest.mark.field
 async def test_after_it_stopped_by_itself_nothing_piles_up(tmp_path: Path) -> None:
-    """The loop hands over what comes until somebody ends the part."""
+    """The loop passes on what comes until somebody ends the part."""
     user = RecorderUser(tmp_path, Allowance(quota=0, min_free=1 << 62))
     user.recorder.begin(user.part())
     await user.until(lambda: user.recorder.status.state == "stopped" and user.recorder.queued == 0)
@@ -226,7 +226,7 @@ async def test_after_it_stopped_by_itself_nothing_piles_up(tmp_path: Path) -> No
     await user.stop()
 
 
-async def test_a_folder_that_is_none_is_said(tmp_path: Path) -> None:
+async def test_a_folder_that_is_none_is_reported(tmp_path: Path) -> None:
     (tmp_path / "recordings").write_text("a file")
     user = RecorderUser(tmp_path / "recordings")
     user.recorder.begin(replace(user.part(), path=tmp_path / "recordings" / "car" / "a.mcap"))
@@ -265,7 +265,7 @@ async def test_a_fault_of_the_search_for_the_recording_before_stops_none(
     assert "previous" not in read_first_metadata(path)
 
 
-async def test_a_file_that_is_taken_away_while_it_is_written_is_said(
+async def test_a_file_that_is_taken_away_while_it_is_written_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(space, "LOOK_S", 0.1)
@@ -281,9 +281,9 @@ async def test_a_file_that_is_taken_away_while_it_is_written_is_said(
 
 
 @pytest.mark.parametrize(
-    ("size", "said"),
+    ("size", "text"),
     [(0, "0 bytes"), (999, "999 bytes"), (1000, "1.0 kB"), (1_250_000, "1.2 MB"), (99_400_000, "99.4 MB"),
      (340_000_000, "340 MB"), (1_200_000_000, "1.2 GB"), (2e12, "2000 GB")],
 )  # fmt: skip
-def test_amounts_are_said_as_people_say_them(size: float, said: str) -> None:
-    assert amount(size) == said
+def test_amounts_are_shown_in_usual_units(size: float, text: str) -> None:
+    assert amount(size) == text

@@ -37,11 +37,11 @@ def test_times_go_on_and_entries_follow_them(by_ms: int) -> None:
     clocks.passes(1.0)
     assert clocks.clock.ms() == before_ms + 1000
     kept = {"hold_ms": 5000, "text": "x", "is_on": True}
-    said = {**kept, "at_ms": clocks.wall_ms - 200, "fix": {"heard_ms": clocks.wall_ms}}
-    assert clocks.clock.entry(said) == {**kept, "at_ms": before_ms + 800, "fix": {"heard_ms": before_ms + 1000}}
+    fields = {**kept, "at_ms": clocks.wall_ms - 200, "fix": {"heard_ms": clocks.wall_ms}}
+    assert clocks.clock.entry(fields) == {**kept, "at_ms": before_ms + 800, "fix": {"heard_ms": before_ms + 1000}}
 
 
-def test_what_was_said_before_the_clock_was_set_by_days_stays() -> None:
+def test_times_from_before_the_clock_was_set_by_days_stay() -> None:
     clocks = Clocks()
     old_ms = clocks.wall_ms
     clocks.wall_ms += 3 * DAY_MS
@@ -52,8 +52,8 @@ def test_a_clock_that_is_slewed_changes_no_entry() -> None:
     clocks = Clocks()
     clocks.passes(60.0)
     clocks.wall_ms += 400
-    said = {"at_ms": clocks.wall_ms}
-    assert clocks.clock.entry(said) is said
+    fields = {"at_ms": clocks.wall_ms}
+    assert clocks.clock.entry(fields) is fields
 
 
 def test_another_recording_begins_at_the_time_of_day() -> None:

@@ -30,7 +30,7 @@ def names(folder: Path) -> list[str]:
 
 def alarms(path: Path) -> list[int]:
     with open_recording([path]) as recording:
-        return [said["n"] for _, said in recording.own("/catgraph/alarms")]
+        return [entry["n"] for _, entry in recording.own("/catgraph/alarms")]
 
 
 @pytest.mark.parametrize("version", [1, 2])
@@ -211,7 +211,7 @@ def test_much_that_cannot_be_read_is_kept_aside(tmp_path: Path) -> None:
     assert names(left.parent) == ["car_1.mcap", "car_1.mcap.damaged"]
 
 
-def test_what_is_no_recording_at_all_is_kept_and_said(tmp_path: Path) -> None:
+def test_what_is_no_recording_at_all_is_kept_and_reported(tmp_path: Path) -> None:
     left = tmp_path / "a.mcap.writing"
     left.write_bytes(b"something else")
     (tmp_path / "a.mcap.damaged").write_bytes(b"of another time")

@@ -97,7 +97,7 @@ def test_whatever_was_recorded_is_intact_and_any_other_bytes_are_not(
     assert (verify(path).state == "intact") == (other == raw)
 
 
-def test_it_says_at_which_record_bytes_and_time(tmp_path: Path) -> None:
+def test_it_names_at_which_record_bytes_and_time(tmp_path: Path) -> None:
     path = tmp_path / "car_1.mcap"
     raw = closed(path, [[100]] * 60)
     tags = [at - 9 for at in range(len(raw)) if raw.startswith(b"catgraph chain 1", at)]
@@ -113,7 +113,7 @@ def test_it_says_at_which_record_bytes_and_time(tmp_path: Path) -> None:
     assert found.head is None, "a broken chain has no head to be compared"
 
 
-def test_a_file_that_ends_too_early_says_so(tmp_path: Path) -> None:
+def test_a_file_that_ends_too_early_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "car_1.mcap"
     raw = closed(path, [[30], [31], [32]])
     ends = [at - 9 + RECORD_BYTES for at in range(len(raw)) if raw.startswith(b"catgraph chain 1", at)]
@@ -258,7 +258,7 @@ def test_a_damaged_name_of_the_one_before_stops_no_verification(
     assert len(max(lines, key=len)) < 2000
 
 
-def test_a_cut_tail_says_since_when(tmp_path: Path) -> None:
+def test_a_cut_tail_is_reported_with_its_time(tmp_path: Path) -> None:
     path = tmp_path / "car_1.mcap"
     raw = closed(path, [[100]] * 6)
     path.write_bytes(raw[: len(raw) * 2 // 3])

@@ -19,8 +19,8 @@ from tests.server.conftest import serving
 
 PATIENCE_S = 20.0
 SPEEDS_BEFORE = 20  # that the server has received before an order; the car reports 20 a second
-ASK_S = 0.1  # the server is asked so often
-LOOK_S = 0.02  # the car itself is looked at so often: that costs nothing
+ASK_S = 0.1  # interval of requests to the server
+LOOK_S = 0.02  # interval of reading the car itself, which costs nothing
 
 
 class Field:
@@ -29,12 +29,12 @@ class Field:
     def __init__(self, service: CarService, client: httpx.AsyncClient) -> None:
         self.service = service
         self.client = client
-        self.heard: list[tuple[float, str, dict[str, Any]]] = []  # what any client published, and when it arrived
+        self.published: list[tuple[float, str, dict[str, Any]]] = []  # what any client published, and when it arrived
         self.driven: list[float] = []  # how fast the car was then
-        service.bridge.on_publish.append(self._hear)
+        service.bridge.on_publish.append(self._note_published)
 
-    def _hear(self, topic: str, kind: str, said: dict[str, Any]) -> None:
-        self.heard.append((time.monotonic(), topic, said))
+    def _note_published(self, topic: str, kind: str, message: dict[str, Any]) -> None:
+        self.published.append((time.monotonic(), topic, message))
         self.driven.append(self.speed_mps)
 
     @property
@@ -44,7 +44,9 @@ class Field:
     @property
     def speeds(self) -> list[tuple[float, float]]:
         """The ordered speeds and when they arrived."""
-        return [(at_s, said["linear"]["x"]) for at_s, topic, said in self.heard if topic == "/catvehicle/cmd_vel"]
+        return [
+            (at_s, message["linear"]["x"]) for at_s, topic, message in self.published if topic == "/catvehicle/cmd_vel"
+        ]
 
     async def state(self) -> dict[str, Any]:
         found: dict[str, Any] = (await self.client.get("/api/state")).json()

@@ -1,4 +1,4 @@
-"""A way to a bridge that carries what the bridge says, and at will nothing that is said to it."""
+"""A proxy to a bridge that forwards what the bridge sends and, on demand, nothing that is sent to it."""
 
 from __future__ import annotations
 

@@ -96,5 +96,5 @@ class Rig:
                 assert "snapshot" in self.fails
             self.slowing.sender.send_safely()
 
-    def obey(self, kind: str) -> None:
-        self.slowing.obey(commands.read({"kind": kind}), by="Ann")  # type: ignore[arg-type]
+    def execute(self, kind: str) -> None:
+        self.slowing.execute(commands.read({"kind": kind}), by="Ann")  # type: ignore[arg-type]

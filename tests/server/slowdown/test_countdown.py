@@ -24,7 +24,7 @@ def at_fault(*names: str) -> dict[str, Alarm]:
 
 
 class Car:
-    """A count-down with its log; `look` says which rule slows the car now."""
+    """A count-down with its log; `look` returns the rule that slows the car now."""
 
     def __init__(self) -> None:
         self.log: list[dict[str, Any]] = []
@@ -45,7 +45,7 @@ def counting() -> Car:
     return car
 
 
-def test_it_says_what_will_happen_and_slows_the_car_when_it_is_over() -> None:
+def test_it_announces_what_will_happen_and_slows_the_car_when_it_is_over() -> None:
     car = counting()
     assert car.log == [
         {

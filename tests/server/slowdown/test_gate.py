@@ -147,10 +147,10 @@ def every_command() -> list[dict[str, Any]]:
 @pytest.mark.slow
 @pytest.mark.virtual_time
 async def test_whatever_is_called_nothing_is_published_that_was_not_ordered(bridge: RosBridge) -> None:
-    """Every route with every method, every command of a page: and arming alone says nothing to the car."""
+    """Every route with every method, every command of a page: and arming alone sends nothing to the car."""
     bridge.advertise("/catvehicle/cmd_vel", "geometry_msgs/Twist")
-    heard: list[str] = []
-    bridge.on_publish.append(lambda topic, kind, said: heard.append(topic))
+    published: list[str] = []
+    bridge.on_publish.append(lambda topic, kind, message: published.append(topic))
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
     app = create_app(config, now=time.monotonic)
     async with (
@@ -178,14 +178,14 @@ async def test_whatever_is_called_nothing_is_published_that_was_not_ordered(brid
         ends_s = time.monotonic() + 20
         while waited_for - set(answered):
             assert time.monotonic() < ends_s, waited_for - set(answered)
-            said = json.loads(await asyncio.wait_for(page.recv(), 20))
-            if said["kind"] == "reply":
-                answered[said["id"]] = said
-            elif said["kind"] == "offer":
-                await page.send(json.dumps({"kind": "take", "seq": said["seq"]}))
+            message = json.loads(await asyncio.wait_for(page.recv(), 20))
+            if message["kind"] == "reply":
+                answered[message["id"]] = message
+            elif message["kind"] == "offer":
+                await page.send(json.dumps({"kind": "take", "seq": message["seq"]}))
         assert answered["arm"]["ok"]
         await asyncio.sleep(0.3)
-        assert heard == []
+        assert published == []
         assert (await client.post("/api/slow-down/order")).is_success  # and now it is
         await asyncio.sleep(0.3)
-        assert set(heard) == {"/catvehicle/cmd_vel"}
+        assert set(published) == {"/catvehicle/cmd_vel"}

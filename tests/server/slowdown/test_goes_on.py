@@ -28,9 +28,9 @@ pytestmark = pytest.mark.world(n=13)
 @pytest.mark.parametrize("fails", [(), ("log",), ("recording",), ("snapshot",), ("log", "recording", "snapshot")])
 def test_what_fails_beside_it_neither_stops_nor_delays_it(fails: tuple[str, ...]) -> None:
     rig = Rig()
-    rig.obey("arm")
+    rig.execute("arm")
     rig.fails = set(fails)
-    rig.obey("slow_down")  # nothing is raised: it was obeyed, and that is what the operator is answered
+    rig.execute("slow_down")  # nothing is raised: it was executed, and that is the answer to the operator
     at_once = 0 if "snapshot" in fails else 1  # without a speed it waits for one, half a second after the link opened
     assert len(rig.link.speeds) == at_once or rig.link.speeds == [0.0]
     rig.pass_time(2.0)
@@ -60,8 +60,8 @@ async def test_after_a_stall_no_command_follows_at_once() -> None:
     rig.link.send_now = note  # type: ignore[method-assign]
     try:
         rig.tick()
-        rig.obey("arm")
-        rig.obey("slow_down")
+        rig.execute("arm")
+        rig.execute("slow_down")
         for late_s in (0.08, 0.21, 0.34, 0.6):
             await asyncio.sleep(0.5)
             stalled_s += late_s
@@ -82,8 +82,8 @@ async def test_its_task_goes_on_after_a_cancellation_that_nobody_ordered() -> No
     supervisor.keep("slow-down", rig.slowing.sender.send_loop)
     try:
         rig.tick()
-        rig.obey("arm")
-        rig.obey("slow_down")
+        rig.execute("arm")
+        rig.execute("slow_down")
         for _ in range(3):
             sent = len(rig.link.speeds)
             async with asyncio.timeout(20):
@@ -99,7 +99,7 @@ async def test_its_task_goes_on_after_a_cancellation_that_nobody_ordered() -> No
 
 def test_armed_ends_ten_seconds_after_the_last_operators_page_has_gone() -> None:
     rig = Rig()
-    rig.obey("arm")
+    rig.execute("arm")
     rig.slowing.watch_operators(rig.now_s)
     rig.now_s += DESERTED_S - 0.1
     rig.slowing.watch_operators(None)
@@ -112,24 +112,24 @@ def test_armed_ends_ten_seconds_after_the_last_operators_page_has_gone() -> None
 
 def test_a_page_that_is_there_keeps_it_armed_and_an_order_is_not_ended_by_an_empty_room() -> None:
     rig = Rig()
-    rig.obey("arm")
+    rig.execute("arm")
     for _ in range(40):
         rig.now_s += 1.0
         rig.slowing.watch_operators(rig.now_s)
     assert rig.slowing.frame()["state"] == "armed"
-    rig.obey("slow_down")
+    rig.execute("slow_down")
     rig.now_s += 3 * DESERTED_S
     rig.slowing.watch_operators(None)
     order = rig.slowing.frame()["order"]
     assert order is not None
-    rig.slowing.obey(drive_commands.Release(kind="release", number=order["number"]), by="Ann")
+    rig.slowing.execute(drive_commands.Release(kind="release", number=order["number"]), by="Ann")
     rig.slowing.watch_operators(None)
     assert rig.slowing.frame()["state"] == "not_armed"
 
 
 def test_armed_by_a_program_without_any_page_it_stays_armed_and_so_it_does_where_nobody_is_the_rule() -> None:
     rig = Rig()
-    rig.obey("arm")
+    rig.execute("arm")
     rig.now_s += 100.0
     rig.slowing.watch_operators(None)
     assert rig.slowing.frame()["state"] == "armed"

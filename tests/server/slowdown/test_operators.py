@@ -30,7 +30,7 @@ class Phone:
         return await self._page.ask(kind=kind, **fields)
 
     async def press(self, kind: str, **fields: Any) -> dict[str, Any]:
-        """The answer to a command that says when it was pressed."""
+        """The answer to a command with the time at which it was pressed."""
         newest = self._page.states[-1]["server"]["time_ms"]
         held_s = time.time() - self._page.got_s[-1]
         return await self.order(kind, **{"pressed_ago_s": 0.01, "heard_ms": newest, "held_s": held_s} | fields)
@@ -42,7 +42,7 @@ class Phone:
 
 @contextlib.asynccontextmanager
 async def phone(car: Field, name: str, at: str | None = None) -> AsyncIterator[Phone]:
-    """`at`: where the server is heard; None: its own address."""
+    """`at`: the address of the server; None: its own."""
     async with viewer(at or str(car.client.base_url).rstrip("/")) as page:
         await page.send({"kind": "hello", "name": name, "page": f"page-of-{name.lower()}", "have_event": 0})
         await page.send(SEEN)
@@ -98,7 +98,7 @@ async def test_what_was_pressed_too_long_ago_is_refused(late: dict[str, float], 
             assert car.speeds == []
 
 
-async def test_orders_that_hung_in_the_radio_are_refused_and_their_sender_is_told() -> None:
+async def test_orders_that_hung_in_the_radio_are_refused_with_an_answer() -> None:
     """Each of the five, held from just above what it may take to 10 s."""
     number = 999
     orders: dict[str, dict[str, Any]] = {

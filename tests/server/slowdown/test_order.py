@@ -35,10 +35,10 @@ def test_a_ramp_never_rises_and_ends_at_zero(speed: float, deceleration: float, 
     now_s, before = 100.0, abs(speed)
     for step in steps:
         now_s += step
-        said = ramp.speed_mps(now_s)
-        assert abs(said) <= before
-        assert said == 0.0 or math.copysign(1, said) == math.copysign(1, speed)
-        before = abs(said)
+        ordered_mps = ramp.speed_mps(now_s)
+        assert abs(ordered_mps) <= before
+        assert ordered_mps == 0.0 or math.copysign(1, ordered_mps) == math.copysign(1, speed)
+        before = abs(ordered_mps)
     assert ramp.speed_mps(100.0 + abs(speed) / deceleration + 0.001) == 0.0
 
 
@@ -81,10 +81,10 @@ def test_only_twists_command_a_car(type: str, kind: str | None) -> None:
     [(1, {"secs": 1_790_000_000, "nsecs": 5}), (2, {"sec": 1_790_000_000, "nanosec": 5})],
 )
 def test_a_stamped_command_carries_the_stamp_of_its_ros(ros_version: int, stamp: dict[str, int]) -> None:
-    said = twist_message("TwistStamped", 2.0, -0.1, stamp_ns=1_790_000_000_000_000_005, ros_version=ros_version)
-    assert said["header"]["stamp"] == stamp
-    assert said["twist"] == twist_message("Twist", 2.0, -0.1, stamp_ns=0, ros_version=ros_version)
-    assert (said["twist"]["linear"]["x"], said["twist"]["angular"]["z"]) == (2.0, -0.1)
+    message = twist_message("TwistStamped", 2.0, -0.1, stamp_ns=1_790_000_000_000_000_005, ros_version=ros_version)
+    assert message["header"]["stamp"] == stamp
+    assert message["twist"] == twist_message("Twist", 2.0, -0.1, stamp_ns=0, ros_version=ros_version)
+    assert (message["twist"]["linear"]["x"], message["twist"]["angular"]["z"]) == (2.0, -0.1)
 
 
 def source(topic: str, type: str | None) -> Source:
@@ -117,7 +117,7 @@ def source(topic: str, type: str | None) -> Source:
         ),
     ],
 )
-def test_the_way_is_known_or_its_problem_said(
+def test_the_target_is_known_or_its_problem_is_reported(
     phase: str, sources: dict[str, Source], offered: dict[str, str] | None, topic: str, problem: str | None
 ) -> None:
     way = target_of(phase=phase, sources=sources, offered=offered)
@@ -174,9 +174,9 @@ def test_without_a_speed_it_begins_at_the_last_command_or_at_zero(was_sent: bool
     life = SlowDown()
     begun(life)
     if was_sent:
-        said = life.next(DRIVES, 10.0)
-        assert said is not None
-        life.sent(said, 10.0)
+        command = life.next(DRIVES, 10.0)
+        assert command is not None
+        life.sent(command, 10.0)
         life.cut()
     blind = life.next(Car(speed_mps=None, tyre_rad=None if was_sent else 0.1), 12.0)
     assert blind is not None

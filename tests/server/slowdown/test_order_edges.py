@@ -30,7 +30,7 @@ def test_an_order_is_what_was_ordered() -> None:
     assert life.order.by == "Ben"
 
 
-def test_every_refusal_says_why() -> None:
+def test_every_refusal_has_its_reason() -> None:
     life = SlowDown()
     how: dict[str, Any] = {"by": "Ann", "why": "by hand", "deceleration_mps2": 1.5, "now_s": 10.0, "pressed_s": None}
     assert refusal(life.arm, NO_WAY, "Ann") == "Slow-down is not available: No car is connected."
@@ -119,7 +119,7 @@ def test_no_order_is_too_long_and_only_another_car_disarms() -> None:
 
 
 @pytest.mark.parametrize(
-    ("heard", "now_s", "keeps", "is_deserted"),
+    ("contacts_s", "now_s", "keeps", "is_deserted"),
     [
         ([100.0], 100.0 + DESERTED_S - 0.01, False, False),
         ([100.0], 100.0 + DESERTED_S, False, True),
@@ -129,10 +129,10 @@ def test_no_order_is_too_long_and_only_another_car_disarms() -> None:
         ([None], 1000.0, False, False),  # armed by a program, with no page about
     ],
 )
-def test_armed_with_nobody_about(heard: list[float | None], now_s: float, keeps: bool, is_deserted: bool) -> None:
+def test_armed_with_nobody_about(contacts_s: list[float | None], now_s: float, keeps: bool, is_deserted: bool) -> None:
     life = SlowDown()
     life.arm(WAY, "Ann")
-    for heard_s in heard:
+    for heard_s in contacts_s:
         assert not life.is_deserted(heard_s, heard_s or 0.0, keeps=keeps)
     assert life.is_deserted(None, now_s, keeps=keeps) is is_deserted
 

@@ -24,22 +24,22 @@ OUTAGES = [
 ]
 
 
-class Heard:
-    """What a bridge heard of stamped commands under outages [s since 1970]. Of a command the stamp tells when it was
-    made. A bridge that freezes holds what had reached it already, and says it when it thaws: no sender can take that
-    back. At most two commands an outage are under way so."""
+class ReceivedCommands:
+    """The stamped commands that a bridge receives under outages [s since 1970]. The stamp is the time of making a
+    command. A frozen bridge keeps what it has received already and publishes it when it thaws: no sender can withdraw
+    that. These are at most two commands an outage."""
 
     def __init__(self, bridge: RosBridge, server: str) -> None:
         bridge.advertise(TOPIC, "geometry_msgs/TwistStamped")
-        bridge.on_publish.append(self._hear)
+        bridge.on_publish.append(self._note)
         self._bridge = bridge
         self._server = server
         self.commands: list[tuple[float, float]] = []  # made and arrived
         self.outages: list[tuple[float, float]] = []  # began and ended
 
-    def _hear(self, topic: str, kind: str, said: dict[str, Any]) -> None:
+    def _note(self, topic: str, kind: str, message: dict[str, Any]) -> None:
         if topic == TOPIC:
-            stamp = said["header"]["stamp"]
+            stamp = message["header"]["stamp"]
             self.commands.append((stamp["secs"] + stamp["nsecs"] / 1e9, time.time()))
 
     async def order_under(self, outages: int) -> None:
@@ -102,9 +102,9 @@ class Heard:
 @pytest.mark.slow
 @pytest.mark.virtual_time
 async def test_no_command_arrives_late_and_none_twice(bridge: RosBridge, server: str) -> None:
-    heard = Heard(bridge, server)
-    await heard.order_under(4)
-    heard.check(0.002)  # stamps are of whole milliseconds
+    received = ReceivedCommands(bridge, server)
+    await received.order_under(4)
+    received.check(0.002)  # stamps are of whole milliseconds
 
 
 @pytest.mark.field
@@ -112,9 +112,9 @@ async def test_no_command_arrives_late_and_none_twice(bridge: RosBridge, server:
 async def test_no_command_arrives_late_and_none_twice_in_real_time(
     bridge: RosBridge, server: str, outages: int
 ) -> None:
-    heard = Heard(bridge, server)
-    await heard.order_under(outages)
-    heard.check(LATE_S)
+    received = ReceivedCommands(bridge, server)
+    await received.order_under(outages)
+    received.check(LATE_S)
 
 
 @pytest.mark.field
@@ -144,7 +144,7 @@ async def test_the_ramp_goes_on_from_the_speed_that_is_measured(fault: str) -> N
         await car.until(lambda state: state["decelerate"]["order"]["sending"], 10.0)
         await asyncio.sleep(0.4)
         after = [speed for at_s, speed in car.speeds if at_s >= cut_s]
-        first = next(index for index, (at_s, _, _) in enumerate(car.heard) if at_s >= cut_s)
+        first = next(index for index, (at_s, _, _) in enumerate(car.published) if at_s >= cut_s)
         assert after[0] == pytest.approx(car.driven[first], abs=0.5)
         assert all(b < a for a, b in itertools.pairwise(after[1:]))
         await car.until_car(lambda: car.speed_mps == 0.0)

@@ -1,4 +1,4 @@
-"""What the log says of a car that is ordered to slow down: shown, stopped, already standing, or not confirmed."""
+"""The log lines about a car that is ordered to slow down: shown, stopped, already standing, or not confirmed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MISSING = "NOT CONFIRMED: the car does not slow. Use the physical stop."
 
 
 class Car:
-    """An order given 2 s ago whose first command went out 1.5 s ago, and what the log says of it."""
+    """An order given 2 s ago whose first command went out 1.5 s ago, and its lines in the log."""
 
     def __init__(self, *, sent: bool = True) -> None:
         self.log: list[tuple[str, str]] = []
@@ -51,14 +51,14 @@ def stands(shown: Shown | None = None, *, stood_before: bool = False) -> Snapsho
     return replace(snapshot, slow_proof=proof, standing_since_s=NOW_S - 1.0)
 
 
-OBEYS, IGNORES, WAITS = slowed(-1.4), slowed(-0.2), slowed(-0.2, shown=False, sending_s=NOW_S - 0.4)
+SLOWS, IGNORES, WAITS = slowed(-1.4), slowed(-0.2), slowed(-0.2, shown=False, sending_s=NOW_S - 0.4)
 
 
 @pytest.mark.parametrize(
     ("snapshots", "log"),
     [
         ([WAITS], []),
-        ([WAITS, OBEYS, OBEYS], [("slows", "The car slows: shown by its own speed 1.5 s after the first command.")]),
+        ([WAITS, SLOWS, SLOWS], [("slows", "The car slows: shown by its own speed 1.5 s after the first command.")]),
         (
             [stands("stopped")] * 2,
             [("slows", "The car stopped: shown by its own speed 1.5 s after the first command.")],
@@ -75,16 +75,16 @@ def test_the_log_has_each_change_once(snapshots: list[Snapshot], log: list[tuple
     assert Car().judge(*snapshots) == log
 
 
-def test_what_slows_again_and_stops_slowing_again_is_said_again() -> None:
+def test_what_slows_again_and_stops_slowing_again_is_logged_again() -> None:
     car = Car()
-    assert [step for step, _ in car.judge(IGNORES, OBEYS, IGNORES)] == ["not_confirmed", "slows", "not_confirmed"]
+    assert [step for step, _ in car.judge(IGNORES, SLOWS, IGNORES)] == ["not_confirmed", "slows", "not_confirmed"]
     assert car.order.slows_s == NOW_S
 
 
 def test_missing_until_it_slows_or_another_order_stands() -> None:
     car = Car()
     found = []
-    for snapshot in (WAITS, IGNORES, WAITS, OBEYS, IGNORES):
+    for snapshot in (WAITS, IGNORES, WAITS, SLOWS, IGNORES):
         car.judge(snapshot)
         found.append(car.response.is_missing)
     assert found == [False, True, True, False, True]
@@ -103,5 +103,5 @@ def test_what_stands_is_kept_until_it_is_known_no_more() -> None:
 
 def test_before_the_first_command_nothing_is_shown() -> None:
     car = Car(sent=False)
-    assert car.judge(OBEYS) == []
+    assert car.judge(SLOWS) == []
     assert car.order.slows_s is None

@@ -38,7 +38,9 @@ async def test_it_is_armed_ordered_proven_held_and_released() -> None:
         await car.until_car(lambda: car.speed_mps == 0.0)
         slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in zip(car.speeds[:-1:20], car.speeds[20::20], strict=False)]
         assert slopes[0] == pytest.approx(-1.5, abs=0.001)
-        angles = {round(said["angular"]["z"], 6) for _, topic, said in car.heard if topic == "/catvehicle/cmd_vel"}
+        angles = {
+            round(message["angular"]["z"], 6) for _, topic, message in car.published if topic == "/catvehicle/cmd_vel"
+        }
         assert len(angles) == 1  # the wheels are held
         await asyncio.sleep(1.0)
         assert car.speed_mps == 0.0
@@ -103,7 +105,7 @@ async def test_what_is_released_while_the_link_is_lost_is_not_taken_up_again() -
         assert len(car.speeds) == sent
 
 
-async def test_without_a_link_it_is_refused_and_said() -> None:
+async def test_without_a_link_it_is_refused_and_logged() -> None:
     async with field() as car:
         await car.armed()
         car.service.start_scenario("bridge-killed", 3.0)

@@ -77,28 +77,28 @@ def test_the_angle_follows_from_kind_and_ratio_and_a_team_may_set_it() -> None:
     assert received(-20.0, cars["catvehicle"], -0.00536).tyre_rad == pytest.approx(0.1072)
     turned = received(0.1072, cars["catvehicle-sim"], 1.0)
     assert (turned.tyre_rad, turned.percent) == (pytest.approx(0.1072), pytest.approx(-20.0))
-    assert value_of(-20.0, GENERIC, 0.0) is None  # percent or degrees: nothing says which
+    assert value_of(-20.0, GENERIC, 0.0) is None  # percent or degrees: nothing states which
     assert received(-20.0, GENERIC, 0.0, "percent") == Steering(percent=-20.0)
     own = from_toml("[limits.steering]\ntyre_rad_per_unit = 0.0625\n")  # a steering wheel of 16:1, positive = left
     assert received(1.6, GENERIC, ratio(GENERIC, own)).tyre_rad == pytest.approx(0.1)
 
 
-def test_settings_of_before_are_read_and_the_kind_of_car_says_the_rest() -> None:
+def test_settings_of_before_are_read_and_the_kind_of_car_decides_the_rest() -> None:
     read = from_toml(FILE_BEFORE, known_profiles=profiles.load())
     assert (read.version, read.values) == (7, {"speed_limit.max_mps": 9.0})
     assert ratio(profiles.load()[read.profile], read) == -0.00536
 
 
-def test_where_the_steering_is_not_known_it_cannot_be_armed_and_says_why() -> None:
+def test_where_the_steering_is_not_known_it_cannot_be_armed_and_names_why() -> None:
     rig = Rig(steering=Steering(percent=3.0))
     rig.slowing.car.is_steering_known = False
     rig.pass_time(0.1)
     frame = rig.slowing.frame()
     assert (frame["state"], frame["why"]) == ("not_available", STEERING_NOT_KNOWN)
     with pytest.raises(Refused, match="steering of this kind of car is not known"):
-        rig.obey("arm")
+        rig.execute("arm")
     with pytest.raises(Refused):
-        rig.obey("slow_down")
+        rig.execute("slow_down")
     rig.pass_time(1.0)
     assert rig.link.angles == []
 
@@ -108,19 +108,19 @@ def test_before_any_steering_has_come_it_cannot_be_armed() -> None:
     assert rig.slowing.frame()["why"] == NO_STEERING
     rig.steering = TURNED
     rig.pass_time(0.1)
-    rig.obey("arm")
-    rig.obey("slow_down")
+    rig.execute("arm")
+    rig.execute("slow_down")
     rig.pass_time(0.5)
     assert set(rig.link.angles) == {0.1072}
 
 
 def test_steering_that_falls_silent_before_or_in_an_order_is_held_as_it_was_last_known() -> None:
     rig = Rig(steering=TURNED)
-    rig.obey("arm")
+    rig.execute("arm")
     rig.steering = None
     rig.pass_time(8.0)  # far beyond its freshness
     assert rig.slowing.frame()["state"] == "armed"
-    rig.obey("slow_down")
+    rig.execute("slow_down")
     rig.pass_time(0.5)
     assert set(rig.link.angles) == {0.1072}
     assert any("no longer measured: the last known angle is held" in note for note in rig.notes)
@@ -143,7 +143,7 @@ def test_an_order_that_stood_over_a_restart_commands_nothing_before_an_angle_is_
     assert set(rig.link.angles) == (set(kept.values()) or {0.1072})
 
 
-def test_the_corridor_is_straight_and_says_so_where_the_steering_is_not_known() -> None:
+def test_the_corridor_is_straight_and_marked_where_the_steering_is_not_known() -> None:
     speed = Twist(speed_mps=4.5, yaw_rate_radps=None)
     limits = AllLimits()
     scan = sweep([(60.0, 0.0, 50.0)])

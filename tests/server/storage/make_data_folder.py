@@ -23,7 +23,7 @@ from tests.server.storage.usual_work import TOO_FAST_MPS, Phone, Process, finish
 from tests.server.viewer import Viewer
 from tests.tree import PROJECT
 
-ASKED = ("/api/settings", "/api/devices", "/api/log.json", "/api/recordings", "/api/mail", "/api/mail/settings")
+SAVED_PATHS = ("/api/settings", "/api/devices", "/api/log.json", "/api/recordings", "/api/mail", "/api/mail/settings")
 BEAMS = 21
 OF_A_RUN = ("exports", "lock", "mail/work", "mail/lock", "access/running.json", "access/waiting")
 
@@ -108,7 +108,7 @@ async def _write(phone: Phone, recording: str, smtp_port: int) -> None:
 
 async def _facts(phone: Phone, recording: str) -> dict[str, Any]:
     cookie = next(iter(phone.client.cookies.jar))
-    answers = {path: (await phone.ask("GET", path)).json() for path in ASKED}
+    answers = {path: (await phone.ask("GET", path)).json() for path in SAVED_PATHS}
     return {
         "at_ms": round(time.time() * 1000),
         "cookie": f"{cookie.name}={cookie.value}",

@@ -77,7 +77,7 @@ async def phone(kept: Kept) -> AsyncIterator[httpx.AsyncClient]:
         yield client
 
 
-async def asked(phone: httpx.AsyncClient, path: str) -> Any:
+async def answer_of(phone: httpx.AsyncClient, path: str) -> Any:
     answer = await phone.get(path)
     assert answer.status_code == 200, (path, answer.text)
     return answer.json()
@@ -91,30 +91,30 @@ async def recordings(phone: httpx.AsyncClient) -> list[dict[str, Any]]:
     """Both, once both are read; newest first."""
     async with asyncio.timeout(60):
         while True:
-            rows: list[dict[str, Any]] = (await asked(phone, "/api/recordings"))["recordings"]
+            rows: list[dict[str, Any]] = (await answer_of(phone, "/api/recordings"))["recordings"]
             if len(rows) == 2 and all(row["state"] == "read" for row in rows):
                 return rows
             await asyncio.sleep(0.1)
 
 
 async def test_devices_settings_alarms_and_mail_are_as_they_were(kept: Kept, phone: httpx.AsyncClient) -> None:
-    assert (await asked(phone, "/api/me"))["name"] == "Pixel", "its cookie lets it in"
-    assert (await asked(phone, "/api/health"))["problems"] == []
-    before, now = kept.answer("/api/devices")["devices"], (await asked(phone, "/api/devices"))["devices"]
+    assert (await answer_of(phone, "/api/me"))["name"] == "Pixel", "its cookie lets it in"
+    assert (await answer_of(phone, "/api/health"))["problems"] == []
+    before, now = kept.answer("/api/devices")["devices"], (await answer_of(phone, "/api/devices"))["devices"]
     assert parts(now, DEVICE) == parts(before, DEVICE)
-    before, now = kept.answer("/api/settings"), await asked(phone, "/api/settings")
+    before, now = kept.answer("/api/settings"), await answer_of(phone, "/api/settings")
     assert now["version"] == before["version"]
-    assert (await asked(phone, "/api/state"))["limits"]["speed_limit.max_mps"] == 9.5
-    events = {event["n"]: event for event in await asked(phone, "/api/log.json")}
+    assert (await answer_of(phone, "/api/state"))["limits"]["speed_limit.max_mps"] == 9.5
+    events = {event["n"]: event for event in await answer_of(phone, "/api/log.json")}
     before = kept.answer("/api/log.json")
     assert len(before) > 4
     assert [events[event["n"]] for event in before] == before
     assert "speed_limit" in {event["alarm"] for event in before}
-    before, now = kept.answer("/api/mail")["mails"], (await asked(phone, "/api/mail"))["mails"]
+    before, now = kept.answer("/api/mail")["mails"], (await answer_of(phone, "/api/mail"))["mails"]
     assert parts(now, MAIL) == parts(before, MAIL)
     assert [mail["state"] for mail in now] in (["queued", "sent"], ["sending", "sent"])
     since_then = {"report_to": []}
-    assert (await asked(phone, "/api/mail/settings")) == since_then | kept.answer("/api/mail/settings")
+    assert (await answer_of(phone, "/api/mail/settings")) == since_then | kept.answer("/api/mail/settings")
 
 
 @pytest.mark.field

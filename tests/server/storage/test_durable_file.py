@@ -26,7 +26,7 @@ def mode_of(path: Path) -> int:
     return stat.S_IMODE(path.stat().st_mode)
 
 
-def test_content_and_mode_are_those_asked_for_whatever_the_umask(tmp_path: Path) -> None:
+def test_content_and_mode_are_those_requested_whatever_the_umask(tmp_path: Path) -> None:
     path = tmp_path / "devices.json"
     path.write_bytes(b"old")
     path.chmod(0o666)

@@ -102,8 +102,8 @@ async def goes_on(data: Path, page: Viewer, seen: dict[int, dict[str, Any]]) -> 
     try:
         await copied.start()
         async with http_client(base_url=copied.address) as client:
-            asked = {"after": max(seen), "run": before, "limit": 1000}
-            answer = (await client.get("/api/events", params=asked)).json()
+            params = {"after": max(seen), "run": before, "limit": 1000}
+            answer = (await client.get("/api/events", params=params)).json()
         assert answer["run"] != before
         assert answer["resumed"]["common"] == max(seen)
         numbers = [event["n"] for event in answer["events"]]

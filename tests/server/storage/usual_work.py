@@ -76,7 +76,7 @@ class Process:
 
 
 class Phone:
-    """A paired phone: asks by HTTPS, and has the page open."""
+    """A paired phone, which sends requests by HTTPS and has the page open."""
 
     def __init__(self, client: httpx.AsyncClient) -> None:
         self.client = client
@@ -88,7 +88,7 @@ class Phone:
         return answer
 
     async def until(self, path: str, fits: Callable[[Any], Any], within_s: float = 40.0) -> Any:
-        """Asks again and again until the answer fits; what fitted."""
+        """Repeat the request until the answer fits; return what fitted."""
         async with asyncio.timeout(within_s):
             while not (found := fits((await self.ask("GET", path)).json())):
                 await asyncio.sleep(0.1)

@@ -1,8 +1,8 @@
 """A disk with a volatile cache: a file that keeps its writes apart until they are flushed, served by the kernel's FUSE.
 
-python -m tests.server.storage.volatile_disk IMAGE FOLDER  serves the file FOLDER/disk, which begins as IMAGE, and says
-"ready". For each line `SEED PATH` it writes what a loss of power would leave to PATH, and prints "cut": all that was
-flushed, and of each later write some sectors, by chance. The rules of FUSE are those of linux/fuse.h.
+python -m tests.server.storage.volatile_disk IMAGE FOLDER  serves the file FOLDER/disk, at first a copy of IMAGE, and
+prints "ready". For each line `SEED PATH` it writes what a loss of power would leave to PATH, and prints "cut": all that
+was flushed, and of each later write some sectors, by chance. The rules of FUSE are those of linux/fuse.h.
 """
 
 from __future__ import annotations

@@ -69,21 +69,21 @@ class Attended:
         spec = AlarmSpec(title=f"Test {priority}", priority=priority, place=Place.LIST, sound=sound, needs_ack=False)
         return Check(id=f"test_{priority}", label=priority, alarm=spec, limits=Limits, find=find, scope=scope)
 
-    def tick(self, seconds: float = 0.0, *, heard: tuple[Mapping[str, Any], ...] = ()) -> None:
-        """Time passes, a tick every 50 ms; the pages in `heard` report once a second."""
+    def tick(self, seconds: float = 0.0, *, reporting: tuple[Mapping[str, Any], ...] = ()) -> None:
+        """Time passes, a tick every 50 ms; the pages in `reporting` report once a second."""
         until_s = self.now_s + seconds
         due_s = self.now_s
         while True:
             if self.now_s >= due_s:
                 due_s += 1.0
-                for page in heard:
-                    self.say(page)
+                for page in reporting:
+                    self.report(page)
             self.session._tick.run(self._clock(), put=True)
             if self.now_s >= until_s:
                 return
             self.now_s = min(until_s, self.now_s + 0.05)
 
-    def say(self, page: Mapping[str, Any]) -> None:
+    def report(self, page: Mapping[str, Any]) -> None:
         """A page of all cars reports that it is there."""
         found = self.session._commands._query({**SEEN, **page, "kind": "announces"})
         assert found == {"ok": True}

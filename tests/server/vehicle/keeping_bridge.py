@@ -103,7 +103,7 @@ class KeepingBridge:
         self._listener.link_opened()
 
     async def answer_pings(self) -> None:
-        """Answers a ping twice a second until it is cancelled, and says how many clients there are."""
+        """Answers a ping twice a second until it is cancelled, and publishes the number of clients."""
         while True:
             if self.is_open and self._marks is not None:
                 self.heard_s = time.monotonic()

@@ -66,7 +66,7 @@ async def test_an_order_that_was_obeyed_is_answered_so(
         if broken == "frame":
             monkeypatch.setattr(session, "frame", fails)
         else:
-            monkeypatch.setattr(session._parts.recording, "asked", fails)
+            monkeypatch.setattr(session._parts.recording, "note_command", fails)
         async with httpx.AsyncClient(base_url=base, timeout=20) as client:
             answer = await client.post("/api/pause")
             assert answer.status_code == 200, answer.text

@@ -59,10 +59,10 @@ async def test_it_stays_while_an_alarm_is_active_or_unacknowledged() -> None:
     assert car.item is not None
 
 
-async def test_two_people_take_hand_over_and_release_and_the_log_says_who() -> None:
+async def test_two_people_take_hand_over_and_release_and_the_log_names_them() -> None:
     car = needing()
     for page in (ANN, BEN):
-        car.say(page)
+        car.report(page)
     await car.obeyed(ANN, "take_item")
     assert car.item is not None
     assert car.item["assigned"] == {"name": "Ann", "page": "page-a", "since_ms": WALL_MS + 1000}
@@ -72,7 +72,7 @@ async def test_two_people_take_hand_over_and_release_and_the_log_says_who() -> N
     await car.obeyed(ANN, "offer_item", to="page-b", vehicle="ocelot")
     assert car.item["assigned"]["name"] == "Ann"
     assert car.item["offered"] == {"by": "Ann", "name": "Ben", "page": "page-b", "since_ms": WALL_MS + 1000}
-    assert await car.refused(ANN, "answer_item", accept=True) == "You are not asked to take over."
+    assert await car.refused(ANN, "answer_item", accept=True) == "You have no offer to take over."
     await car.obeyed(BEN, "answer_item", accept=True)
     assert (car.item["assigned"]["name"], car.item["offered"]) == ("Ben", None)
     assert await car.refused(ANN, "release_item") == "This car is assigned to Ben."
@@ -115,11 +115,11 @@ async def test_nobody_takes_it_and_it_is_escalated_once() -> None:
 async def test_a_page_that_falls_silent_loses_it_after_10_s() -> None:
     car = needing()
     await car.obeyed(ANN, "take_item")
-    car.tick(100.0, heard=(ANN,))
+    car.tick(100.0, reporting=(ANN,))
     assert [event["act"] for event in car.log] == ["taken"]
-    car.tick(9.0, heard=(BEN,))
+    car.tick(9.0, reporting=(BEN,))
     assert [event["act"] for event in car.log] == ["taken"]
-    car.tick(2.0, heard=(BEN,))
+    car.tick(2.0, reporting=(BEN,))
     assert [(event["act"], event["by"], event["holder"], event["before"]) for event in car.log[1:]] == [
         ("unassigned", None, None, "Ann")
     ]
@@ -173,14 +173,14 @@ async def test_a_program_has_it_while_it_takes_it_again() -> None:
     assert [event["act"] for event in car.log] == ["taken", "unassigned"]
 
 
-async def test_only_a_page_that_is_seen_is_asked() -> None:
+async def test_only_a_page_that_is_seen_gets_an_offer() -> None:
     car = needing()
-    car.say(ANN)
+    car.report(ANN)
     await car.obeyed(ANN, "take_item")
     assert await car.refused(ANN, "offer_item", to="page-b") == "That page is closed or not visible."
-    car.say({**BEN, "visible": False})
+    car.report({**BEN, "visible": False})
     assert await car.refused(ANN, "offer_item", to="page-b") == "That page is closed or not visible."
-    car.say(BEN)
+    car.report(BEN)
     await car.obeyed(ANN, "offer_item", to="page-b")
 
 
@@ -223,7 +223,7 @@ async def test_a_summary_stays_within_its_bound_whoever_is_there() -> None:
     widest = "\N{GRINNING FACE}" * 40
     pages = [{"by": widest, "who": f"phone {number}", "page": f"{number:040d}"} for number in range(60)]
     for page in pages:
-        car.say(page)
+        car.report(page)
     assert (await car.ask(pages[0], "present", visible=True, sound="ready", awake="ready"))["ok"]
     await car.obeyed(pages[0], "control", do="take")
     await car.obeyed(pages[0], "take_item")
@@ -232,7 +232,7 @@ async def test_a_summary_stays_within_its_bound_whoever_is_there() -> None:
     car.tick(0.5)
     person = {"name": "A" + widest[:29], "role": "operator"}
     await car.obeyed(pages[0] | {"person": person}, "acknowledge", alarm="test_warning", occurrence=1)
-    car.say(pages[1] | {"duties": {person["name"]: WALL_MS}})
+    car.report(pages[1] | {"duties": {person["name"]: WALL_MS}})
     car.say_what = '"' * 10_000
     car.tick(0.5)
     frame = car.bus.newest(ALL, "ocelot")
@@ -242,6 +242,6 @@ async def test_a_summary_stays_within_its_bound_whoever_is_there() -> None:
     assert 1 < len(car.summary["people"]) < MOST_PEOPLE
     assert len(str(frame.payload).encode()) <= LONGEST_SUMMARY
     for number in range(60):
-        car.say({"by": f"P{number}", "who": f"phone {number}", "page": f"page-{number}"})
+        car.report({"by": f"P{number}", "who": f"phone {number}", "page": f"page-{number}"})
     car.tick(0.5)
     assert len(car.summary["people"]) == MOST_PEOPLE

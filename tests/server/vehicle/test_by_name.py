@@ -1,4 +1,4 @@
-"""A bridge without rosapi: each signal has one topic, chosen from those of which messages come, or is asked for."""
+"""A bridge without rosapi: each signal has one topic, chosen from those with messages, or by the operator."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Without:
 
 
 @pytest.mark.virtual_time
-async def test_two_lasers_do_not_mix_and_are_asked_for() -> None:
+async def test_two_lasers_do_not_mix_and_are_a_question() -> None:
     def publish(bridge: RosBridge, at_s: float) -> None:
         bridge.publish("/odom", odometry(2.0 * at_s, 2.0))
         bridge.publish("/scan", of_laser("rear", 20.0))

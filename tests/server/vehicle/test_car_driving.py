@@ -75,7 +75,7 @@ async def test_a_drive_with_each_scenario_and_a_restart(tmp_path: Path) -> None:
                 assert event["initiated_by"] in ("driver", "unknown")  # a busy machine sees brake and mode at once
                 assert len(event["before"]) <= 21
             modes = [(event["before"], event["mode"]) for event in await one.events("mode")]
-            assert modes == [  # what flickers is told twice
+            assert modes == [  # a short change is logged both ways
                 ("unknown", "autonomous"), ("autonomous", "manual"), ("manual", "autonomous"),
                 ("autonomous", "unknown"), ("unknown", "autonomous"),
             ]  # fmt: skip
@@ -100,7 +100,7 @@ async def test_a_drive_with_each_scenario_and_a_restart(tmp_path: Path) -> None:
 
 
 async def kept_beside(folder: Path, wanted: dict[str, str]) -> None:
-    """What was said once the recording was complete, and nothing that it holds itself."""
+    """The descriptions given after the recording was complete, and none that it holds itself."""
     found: dict[str, str | None] = {}
     ends_s = time.monotonic() + 20.0
     while found != wanted:

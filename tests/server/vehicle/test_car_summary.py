@@ -23,7 +23,7 @@ def snapshot(**readings: Reading[Any]) -> Snapshot:
     return Snapshot(now_s=NOW_S, readings=readings)
 
 
-def test_a_car_is_where_its_gps_says_and_heads_where_it_says() -> None:
+def test_a_car_is_at_the_position_and_heading_of_its_gps() -> None:
     found = place(
         snapshot(position=reading(GpsFix(lat_deg=36.2, lon_deg=-115.0)), heading=reading(Heading(heading_deg=180.0))),
         NOW_S,
@@ -59,7 +59,7 @@ def test_without_a_fix_it_has_no_place(fix: GpsFix | None) -> None:
     assert place(snapshot() if fix is None else snapshot(position=reading(fix)), NOW_S) is None
 
 
-def test_an_old_place_is_said_to_be_old_and_an_old_heading_is_none() -> None:
+def test_an_old_place_is_marked_as_old_and_an_old_heading_is_none() -> None:
     found = place(
         snapshot(
             position=reading(GpsFix(lat_deg=1.0, lon_deg=2.0), age_s=20.0),

@@ -50,7 +50,7 @@ def test_a_fault_with_its_numbers_and_its_minute() -> None:
     assert (found["signal"], found["delays"]["on_s"]) == ("speed", 0.3)
 
 
-def test_not_checked_says_why_and_what_it_needs() -> None:
+def test_not_checked_names_why_and_what_it_needs() -> None:
     found = answer("gps_drift", 4.0)
     assert (found["verdict"], found["text"]) == ("unknown", "Position is not published")
     assert found["checked_when"].startswith("Checked at standstill")

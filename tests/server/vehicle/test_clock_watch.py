@@ -1,4 +1,4 @@
-"""The server's clock is set during a drive: an event says so, once."""
+"""The server's clock is set during a drive: one event reports it."""
 
 from __future__ import annotations
 
@@ -27,5 +27,5 @@ def test_a_step_is_noted_once(by_ms: int, how: str | None) -> None:
     for number in range(20):
         wall_ms[0] += 50 + (by_ms if number == 10 else 0)
         watch.tick(5.0 + number * 0.05)
-    said = [] if how is None else [("clock_set", f"The server's clock was set {how}: ages are not changed by it.")]
-    assert log.notes == said
+    notes = [] if how is None else [("clock_set", f"The server's clock was set {how}: ages are not changed by it.")]
+    assert log.notes == notes

@@ -49,7 +49,7 @@ async def bus() -> AsyncIterator[LocalBus]:
 
 
 def example(kind: str) -> dict[str, Any]:
-    """A message of a kind, which a session without a car may obey or refuse."""
+    """A message of a kind, which a session without a car may execute or refuse."""
     schema = BY_KIND[kind].model_json_schema()
     fields = {name: schema["properties"][name] for name in schema.get("required", ()) if name != "kind"}
     made = {name: of["enum"][0] if "enum" in of else OF_TYPE.get(of.get("type")) for name, of in fields.items()}
@@ -67,7 +67,7 @@ async def test_a_command_is_handled_and_needs_what_it_declares(bus: LocalBus, ki
     assert "held_by" not in answer
 
 
-def test_a_command_is_served_over_http_where_it_says_so() -> None:
+def test_a_command_is_served_over_http_where_it_is_declared() -> None:
     paths = create_app(Config()).openapi()["paths"]
     served = {kind: command.path or f"/api/{kind}" for kind, command in BY_KIND.items() if command.http}
     assert len(set(served.values())) == len(served) >= 11
@@ -123,7 +123,7 @@ async def test_what_was_long_on_its_way_is_refused_and_the_same_pressed_now_is_n
 
 
 async def test_what_is_not_for_the_moment_may_come_late(bus: LocalBus) -> None:
-    """A position, a mark or an acknowledgement says itself what it is of."""
+    """A position, a mark or an acknowledgement names what it belongs to."""
     late = {"heard_ms": 1.7e12, "held_s": 0.0, "pressed_ago_s": 20.0}
     answer = await bus.request("car", {"kind": "record", "on": True, **late, **PHONE_A})
     assert "press again" not in answer.get("reason", "")

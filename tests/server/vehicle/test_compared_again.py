@@ -27,7 +27,7 @@ def test_what_is_only_compared_comes_again_for_no_signal() -> None:
         judged.receive_again(by_topic["/gps/filtered"], "/gps/filtered", fix(0.0, 1.0), None, 2.0, came_s=1.0)
     assert judged.reception.tally("position").repeats == 0
     (other,) = judged.state.snapshot(2.0).compared.of("position")
-    assert other.reading.count == 1, "it says nothing new"
+    assert other.reading.count == 1, "it is not new"
     judged.receive_again(by_topic["/gps/fix"], "/gps/fix", fix(0.0, 1.0), None, 2.0, came_s=1.0)
     assert judged.reception.tally("position").repeats == 1
 

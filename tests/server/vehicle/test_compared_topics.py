@@ -71,7 +71,7 @@ def test_they_are_throttled_unless_they_are_recorded(
         undecided=(),
         without=(),
         is_recorded=is_recorded,
-        asked=(),
+        requested=(),
         fit=(),
         compression=lambda topic, is_fit: "none",
     )

@@ -59,7 +59,7 @@ async def signed() -> Attended:
     log._wall_ms = lambda wall_ms=log._wall_ms: wall_ms() + 7  # what happened is logged a moment later
     car.tick(2.5)  # nobody would hear an alarm
     await car.obeyed(ANN, "present", visible=True, sound="ready", awake="ready")
-    car.tick(1.5, heard=(ANN,))
+    car.tick(1.5, reporting=(ANN,))
     press_brake(car, 31.0)
     await car.obeyed(ANN | AK, "set_departure_item", item="doors", result="done")
     await car.obeyed(ANN, "set_departure_item", item="tyres", result="failed", note="worn")
@@ -119,7 +119,7 @@ async def test_it_is_refused_while_an_item_is_failed_or_open_and_without_a_check
     assert log(car, "signed") == []
 
 
-async def test_a_restart_finds_what_stood_word_for_word() -> None:
+async def test_a_restart_finds_what_stood_unchanged() -> None:
     car = await signed()
     before = await answer(car)
     again = CarDeparture(ActiveSettings(SettingsFile(None)), DepartureFile(None), lambda *_, **__: None)
@@ -152,7 +152,7 @@ async def test_each_drive_has_a_check_of_its_own() -> None:
     assert (await answer(car))["done"] == 0, "by hand it begins again"
 
 
-async def test_a_drive_without_one_is_said_once() -> None:
+async def test_a_drive_without_one_is_logged_once() -> None:
     car = Attended()
 
     def drive(seconds: float) -> None:
@@ -197,7 +197,7 @@ async def test_the_list_is_edited_kept_and_refused_with_a_sentence(tmp_path: Pat
     [(b"[[item", "This is not TOML"), (b"\xff", "not UTF-8"), (b"[[item]]\nid = 'a'", "Item 1 needs a title")],
     ids=["toml", "utf8", "title"],
 )
-def test_a_file_that_cannot_be_used_is_said_and_left_alone(tmp_path: Path, content: bytes, why: str) -> None:
+def test_a_file_that_cannot_be_used_is_reported_and_left_alone(tmp_path: Path, content: bytes, why: str) -> None:
     path = tmp_path / "car.departure.toml"
     path.write_bytes(content)
     found = DepartureFile(path)
@@ -224,18 +224,20 @@ async def test_a_file_that_cannot_be_used_is_set_aside_before_the_list_is_kept(
 
 
 async def test_a_list_that_takes_long_to_keep_comes_into_force_though_nobody_waits(tmp_path: Path) -> None:
-    path, storage, disk, said = tmp_path / "car.departure.toml", StorageThread(), threading.Event(), list[str]()
-    car = CarDeparture(ActiveSettings(SettingsFile(None)), DepartureFile(path), lambda _, text, **__: said.append(text))
+    path, storage, disk, texts = tmp_path / "car.departure.toml", StorageThread(), threading.Event(), list[str]()
+    car = CarDeparture(
+        ActiveSettings(SettingsFile(None)), DepartureFile(path), lambda _, text, **__: texts.append(text)
+    )
     storage.submit(lambda: disk.wait(10) and None)
     commands = [SetDepartureList(kind="set_departure_list", items=LIST[:number]) for number in (2, 3)]
-    first, second = [asyncio.create_task(car.obey(one, Caller(name="Ann"), 0, storage)) for one in commands]
+    first, second = [asyncio.create_task(car.execute(one, Caller(name="Ann"), 0, storage)) for one in commands]
     await asyncio.sleep(0)
     first.cancel()
     disk.set()
     await asyncio.wait_for(second, 10)
     storage.close()
     assert first.cancelled()
-    assert said == [f"The list of the departure check has {number} items now." for number in (2, 3)]
+    assert texts == [f"The list of the departure check has {number} items now." for number in (2, 3)]
     kept = DepartureFile(path).items
     assert kept is not None
     assert [one.id for one in kept] == [row["id"] for row in car.answer()["items"]] == ["doors", "tyres", "sound"]

@@ -40,7 +40,7 @@ MESSAGES = {
 FILES = {1: "catvehicle_2016-06-01.bag", 2: "catvehicle_2016-06-01_mcap"}  # by the version of ROS
 JITTER_S = 0.05  # of a bridge and a server on a machine that is busy with tests
 LOOKS_BACK_MS = 11_000.0  # the check that the car moves looks back ten seconds
-AFTER_MS = 500.0  # what was played late is heard after the moment
+AFTER_MS = 500.0  # what was played late arrives after the moment
 
 
 @contextlib.asynccontextmanager
@@ -56,7 +56,7 @@ async def replaying(path: Path, *options: str) -> AsyncIterator[str]:
         async with asyncio.timeout(30):
             while True:
                 line = (await process.stdout.readline()).decode()
-                assert line, "replay ended before it said its address"
+                assert line, "replay ended before it printed its address"
                 found = re.search(r"ws://[\d.]+:\d+", line)
                 if found:
                     break
@@ -113,38 +113,38 @@ def _assert_seen_on_the_socket(one: Viewer) -> None:
         state["signals"]["speed"]["value"]["speed_mps"] for state in one.states if state["signals"]["speed"]["value"]
     ]
     assert max(speeds) > 4.1
-    heard = [index for index, state in enumerate(one.states) if state["session"]["received"] > 0]
+    received = [index for index, state in enumerate(one.states) if state["session"]["received"] > 0]
     done = next(index for index, state in enumerate(one.states) if state["session"]["received"] >= 14228)
-    assert one.got_s[done] - one.got_s[heard[0]] == pytest.approx(55.9, abs=1.0)
-    assert done - heard[0] > 400  # some ten a second
+    assert one.got_s[done] - one.got_s[received[0]] == pytest.approx(55.9, abs=1.0)
+    assert done - received[0] > 400  # some ten a second
 
 
 def _assert_as_rehearsed(file: Path, events: list[dict[str, Any]], one: Viewer) -> None:
-    """`catgraph check` over the file says what the log of the live drive says, at the same times to a tick.
+    """`catgraph check` of the file has the same events as the log of the live drive, at the same times to a tick.
 
-    A moment of the live drive is told by the message of the speed that was the newest then: a busy machine plays a
-    drive more slowly here and there, and by how much it did so in the seconds before is measured, and allowed for.
+    A moment of the live drive is identified by the newest speed message then: a busy machine plays a drive more slowly
+    at times. The delay in the seconds before is measured and allowed for.
     """
     with open_recording([file]) as recording:
         run = rehearse(recording)
         topic = run.sources["speed"].topic
         speed_s = [message.at_s - recording.start_s for message in recording.messages(0.0, {topic})
                    if message.topic == topic]  # fmt: skip
-    heard = [
+    received = [
         (state["server"]["time_ms"] - 1000 * (speed["age_s"] - speed["delay_s"]), speed["count"])
         for state in one.states
         if (speed := state["signals"]["speed"])["count"]
     ]
 
     def in_file_s(at_ms: float) -> float:
-        heard_ms, count = max((row for row in heard if row[0] <= at_ms), default=heard[0])
+        heard_ms, count = max((row for row in received if row[0] <= at_ms), default=received[0])
         return speed_s[count - 1] + (at_ms - heard_ms) / 1000
 
     def slip_s(at_ms: float) -> float:
         """How unevenly the drive was played in the seconds that an alarm may look back."""
         late = [
             heard_ms / 1000 - speed_s[count - 1]
-            for heard_ms, count in heard
+            for heard_ms, count in received
             if at_ms - LOOKS_BACK_MS <= heard_ms <= at_ms + AFTER_MS
         ]
         return max(late) - min(late)
@@ -156,9 +156,11 @@ def _assert_as_rehearsed(file: Path, events: list[dict[str, Any]], one: Viewer) 
     }
     live = {name: in_file_s(one_ms) for name, one_ms in at_ms.items()}
     rehearsed = {(row.alarm_id, row.change, row.occurrence): row.at_s for row in run.transitions}
-    during = {name for name, at_s in live.items() if at_s <= run.to_s}  # then the replay falls silent, and that is told
+    during = {
+        name for name, at_s in live.items() if at_s <= run.to_s
+    }  # then the replay falls silent, which raises an alarm
     assert rehearsed
-    during = {one for one in during if one[0] != "reach"}  # nobody listens here, which no recording can tell
+    during = {one for one in during if one[0] != "reach"}  # nobody listens here, which no recording shows
     assert during == set(rehearsed)
     for name, at_s in rehearsed.items():
         assert live[name] == pytest.approx(at_s, abs=TICK_S + JITTER_S + slip_s(at_ms[name])), name

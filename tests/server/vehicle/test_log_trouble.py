@@ -1,4 +1,4 @@
-"""The log's file is held, damaged or gone: judging goes on, events reach the pages, and the operator is told."""
+"""The log's file is held, damaged or gone: judging goes on, events reach the pages, and the operator is informed."""
 
 from __future__ import annotations
 
@@ -34,7 +34,9 @@ async def raised(one: Viewer, name: str) -> None:
 
 
 @pytest.mark.field
-async def test_a_file_that_another_program_holds_stops_no_alarm_and_is_said(bridge: RosBridge, tmp_path: Path) -> None:
+async def test_a_file_that_another_program_holds_stops_no_alarm_and_is_reported(
+    bridge: RosBridge, tmp_path: Path
+) -> None:
     config = config_of(bridge, tmp_path)
     speeds = {"now": 2.0}
     async with driving(bridge, speed=lambda n: speeds["now"]):

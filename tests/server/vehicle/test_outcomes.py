@@ -32,7 +32,7 @@ def test_a_command_is_under_way_and_then_done_or_refused() -> None:
     assert outcomes.ask(PAGE, "a-3", 1.0, 4.0) == {"ok": True, "became": "not_known"}
 
 
-def test_who_handed_over_is_told_again_where_the_answer_was_lost() -> None:
+def test_who_handed_over_gets_the_answer_again_where_it_was_lost() -> None:
     outcomes = Outcomes(lambda: 0.0)
     outcomes.end(command(kind="accept_control"), {"ok": True, "handed_over": {"device": "dev-a", "to": "Ben"}}, 2.0)
     answer = outcomes.ask(PAGE, "a-1", 1.0, 5.0)
@@ -71,7 +71,7 @@ def test_programs_and_positions_are_not_remembered(message: dict[str, Any]) -> N
     assert outcomes._known == {}
 
 
-def test_a_sentence_says_whether_it_may_have_been_carried_out() -> None:
+def test_a_sentence_states_whether_it_may_have_been_carried_out() -> None:
     lost = NotServed("the agent of ocelot did not answer within 3.0 s", outcome="unknown", cut="broker-agent")
     assert not_served(lost) == {
         "ok": False,

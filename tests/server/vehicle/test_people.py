@@ -33,22 +33,22 @@ def escalated(car: Attended) -> str:
 
 
 @pytest.mark.parametrize(
-    ("stated", "said", "shown"),
+    ("stated", "text", "shown"),
     [
         (BOSS, "escalated to J. D., supervisor.", ["J. D."]),
         ({"supervisors": ["J. D.", "K. L."]}, "escalated to J. D. and K. L., supervisors.", ["J. D.", "K. L."]),
         (NOBODY, "escalated, but no supervisor is on duty.", []),
-        ({}, "escalated to the supervisor.", None),  # of a web node that knows nothing of people
+        ({}, "escalated to the supervisor.", None),  # of a web node without data on people
         ({"supervisors": "J. D."}, "escalated to the supervisor.", None),
     ],
 )
 async def test_a_critical_alarm_is_escalated_to_who_is_on_duty(
-    stated: dict[str, Any], said: str, shown: list[str] | None
+    stated: dict[str, Any], text: str, shown: list[str] | None
 ) -> None:
     car = Attended()
     car.faults = {Priority.CRITICAL}
-    car.tick(32.0, heard=(ANN | stated,))
-    assert escalated(car).endswith(said)
+    car.tick(32.0, reporting=(ANN | stated,))
+    assert escalated(car).endswith(text)
     assert car.item is not None
     assert car.item["supervisors"] == shown
 
@@ -56,7 +56,7 @@ async def test_a_critical_alarm_is_escalated_to_who_is_on_duty(
 async def test_who_is_supervisor_is_not_known_once_no_page_states_it() -> None:
     car = Attended()
     car.faults = {Priority.CRITICAL}
-    car.tick(1.0, heard=(ANN | BOSS,))
+    car.tick(1.0, reporting=(ANN | BOSS,))
     assert car.item is not None
     assert car.item["supervisors"] == ["J. D."]
     car.tick(11.5)
@@ -67,7 +67,7 @@ async def test_what_a_person_does_is_logged_with_their_name_and_role() -> None:
     car = Attended()
     car.tick(0.5)
     car.faults = {Priority.WARNING}
-    car.tick(0.5, heard=(ANN,))
+    car.tick(0.5, reporting=(ANN,))
     await car.obeyed(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
     assert car.session.frame()["alarms"][0]["acknowledged_by"] == "A. K. (Ann)"
     await car.obeyed(BEN, "shelve", alarm="test_warning", occurrence=1, minutes=5.0)
@@ -202,7 +202,7 @@ async def test_a_new_alarm_during_the_read_back_adds_a_line() -> None:
     assert [line["kind"] for line in shift.state["lines"]] == ["alarm", "rides", "driving", "departure", "slow_down"]
     assert shift.state["lines"][0]["title"] == "No alarm is active"
     assert [line["title"] for line in shift.state["lines"][1:4]] == [
-        "M. R. rides, safety driver", "Who drives is not known", "No departure check was made",
+        "In the car: M. R., safety driver", "Who drives is not known", "No departure check was made",
     ]  # fmt: skip
     await shift.read_all()
     version = shift.state["version"]

@@ -1,4 +1,4 @@
-"""The phone from its page to the judge: what a page may say, on whose clock it counts, and whole rides with a phone."""
+"""The phone from its page to the judge: what a page may send, which clock counts, and whole drives with a phone."""
 
 from __future__ import annotations
 
@@ -85,19 +85,19 @@ def test_anything_else_is_refused_with_a_sentence(command: dict[str, Any], sente
 # -- on whose clock it counts ------------------------------------------------------------------------------------------
 
 
-def heard(wall_ms: float, **more: Any) -> PhoneReport:
+def report_of(wall_ms: float, **more: Any) -> PhoneReport:
     command = commands.read(with_fix(**more))
     assert isinstance(command, commands.Position)
     return phone_report(command, now_s=1000.0, wall_ms=wall_ms)
 
 
 @pytest.mark.parametrize("at_ms", [0, 1_700_000_000_000, 1_790_000_000_000, 9_000_000_000_000])
-def test_the_phone_s_own_clock_has_no_say(at_ms: float) -> None:
-    word = heard(WALL_MS + 150, at_ms=at_ms, age_s=0.3, held_s=0.05)
-    assert word.measured_s == pytest.approx(1000.0 - 0.3 - 0.05)  # half of the 0.1 s there and back
-    assert word.uncertain_s == pytest.approx(0.05)
-    assert word.fix is not None
-    assert word.fix.at_ms == at_ms
+def test_the_phone_s_own_clock_does_not_count(at_ms: float) -> None:
+    report = report_of(WALL_MS + 150, at_ms=at_ms, age_s=0.3, held_s=0.05)
+    assert report.measured_s == pytest.approx(1000.0 - 0.3 - 0.05)  # half of the 0.1 s there and back
+    assert report.uncertain_s == pytest.approx(0.05)
+    assert report.fix is not None
+    assert report.fix.at_ms == at_ms
 
 
 @pytest.mark.parametrize(
@@ -111,9 +111,9 @@ def test_the_phone_s_own_clock_has_no_say(at_ms: float) -> None:
     ],
 )
 def test_how_long_the_way_may_have_taken(wall_ms: float, held_s: float, uncertain_s: float) -> None:
-    word = heard(wall_ms, held_s=held_s)
-    assert word.uncertain_s == pytest.approx(uncertain_s)
-    assert math.isfinite(word.measured_s)
+    report = report_of(wall_ms, held_s=held_s)
+    assert report.uncertain_s == pytest.approx(uncertain_s)
+    assert math.isfinite(report.measured_s)
 
 
 def test_a_reason_needs_no_clock() -> None:
@@ -172,7 +172,7 @@ def gps(lat_deg: float) -> dict[str, Any]:
 
 
 @pytest.mark.virtual_time
-async def test_a_phone_far_from_the_car_is_told_on_every_page(bridge: RosBridge) -> None:
+async def test_a_phone_far_from_the_car_is_shown_on_every_page(bridge: RosBridge) -> None:
     """Page → server → check → alarm on another page, and how the state shows it."""
     bridge.advertise("/gps_fix", "sensor_msgs/NavSatFix")
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
@@ -210,7 +210,7 @@ async def test_what_does_not_fit_or_is_not_wanted_is_refused(bridge: RosBridge) 
         assert (await one.state())["phone"] is None
 
 
-# -- whole rides, in virtual time --------------------------------------------------------------------------------------
+# -- whole drives, in virtual time -------------------------------------------------------------------------------------
 
 
 def raised(found: Ride) -> list[tuple[str, float]]:
@@ -249,12 +249,12 @@ def test_a_phone_500_m_away_is_beyond_the_gate_although_its_track_correlates_per
 
 
 @pytest.mark.slow
-def test_a_phone_that_is_away_for_a_while_is_told_once_and_its_return_is_not() -> None:
+def test_a_phone_that_is_away_for_a_while_is_reported_once_and_its_return_is_not() -> None:
     found = ride(Rider(offset=lambda t: (500.0, 0.0) if 40.0 < t < 60.0 else (0.0, 0.0)), 120.0)
     assert [(one.alarm, one.change) for one in found.events] == [("phone_car", "raised"), ("phone_car", "cleared")]
 
 
-def test_case_07_a_permission_that_is_taken_away_is_told_with_its_name() -> None:
+def test_case_07_a_permission_that_is_taken_away_is_reported_with_its_name() -> None:
     found = ride(Rider(why=lambda t: "denied" if 20.0 < t < 45.0 else None), 60.0)
     assert [(one.alarm, one.change) for one in found.events] == [
         ("phone_missing", "raised"),
@@ -265,7 +265,7 @@ def test_case_07_a_permission_that_is_taken_away_is_told_with_its_name() -> None
     assert "FAULT: permission" in found.briefs["phone_missing"]
 
 
-def test_without_a_phone_nothing_is_said_of_one() -> None:
+def test_without_a_phone_nothing_is_reported_of_one() -> None:
     found = ride(None, 30.0)
     assert found.events == []
     assert {frozenset(found.briefs[check]) for check in ("phone_car", "phone_tracks", "phone_missing")} == {

@@ -71,7 +71,7 @@ async def test_it_marks_alarms_and_hides_none() -> None:
 async def test_a_critical_alarm_escalates_as_ever() -> None:
     car = await stopped()
     car.faults = {Priority.CRITICAL}
-    car.tick(32.0, heard=(ANN,))
+    car.tick(32.0, reporting=(ANN,))
     assert [one["act"] for one in car.log] == ["escalated"]
     assert car.summary["worst"]["sound"] == "medium"
     assert car.summary["planned_stop"] == "workshop"
@@ -80,13 +80,13 @@ async def test_a_critical_alarm_escalates_as_ever() -> None:
 async def test_a_warning_still_needs_a_person() -> None:
     car = await stopped()
     car.faults = {Priority.WARNING}
-    car.tick(1.0, heard=(ANN,))
+    car.tick(1.0, reporting=(ANN,))
     assert car.item is not None
     assert (car.summary["waiting"], car.summary["worst"]["sound"]) == (1, "none")
 
 
 def test_of_two_alike_the_summary_has_the_one_that_sounds() -> None:
-    """Elsewhere only the worst is heard: one that is silent, because the car stands, must not hide another."""
+    """On pages of other cars only the worst sounds: one that is silent while the car stands must not hide another."""
     spec = AlarmSpec(title="", priority=Priority.WARNING, place=Place.LIST, sound=Sound.MEDIUM, needs_ack=False)
     sounding, silent = (
         Alarm(id=name, spec=spec, active=True, acknowledged=False, raised_s=at_s)
@@ -148,7 +148,7 @@ async def test_it_ends_by_itself_when_the_car_moves(mps: float, is_ended: bool) 
         assert ends[0]["text"] == f"The planned stop ended: the car moves, {abs(mps):.1f} m/s."
 
 
-async def test_a_speed_that_is_not_known_does_not_end_it_and_is_said() -> None:
+async def test_a_speed_that_is_not_known_does_not_end_it_and_is_reported() -> None:
     car = await stopped()
     assert logged(car)[0]["text"] == (
         "Planned stop: in the workshop. The speed is not known: it does not end by itself until it is."

@@ -37,7 +37,7 @@ class Page:
                 reach.leave(operator)
                 state.receive_phone(PhoneReport(phone=str(self.number), is_handheld=True, why="off"), now_s)
         if self.is_here:
-            reach.hear(operator, Present(is_visible=True, sound=self.sound, awake="ready"), now_s)
+            reach.update_status(operator, Present(is_visible=True, sound=self.sound, awake="ready"), now_s)
             state.receive_phone(PhoneReport(phone=str(self.number), is_handheld=True, why=self.why), now_s)
 
 

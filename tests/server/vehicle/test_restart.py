@@ -1,4 +1,4 @@
-"""kill -9 and a new start on the same data: what stood stands again, what was said is kept, numbers go on."""
+"""kill -9 and a new start on the same data: active alarms are active again, entries are kept, numbers continue."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ async def test_a_returned_alarm_and_a_shelf_survive_kill_9(bridge: RosBridge, tm
 
 
 @pytest.mark.virtual_time
-async def test_a_pause_outlasts_a_restart_and_is_said(bridge: RosBridge, tmp_path: Path) -> None:
+async def test_a_pause_outlasts_a_restart_and_is_reported(bridge: RosBridge, tmp_path: Path) -> None:
     address = bridge.address  # type: ignore[attr-defined]
     config = Config(vehicles=(Vehicle(name="car", address=address),), data=tmp_path)
     async with driving(bridge):
@@ -122,8 +122,8 @@ async def test_a_pause_outlasts_a_restart_and_is_said(bridge: RosBridge, tmp_pat
             state = await one.state(lambda s: s["session"]["phase"] == "monitoring")
             assert state["session"]["paused"]
             assert state["session"]["paused_by"] == "Ann"
-            said = "restarted and monitoring is still paused"
-            await one.until(lambda: any(said in event["text"] for event in one.events))
+            text = "restarted and monitoring is still paused"
+            await one.until(lambda: any(text in event["text"] for event in one.events))
             assert (await one.ask(kind="resume"))["ok"]
         async with serving(config) as server, viewer(server) as one:
             state = await one.state(lambda s: s["session"]["phase"] == "monitoring")
@@ -144,8 +144,8 @@ async def test_a_planned_stop_outlasts_a_restart_and_motion_ends_it(bridge: RosB
             again = state["session"]["planned_stop"]
             assert (again["reason"], again["by"], again["is_speed_known"]) == ("charging", "Ann", True)
             assert abs(again["since_ms"] - began["since_ms"]) <= 2
-            said = "the planned stop goes on: charging or refuelling"
-            await one.until(lambda: any(said in event["text"] for event in one.events))
+            text = "the planned stop continues: charging or refuelling"
+            await one.until(lambda: any(text in event["text"] for event in one.events))
             speeds["now"] = 1.0
             await one.state(lambda s: s["session"]["planned_stop"] is None)
         async with serving(config) as server, viewer(server) as one:

@@ -137,12 +137,12 @@ def test_which_planned_stop_was_in_force(changes: list[str], reason: str | None)
         note(one, change, address="ws://a", reason="workshop", since_ms=WALL_MS - 60_000)
     past = read(one, now_s=50.0)
     assert (past.planned_stop and past.planned_stop.reason) == reason
-    assert ("A planned stop was in force: in the workshop." in past.words()) is (reason is not None)
+    assert ("A planned stop was in force: in the workshop." in past.text()) is (reason is not None)
     if past.planned_stop is not None:
         assert past.planned_stop.since_s == pytest.approx(-10.0)
 
 
-def test_which_phone_rides_is_not_read_from_a_recording() -> None:
+def test_which_phone_is_in_the_car_is_not_read_from_a_recording() -> None:
     one = bus()
     note(one, "ride", phone="a")
     assert phone_chosen(one, "car") == "a"
@@ -214,7 +214,7 @@ def test_odd_parts_of_an_event_harm_nothing(odd: dict[str, Any]) -> None:
 
 
 def test_a_long_log_is_read_from_its_end() -> None:
-    """Ten thousand events: only those since an alarm was last at rest are asked for."""
+    """Ten thousand events: only those since an alarm was last at rest are queried."""
     one = bus()
     rested = {"alarm": "hot", "change": "cleared", "state": "NORMAL", "text": "", "occurrence": 1}
     one.append("car", [{"at_ms": WALL_MS, **rested, "occurrence": n} for n in range(10_000)])

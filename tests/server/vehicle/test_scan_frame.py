@@ -39,7 +39,7 @@ def sent(snapshot: Snapshot, *, age_s: float = 0.0, kinds_kept: bool = True, was
 
 @pytest.mark.parametrize("turned", [False, True], ids=["left to right", "negative increment"])
 @pytest.mark.parametrize("percent", [0.0, -15.0, 15.0, None])
-def test_the_page_is_told_the_gap_and_the_bend_of_the_obstacle_check(percent: float | None, turned: bool) -> None:
+def test_the_page_is_sent_the_gap_and_the_bend_of_the_obstacle_check(percent: float | None, turned: bool) -> None:
     things = [(9.0, 0.0, 0.4), (9.0, 2.3, 0.4), (9.0, -2.3, 0.4), WALL]
     snapshot = seen(sweep(things, turned=turned), percent=percent)
     frame = sent(snapshot)
@@ -76,7 +76,7 @@ def test_a_bend_takes_another_object_for_the_nearest() -> None:
         pytest.param(seen(sweep([WALL]), percent=-1e9), 7.14, 0.6, id="steering beyond any car's"),
     ],
 )
-def test_what_is_not_known_is_not_told(snapshot: Snapshot, stopping_m: float | None, tyre_rad: float) -> None:
+def test_what_is_not_known_is_not_sent(snapshot: Snapshot, stopping_m: float | None, tyre_rad: float) -> None:
     frame = sent(snapshot)
     assert frame.stopping_m == (None if stopping_m is None else pytest.approx(stopping_m, abs=0.005))
     assert frame.tyre_angle_rad == pytest.approx(tyre_rad)

@@ -46,8 +46,8 @@ async def test_events_reach_a_page_before_a_state_is_made(bridge: RosBridge) -> 
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
     app, speeds = create_app(config, now=time.monotonic), {"now": 4.2}
     turns, due = FairWakeup(), asyncio.Event()  # a page as the hub wakes it
-    heard, shown = [False], [False]  # whether the alarm is raised: as a page heard, and as the states have it
-    was_heard_first: list[bool] = []
+    noticed, shown = [False], [False]  # whether the alarm is raised: by the events of a page, and by the states
+    was_noticed_first: list[bool] = []
 
     async with serving_app(app, config), driving(bridge, speed=lambda _: speeds["now"]):
         bus = app.state.services.bus
@@ -61,28 +61,28 @@ async def test_events_reach_a_page_before_a_state_is_made(bridge: RosBridge) -> 
                     is_raised := any(one["id"] == "speed_limit" and one["state"] == "UNACKED" for one in alarms)
                 ) != shown[-1]:
                     shown.append(is_raised)
-                    was_heard_first.append(heard[-1] == is_raised)
+                    was_noticed_first.append(noticed[-1] == is_raised)
 
         async def page() -> None:
             while True:
                 await due.wait()
                 due.clear()
                 changes = [event["change"] for event in bus.recent_events("car", 0) if event["alarm"] == "speed_limit"]
-                heard.append(changes[-1:] == ["raised"])
+                noticed.append(changes[-1:] == ["raised"])
 
         writer = asyncio.create_task(page())
         bus.watch("car", watch)
         async with asyncio.timeout(30):
             for count, speed in enumerate((12.6, 4.2, 12.6, 4.2), 1):
                 speeds["now"] = speed
-                while len(was_heard_first) < count:
+                while len(was_noticed_first) < count:
                     await asyncio.sleep(0.02)
         writer.cancel()
-    assert any(was_heard_first)  # the machine may stand still between; with a state made at once none is
+    assert any(was_noticed_first)  # the machine may stand still between; with a state made at once none is
 
 
 @pytest.mark.virtual_time
-async def test_a_killed_bridge_is_said_at_once_and_data_flow_again(bridge: RosBridge, server: str) -> None:
+async def test_a_killed_bridge_is_reported_at_once_and_data_flow_again(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), viewer(server) as one:
         await one.state(is_live)
         await bridge.kill()
@@ -94,7 +94,7 @@ async def test_a_killed_bridge_is_said_at_once_and_data_flow_again(bridge: RosBr
 
 
 @pytest.mark.virtual_time
-async def test_a_frozen_bridge_is_said_within_2_s_and_data_flow_again(bridge: RosBridge, server: str) -> None:
+async def test_a_frozen_bridge_is_reported_within_2_s_and_data_flow_again(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), viewer(server) as one:
         await one.state(is_live)
         bridge.freeze()
@@ -107,7 +107,7 @@ async def test_a_frozen_bridge_is_said_within_2_s_and_data_flow_again(bridge: Ro
 
 
 @pytest.mark.virtual_time
-async def test_a_silent_car_is_told_from_a_silent_bridge(bridge: RosBridge, server: str) -> None:
+async def test_a_silent_car_is_distinguished_from_a_silent_bridge(bridge: RosBridge, server: str) -> None:
     async with viewer(server) as one:
         async with driving(bridge):
             await one.state(is_live)
@@ -119,7 +119,7 @@ async def test_a_silent_car_is_told_from_a_silent_bridge(bridge: RosBridge, serv
 
 
 @pytest.mark.virtual_time
-async def test_nothing_after_connecting_is_said_after_5_s(server: str) -> None:
+async def test_nothing_after_connecting_is_reported_after_5_s(server: str) -> None:
     start_s = time.monotonic()
     async with viewer(server) as one:
         state = await one.state(lambda s: s["link"]["cut"] == "bridge-car", within_s=7.0)

@@ -1,4 +1,4 @@
-"""Topics that compete for a signal on a live car: compared, asked for, answered, and not swapped unasked."""
+"""Topics that compete for a signal on a live car: compared, put as a question, and not swapped without an answer."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def two_lasers(bridge: RosBridge, at_s: float) -> None:
 
 
 @pytest.mark.virtual_time
-async def test_two_lasers_are_asked_for_and_the_answer_makes_the_obstacle_alarm() -> None:
+async def test_two_lasers_are_a_question_and_the_answer_makes_the_obstacle_alarm() -> None:
     topics = {"/odom": ODOM, FRONT: "sensor_msgs/LaserScan", REAR: "sensor_msgs/LaserScan"}
     async with car(topics, two_lasers) as (_, base), viewer(base) as one, http_client() as http:
         state = await one.state(lambda s: bool(s["questions"]))
@@ -177,7 +177,7 @@ async def test_two_cars_on_one_bridge_are_not_mixed() -> None:
 
     async with car(topics, publish) as (_, base), viewer(base) as one:
         state = await one.state(lambda s: bool(s["questions"]))
-        assert [asked["words"] for asked in state["questions"]] == ["Two cars: /agv1 and /agv2: which is this?"]
+        assert [question["words"] for question in state["questions"]] == ["Two cars: /agv1 and /agv2: which is this?"]
         assert {signal["topic"] for signal in state["signals"].values()} == {None}
         await one.ask(kind="set", topics={"speed": "/agv1/odom"})
         state = await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")

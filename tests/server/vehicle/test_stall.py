@@ -15,7 +15,7 @@ from tests.page.processes import replay, running, server
 
 
 @pytest.mark.field
-async def test_a_server_that_stood_still_says_so_and_does_not_accuse_the_car(tmp_path: Path) -> None:
+async def test_a_server_that_stood_still_reports_that_and_does_not_blame_the_car(tmp_path: Path) -> None:
     drive = steady(tmp_path / "slow.bag", 4.2)
     async with running(*replay(drive)) as car, running(*server(tmp_path / "data", car.address)) as watch:
         async with httpx.AsyncClient(base_url=watch.address, timeout=20) as client:
@@ -36,7 +36,7 @@ async def test_a_server_that_stood_still_says_so_and_does_not_accuse_the_car(tmp
                     await asyncio.sleep(0.1)
             await asyncio.sleep(1.5)
             after = (await log())[before:]
-        said = [event["text"] for event in after if event["change"] == "stalled"]
-        assert len(said) == 1, after
-        assert re.fullmatch(r"The server stalled for [23]\.\d s: nothing was evaluated meanwhile\.", said[0])
+        texts = [event["text"] for event in after if event["change"] == "stalled"]
+        assert len(texts) == 1, after
+        assert re.fullmatch(r"The server stalled for [23]\.\d s: nothing was evaluated meanwhile\.", texts[0])
         assert [event["title"] for event in after if event["alarm"]] == []

@@ -58,7 +58,7 @@ def test_as_geojson_a_line_ends_where_the_way_is_not_known() -> None:
     assert queries.track(Snapshot(now_s=0.0, track=(point(1),)))["geometry"]["coordinates"] == []
 
 
-async def test_a_track_grows_is_told_by_number_and_another_connection_is_another(bridge: RosBridge) -> None:
+async def test_a_track_grows_is_sent_by_number_and_another_connection_is_another(bridge: RosBridge) -> None:
     bridge.advertise("/gps_fix", "sensor_msgs/NavSatFix")
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
     async with serving(config) as base, viewer(base) as one, http_client(base_url=base) as client:

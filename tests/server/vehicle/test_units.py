@@ -1,4 +1,4 @@
-"""The unit of a signal, live: it is asked for, and the answer holds at once and for this car alone."""
+"""The unit of a signal, live: a question requests it, and the answer applies at once and to this car alone."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def verdict(state: dict[str, Any]) -> str:
 
 
 @pytest.mark.virtual_time
-async def test_the_operator_is_asked_and_the_answer_holds_at_once(bridge: RosBridge, server: str) -> None:
+async def test_the_operator_gets_a_question_and_the_answer_holds_at_once(bridge: RosBridge, server: str) -> None:
     pedals = {"/brake": 0.0, "/throttle": 0.0}
     async with pressing(bridge, pedals), driving(bridge), viewer(server) as one:
         state = await one.state(lambda s: shown(s, "brake") == shown(s, "accelerator") == ("fresh", "%", 0.0))

@@ -1,4 +1,4 @@
-"""An acknowledged alarm whose owner is off duty: it says so in list, hand-over and queue, until somebody takes it."""
+"""An acknowledged alarm whose owner is off duty: list, hand-over and queue show that, until somebody takes it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ async def acknowledged(by: dict[str, Any] = ANN | AK) -> Attended:
     car = Attended()
     car.tick(0.5)
     car.faults = {Priority.WARNING}
-    car.tick(0.5, heard=(ANN,))
+    car.tick(0.5, reporting=(ANN,))
     for who in (ANN | AK | BOTH, BEN | MR | BOTH):
         await car.obeyed(SEEN | who, "present")
     await car.obeyed(by, "acknowledge", **TAKE)
@@ -33,7 +33,7 @@ async def acknowledged(by: dict[str, Any] = ANN | AK) -> Attended:
 
 
 async def left() -> Attended:
-    """The same after the duty of who acknowledged it ended; no page says that they went."""
+    """The same after the duty of who acknowledged it ended; no page reports that they left."""
     car = await acknowledged()
     await car.obeyed(SEEN | BEN | MR | LEFT, "present")
     car.tick(0.5)
@@ -75,7 +75,7 @@ async def test_the_log_says_when_an_owner_goes_off_duty_and_comes_back() -> None
 
 async def test_the_page_of_another_car_says_it_too() -> None:
     car = await acknowledged()
-    car.say(BEN | MR | LEFT)
+    car.report(BEN | MR | LEFT)
     assert listed(car)[2] == OFF_MS
 
 

@@ -137,8 +137,8 @@ async def test_two_people_share_the_cars(bridge: RosBridge, other: RosBridge) ->
         await ann.until(lambda: ((named(ann, "serval") or {})["worst"] or {}).get("state") != "UNACKED")
         expected = [
             ("serval", "Assigned to Ann.", "Ann"),
-            ("serval", "Ann asks Ben to take over.", "Ann"),
-            ("serval", "Assigned to Ben: Ann had asked.", "Ben"),
+            ("serval", "Ann offered it to Ben.", "Ann"),
+            ("serval", "Assigned to Ben: Ann had offered it.", "Ben"),
         ]
         for page in (ann, ben):
             await page.until(lambda page=page: len(logged(page)) >= 3)

@@ -137,8 +137,8 @@ def _own_tables(recording: Recording, tables: _Tables) -> list[str]:
             unfit += 1
             continue
         tables.add_whole("alarms.csv", ALARM_COLUMNS, row)
-    for said in described_late(recording):
-        tables.add_whole("alarms.csv", ALARM_COLUMNS, event_row(described_event(said)))
+    for described in described_late(recording):
+        tables.add_whole("alarms.csv", ALARM_COLUMNS, event_row(described_event(described)))
     for topic, table in OWN_TABLES.items():
         for at_s, entry in recording.own(topic):
             tables.add(table.file, (*table.columns, "details"), at_s, None, _own_row(table, entry))

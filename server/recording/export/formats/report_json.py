@@ -7,7 +7,7 @@ from server.recording.export.export_format import ExportFormat
 FORMAT = ExportFormat(
     name="report_json",
     label="Report as JSON",
-    use="for programs: everything that the drive's report says",
+    use="for programs: everything in the drive's report",
     extension="report.json",
     media_type="application/json",
     writer="server.analysis.drive.tables:write_report_json",

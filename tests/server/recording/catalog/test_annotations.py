@@ -52,7 +52,7 @@ def test_each_tag_stands_once_and_empty_ones_not_at_all() -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "given", "words"),
+    ("field", "given", "sentence"),
     [
         ("title", "x" * (MAX_TITLE + 1), "A title has at most 120 letters; this has 121."),
         ("title", "x" * 10_000, "A title has at most 120 letters; this has 10000."),
@@ -61,8 +61,8 @@ def test_each_tag_stands_once_and_empty_ones_not_at_all() -> None:
         ("tags", [str(n) for n in range(MAX_TAGS + 1)], "A recording has at most 20 tags."),
     ],
 )
-def test_what_is_too_long_is_refused_not_cut(field: str, given: object, words: str) -> None:
-    with pytest.raises(BadAnnotation, match=words) as caught:
+def test_what_is_too_long_is_refused_not_cut(field: str, given: object, sentence: str) -> None:
+    with pytest.raises(BadAnnotation, match=sentence) as caught:
         changed(Annotations(), **{field: given})  # type: ignore[arg-type]
     assert caught.value.field == field
 
@@ -71,25 +71,25 @@ def test_what_fits_exactly_is_taken() -> None:
     assert len(changed(Annotations(), title="x" * MAX_TITLE, note="y" * MAX_NOTE).note) == MAX_NOTE
 
 
-words = st.text(max_size=60)
+LINES = st.text(max_size=60)
 
 
 @example(title="", note="wet\x1b\rdark", tags=[])  # a letter that becomes a blank at the end of a line
-@given(title=words, note=st.text(max_size=200), tags=st.lists(st.text(max_size=MAX_TAG), max_size=MAX_TAGS))
-def test_whatever_is_said_comes_back_as_it_was_kept(
+@given(title=LINES, note=st.text(max_size=200), tags=st.lists(st.text(max_size=MAX_TAG), max_size=MAX_TAGS))
+def test_any_annotation_comes_back_as_it_was_kept(
     tmp_path_factory: pytest.TempPathFactory, title: str, note: str, tags: list[str]
 ) -> None:
-    said = changed(Annotations(), title=title, note=note, tags=tags)
-    for letter in said.title + "".join(said.tags):
+    found = changed(Annotations(), title=title, note=note, tags=tags)
+    for letter in found.title + "".join(found.tags):
         assert unicodedata.category(letter) not in ("Cc", "Cs", "Zl", "Zp")
         assert unicodedata.bidirectional(letter) not in ("LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI")
-    assert changed(said, title=said.title, note=said.note, tags=said.tags) == said
-    path = tmp_path_factory.mktemp("said") / "car_1.mcap"
-    annotation_store.write(path, said)
-    assert annotation_store.read(path) == said
+    assert changed(found, title=found.title, note=found.note, tags=found.tags) == found
+    path = tmp_path_factory.mktemp("found") / "car_1.mcap"
+    annotation_store.write(path, found)
+    assert annotation_store.read(path) == found
 
 
-def test_nothing_said_leaves_no_file(tmp_path: Path) -> None:
+def test_empty_annotations_leave_no_file(tmp_path: Path) -> None:
     path = tmp_path / "car_1.mcap"
     annotation_store.write(path, Annotations(title="a"))
     annotation_store.write(path, Annotations())
@@ -100,7 +100,7 @@ def test_nothing_said_leaves_no_file(tmp_path: Path) -> None:
     "content",
     [b"", b"{", b"[1]", b"null", b'{"title": 7, "note": [], "tags": "x"}', b"\xff\xfe", b'{"title":"' + b"x" * 300_000],
 )
-def test_a_file_of_somebody_elses_says_nothing(tmp_path: Path, content: bytes) -> None:
+def test_a_file_of_another_program_is_not_read(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "car_1.mcap"
     annotation_store.beside(path).write_bytes(content)
     assert annotation_store.read(path) == Annotations()
@@ -118,11 +118,11 @@ def test_hostile_remarks_in_a_file_that_was_copied_in_are_cleaned_and_cut(tmp_pa
     path = tmp_path / "car_1.mcap"
     body = {"title": "\u202e" + "t" * 9000, "note": "n" * 9000, "tags": ["a" * 99, 7, *map(str, range(99))]}
     annotation_store.beside(path).write_bytes(orjson.dumps(body))
-    said = annotation_store.read(path)
-    assert said.title == "t" * MAX_TITLE
-    assert len(said.note) == MAX_NOTE
-    assert len(said.tags) == MAX_TAGS
-    assert said.tags[0] == "a" * MAX_TAG
+    found = annotation_store.read(path)
+    assert found.title == "t" * MAX_TITLE
+    assert len(found.note) == MAX_NOTE
+    assert len(found.tags) == MAX_TAGS
+    assert found.tags[0] == "a" * MAX_TAG
 
 
 def test_a_disk_that_takes_nothing_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,16 +16,16 @@ AT_MS = 1_790_000_000_000
 LETTER = "\U0001f697"  # of four bytes
 
 
-def mark(n: int, words: str) -> DriveMark:
+def mark(n: int, text: str) -> DriveMark:
     return {
-        "mark": f"{n:040}", "marked_ms": -(2**53) + 1 + n, "category": LETTER * 40, "words": words, "voice": False,
+        "mark": f"{n:040}", "marked_ms": -(2**53) + 1 + n, "category": LETTER * 40, "words": text, "voice": False,
         "photo": False, "source": "page", "by": LETTER * 200,
     }  # fmt: skip
 
 
-def description(n: int, words: str) -> InterventionDescription:
+def description(n: int, text: str) -> InterventionDescription:
     return {
-        "intervention": f"{n:060}", "described_ms": AT_MS + n, "what": words, "category": LETTER * 60,
+        "intervention": f"{n:060}", "described_ms": AT_MS + n, "what": text, "category": LETTER * 60,
         "initiated_by": "operator", "by": LETTER * 120,
     }  # fmt: skip
 
@@ -63,15 +63,15 @@ def test_no_file_of_somebody_else_is_lost(tmp_path: Path) -> None:
     assert [one.read_text() for one in sorted(tmp_path.glob("*.other*"))] == ["first", "second", "third"]
 
 
-def test_the_oldest_are_left_out_and_the_log_says_so(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_oldest_are_left_out_and_that_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / "car_20260921T133320Z.mcap"
     marks = [mark(n, "") for n in range(MAX_MARKS)]
     for _ in range(2):
         annotation_store.write_marks(path, [mark(MAX_MARKS, ""), *marks], [])
-    said = [description(n, "") for n in range(descriptions.MOST + 1)]
-    annotation_store.write_described(path, said[::-1])
+    rows = [description(n, "") for n in range(descriptions.MOST + 1)]
+    annotation_store.write_described(path, rows[::-1])
     there = annotation_store.read(path)
     assert {row["mark"] for row in there.marks} == {f"{n:040}" for n in range(1, MAX_MARKS + 1)}
-    assert {row["intervention"] for row in there.described} == {row["intervention"] for row in said[1:]}
+    assert {row["intervention"] for row in there.described} == {row["intervention"] for row in rows[1:]}
     assert f"2501 marks, of which the newest {MAX_MARKS} are kept" in caplog.text
-    assert "1001 words on interventions, of which the newest 1000 are kept" in caplog.text
+    assert "1001 descriptions of interventions, of which the newest 1000 are kept" in caplog.text

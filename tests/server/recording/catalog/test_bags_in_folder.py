@@ -246,16 +246,16 @@ def test_a_database_is_never_without_its_log(
     assert {file: file.read_bytes() for file in path.parent.iterdir()} == before
 
 
-def late_mark(words: str) -> DriveMark:
-    row = row_of({"mark": "m1", "marked_ms": 5000, "category": None, "words": words})
+def late_mark(text: str) -> DriveMark:
+    row = row_of({"mark": "m1", "marked_ms": 5000, "category": None, "words": text})
     assert row is not None
     return row
 
 
-@pytest.mark.parametrize("kind", ["words", "media"])
+@pytest.mark.parametrize("kind", ["texts", "media"])
 def test_a_part_with_notes_of_its_own_keeps_them_and_its_row(tmp_path: Path, kind: str) -> None:
     files = bag_in(tmp_path / "r" / "drive")
-    if kind == "words":
+    if kind == "texts":
         annotation_store.write(files[1], annotation_store.Annotations(title="the gate"))
         annotation_store.write_marks(files[1], [late_mark("late")], [])
     else:
@@ -266,13 +266,13 @@ def test_a_part_with_notes_of_its_own_keeps_them_and_its_row(tmp_path: Path, kin
     rows = {row["file"]: row for row in listed.rows().rows}
     assert set(rows) == {file.name for file in files if file.suffix == ".mcap"}
     found = rows[files[1].name]
-    assert (found["title"], found["marks"]) == (("the gate", 1) if kind == "words" else ("", 0))
+    assert (found["title"], found["marks"]) == (("the gate", 1) if kind == "texts" else ("", 0))
     listed.delete(rows[files[0].name]["id"])
     listed.restore(rows[files[0].name]["id"])
     assert {file: file.read_bytes() for file in (tmp_path / "r").rglob("*") if file.is_file()} == before
 
 
-def test_what_is_said_of_a_split_bag_is_in_its_report_and_among_its_marks(tmp_path: Path) -> None:
+def test_annotations_of_a_split_bag_are_in_its_report_and_among_its_marks(tmp_path: Path) -> None:
     bag_in(tmp_path / "r" / "drive")
     listed = catalog(tmp_path / "r")
     (row,) = listed.rows().rows
@@ -315,7 +315,7 @@ def test_a_file_for_whose_copy_there_was_no_room_is_read_again(
     assert [row["state"] for row in listed.rows().rows] == ["read"]
 
 
-def test_the_row_says_what_is_left_out_and_what_is_in_a_log(tmp_path: Path) -> None:
+def test_the_row_names_what_is_left_out_and_what_is_in_a_log(tmp_path: Path) -> None:
     path = tmp_path / "r" / "drive.db3"
     path.parent.mkdir()
     database(path, "INSERT INTO topics VALUES (2, '/x', 'a/msg/X', 'cdr_xml')",

@@ -183,7 +183,7 @@ async def test_a_recording_is_listed_as_soon_as_it_is_finished(tmp_path: Path) -
         assert len(one.rows().rows) == 1
 
 
-async def test_files_copied_in_by_hand_are_found_once_a_list_is_asked_for(tmp_path: Path) -> None:
+async def test_files_copied_in_by_hand_are_found_once_a_list_is_requested(tmp_path: Path) -> None:
     some(tmp_path)
     async with catalog(tmp_path) as one:
         shutil.copytree(tmp_path / "recordings" / "blue", tmp_path / "recordings" / "copy of blue")
@@ -404,7 +404,7 @@ async def test_one_of_the_same_name_again_is_not_overwritten(tmp_path: Path) -> 
         assert path.read_bytes() != old, "the one that was deleted last comes back first"
 
 
-async def test_a_folder_that_may_not_be_written_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_folder_that_may_not_be_written_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     some(tmp_path)
     id = "blue_20260921T141320Z"
     async with catalog(tmp_path) as one:
@@ -421,7 +421,7 @@ async def test_a_folder_that_may_not_be_written_says_so(tmp_path: Path, monkeypa
         assert one.row(id)["title"] == "Wet lot"  # type: ignore[index]
 
 
-async def test_a_file_that_kills_its_reader_is_told_and_the_next_one_is_read(
+async def test_a_file_that_kills_its_reader_is_reported_and_the_next_one_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     some(tmp_path)
@@ -477,10 +477,10 @@ def test_no_id_leads_out_of_the_folder(id: str) -> None:
     one = Catalog(Path("/proc/none"), None, wall_ms=lambda: 0, now=time.monotonic)
     assert one.path(id) is None
     assert one.row(id) is None
-    for wish in (one.delete, one.restore, one.destroy):
+    for act in (one.delete, one.restore, one.destroy):
         if id:
             with pytest.raises(NotThere):
-                wish(id)
+                act(id)
     one._entries._database.close()
 
 

@@ -30,7 +30,7 @@ async def test_a_folder_that_is_given_relative_to_the_working_directory(
     assert "problem" not in found, found["problem"]
 
 
-def test_a_reader_whose_server_was_killed_ends_without_a_word(tmp_path: Path) -> None:
+def test_a_reader_whose_server_was_killed_ends_without_output(tmp_path: Path) -> None:
     """Nobody reads its answer: the pipe is broken before it is written."""
     path = tmp_path / "car_1.mcap"
     closed(path, [[30], [31]])

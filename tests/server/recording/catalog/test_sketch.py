@@ -105,7 +105,7 @@ def test_any_track_is_a_proper_picture(places: list[tuple[float, float]], alarms
     ET.fromstring(svg(drawn, "a track"))
 
 
-def test_without_a_position_the_picture_says_so() -> None:
+def test_without_a_position_the_picture_shows_that() -> None:
     root = ET.fromstring(svg(None, "No position was recorded"))
     assert "".join(root.itertext()) == "No position was recordednoposition"
     assert "#" not in svg(None, ""), "in the colour of the text around it, in any theme"

@@ -1,4 +1,4 @@
-"""What is told of a file that was read once: how far, how fast, which alarms; and of one that cannot be read, why."""
+"""What the catalog has of a file that was read once: how far, how fast, which alarms; of an unreadable one, why."""
 
 from __future__ import annotations
 
@@ -58,11 +58,11 @@ def test_without_a_position_nothing_is_drawn_and_nothing_is_driven(tmp_path: Pat
     assert found["top_speed_mps"] == 3.0  # backwards is fast too
 
 
-def test_a_clip_is_told_as_one(tmp_path: Path) -> None:
+def test_a_clip_is_marked_as_one(tmp_path: Path) -> None:
     found = survey(record(tmp_path / "car" / "car_1_clip.mcap", clip_of="car_1", started_ms=str(BEGAN_MS - 9000)))
     assert found["is_clip"]
     assert found["clip_of"] == "car_1"
-    assert found["started_ms"] == BEGAN_MS, "what it holds begins there, whatever was asked for"
+    assert found["started_ms"] == BEGAN_MS, "what it holds begins there, whatever was requested"
 
 
 def test_the_topics_of_the_drives_own_settings_count(tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_the_topics_of_the_drives_own_settings_count(tmp_path: Path) -> None:
     assert survey(record(tmp_path / "car" / "car_2.mcap", settings="[[["))["top_speed_mps"] == 5.0
 
 
-def test_one_that_was_never_closed_is_read_to_its_end_and_says_so(tmp_path: Path) -> None:
+def test_one_that_was_never_closed_is_read_to_its_end_and_reported(tmp_path: Path) -> None:
     record(tmp_path / "car" / "car_1.mcap", is_closed=False)
     path = (tmp_path / "car" / "car_1.mcap.writing").rename(tmp_path / "car" / "car_1.mcap")
     found = survey(path)
@@ -92,7 +92,7 @@ def test_one_that_was_never_closed_is_read_to_its_end_and_says_so(tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("content", "words"),
+    ("content", "reason"),
     [
         (b"", "is empty"),
         (b"\x89MCAP0\r\n", "ends too early"),
@@ -102,12 +102,12 @@ def test_one_that_was_never_closed_is_read_to_its_end_and_says_so(tmp_path: Path
         (b"\x89PNG\r\n\x1a\n", "a PNG picture"),
     ],
 )
-def test_what_cannot_be_read_says_why_in_one_sentence(tmp_path: Path, content: bytes, words: str) -> None:
+def test_what_cannot_be_read_has_its_reason_in_one_sentence(tmp_path: Path, content: bytes, reason: str) -> None:
     path = tmp_path / "odd\u202e name.mcap"
     path.write_bytes(content)
     found = survey(path)
     assert list(found) == ["problem"]
-    assert words in found["problem"]
+    assert reason in found["problem"]
     assert found["problem"].startswith("odd name.mcap")
     assert found["problem"].endswith(".")
     assert str(tmp_path) not in found["problem"]

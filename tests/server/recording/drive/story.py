@@ -43,13 +43,13 @@ def logged(at_s: float, change: str, alarm: str | None = None, **more: Any) -> O
 def standing(*own: Own) -> dict[str, str]:
     """What stands after these events, as the recorder writes it into the metadata of the next part."""
     stood = Stood()
-    stood.note_all(said for _, topic, said in own if topic == "/catgraph/alarms")
+    stood.note_all(event for _, topic, event in own if topic == "/catgraph/alarms")
     return stood.as_metadata()
 
 
 def mark(at_s: float, id: str, change: str = "mark", *, logged_s: float | None = None, **more: Any) -> Own:
-    said = {"category": None, "words": "", "voice": False, "photo": False, "source": "page", "by": "A. K. (Pixel)"}
-    row = {"change": change, "mark": id, "marked_ms": BEGIN_MS + round(at_s * 1000), **said, **more}
+    fields = {"category": None, "words": "", "voice": False, "photo": False, "source": "page", "by": "A. K. (Pixel)"}
+    row = {"change": change, "mark": id, "marked_ms": BEGIN_MS + round(at_s * 1000), **fields, **more}
     return (BEGIN_S * NS + round((at_s if logged_s is None else logged_s) * NS), "/catgraph/marks", row)
 
 

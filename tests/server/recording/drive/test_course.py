@@ -91,15 +91,15 @@ def test_the_parts_of_a_drive_are_one_course(tmp_path: Path) -> None:
     assert [event["t"] for event in found["events"] if event["kind"] == "intervention"] == [80.0, 170.0]
 
 
-def test_a_drive_whose_events_are_not_known_says_so(tmp_path: Path) -> None:
+def test_a_drive_whose_events_are_not_known_is_marked(tmp_path: Path) -> None:
     with open_recording([recorded(tmp_path)]) as recording:
         known = course_of(read_facts(recording))
     of_others = course_of(DriveFacts(start_ms=0, end_ms=10_000, log=None, motion=Motion(10.0), late=[]))
-    said = [
+    found = [
         (one["are_interventions_known"], one["are_alarms_known"], one["are_events_cut"])
         for one in (known, of_others, joined([known, of_others]))
     ]
-    assert said == [(True, True, False), (False, False, False), (False, False, False)]
+    assert found == [(True, True, False), (False, False, False), (False, False, False)]
     many = joined(
         [{**known, "events": known["events"][:1] * 200}, known, {**known, "events": known["events"][:1] * 99}]
     )

@@ -1,4 +1,4 @@
-"""What a recording says of its drive, against a drive whose truth is known."""
+"""The facts of a drive in its recording, against a drive whose facts are known."""
 
 from __future__ import annotations
 
@@ -121,13 +121,13 @@ def test_the_newest_of_each_item_and_mark_counts(log: DriveLog) -> None:
     assert intervention.before == ((-10.0, 10.0),)  # what has no number is left out
 
 
-def test_who_began_an_intervention_is_as_the_newest_description_says_or_else_the_data() -> None:
+def test_who_began_an_intervention_is_by_the_newest_description_or_else_the_data() -> None:
     one: dict[str, Any] = {"intervention": "i", "at_ms": BEGIN_MS}
     begun = one | {"change": "intervention", "initiated_by": "driver"}
-    said = one | {"change": "intervention_described", "what": "A box."}
+    event = one | {"change": "intervention_described", "what": "A box."}
     by = [
         [one.initiated_by for one in interventions_of([begun, *described])]
-        for described in ([said | {"initiated_by": "operator"}], [said | {"initiated_by": "operator"}, said])
+        for described in ([event | {"initiated_by": "operator"}], [event | {"initiated_by": "operator"}, event])
     ]
     assert by == [["operator"], ["driver"]]
 

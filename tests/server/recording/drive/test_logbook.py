@@ -81,7 +81,9 @@ def test_a_part_that_does_not_know_makes_no_rate_better(what: str, counts: tuple
     ],
     ids=["reopened", "silent", "log-lost", "none", "none-later", "not-known"],
 )
-def test_the_newest_part_that_knows_says_whether_it_was_checked(states: tuple[str | None, ...], whole: object) -> None:
+def test_the_newest_part_with_a_check_shows_whether_it_was_checked(
+    states: tuple[str | None, ...], whole: object
+) -> None:
     (drive,) = drives_of([row(n, MONDAY + n, session="s", departure=state) for n, state in enumerate(states)])
     assert drive["departure"] == whole
 
@@ -194,7 +196,7 @@ def test_a_distance_that_is_not_known_makes_nothing_certain() -> None:
     assert due_on(1, unknown, row(2, MONDAY + 5, km=40, departure="none")) == {"laser": (None, -5.0, True, True)}
 
 
-def test_the_newest_list_says_which_items_there_are() -> None:
+def test_the_newest_list_decides_which_items_there_are() -> None:
     rows = (checked(1, 0, every("gone", days=1), every("kept", days=1)), checked(2, 5, every("kept", days=9)))
     assert due_on(6, *rows) == {"kept": (8, None, False, False)}
 

@@ -56,7 +56,7 @@ def test_the_figures_of_the_parts_are_added_up(paths: list[Path], drive: DriveFa
     assert sum(row["s"] for row in whole["modes"].values()) == 180.0
 
 
-def test_the_time_between_two_parts_is_said_and_neither_driven_nor_lost(drive: DriveFacts) -> None:
+def test_the_time_between_two_parts_is_reported_and_neither_driven_nor_lost(drive: DriveFacts) -> None:
     (gap,) = drive.gaps
     assert gap == pytest.approx((LENGTH_S, SECOND[0]), abs=0.1)
     assert drive.motion.apart_m(*gap) == pytest.approx(300.0, abs=3.0)
@@ -157,21 +157,21 @@ def part(session: str, number: int | None, from_s: float = 0.0, to_s: float = 1.
     return DrivePart(id=id, session=session, number=number, from_s=from_s, to_s=to_s, metadata=metadata)
 
 
-def said(parts: list[DrivePart], beside: Beside | None = None) -> list[str]:
+def texts(parts: list[DrivePart], beside: Beside | None = None) -> list[str]:
     found = missing(parts) if beside is None else missing(parts, beside)
     return [one.sentence(lambda at_s: f"{at_s:g}").partition(" of the drive")[0] for one in found]
 
 
 def test_a_part_that_is_not_there_is_named_with_its_time() -> None:
-    assert said([part("a", 1), part("a", 2, 5.0, 9.0), part("b", 1, 9.5, 20.0)]) == []
-    assert said([part("a", 2, clip_of="x"), part("", 5)]) == []
+    assert texts([part("a", 1), part("a", 2, 5.0, 9.0), part("b", 1, 9.5, 20.0)]) == []
+    assert texts([part("a", 2, clip_of="x"), part("", 5)]) == []
     later = [part("a", 1, 0, 10), part("a", 3, 30, 40), part("a", 6, 70, 80), part("b", 4, 100, 110)]
-    assert said(later) == [
+    assert texts(later) == [
         "No record here from 10 to 30: Part 2",
         "No record here from 40 to 70: Parts 4, 5",
         "No record here from 80 to 100: Parts 1, 2, 3",
     ]
-    assert said([part("a", 3, 30, 40)]) == ["No record here until 30: Parts 1, 2"]
+    assert texts([part("a", 3, 30, 40)]) == ["No record here until 30: Parts 1, 2"]
     (whole,) = missing([part("a", 2, 30, 40)])
     assert "Part 1 of the drive of a_p2 is not in this report" in whole.sentence(str)
 
@@ -179,16 +179,16 @@ def test_a_part_that_is_not_there_is_named_with_its_time() -> None:
 def test_the_last_part_is_named_by_what_is_beside_it() -> None:
     own = [part("a", 1, 0, 10), part("a", 2, 20, 30)]
     known = frozenset({"a", "a_p2", "a_p3", "b_p9"})
-    assert said(own, Beside(known=known)) == ["No record here from 30 on: Part 3"]
-    assert said(own, Beside(known=known, next_s={"a": 75.0, "b": 90.0})) == ["No record here from 30 to 75: Part 3"]
+    assert texts(own, Beside(known=known)) == ["No record here from 30 on: Part 3"]
+    assert texts(own, Beside(known=known, next_s={"a": 75.0, "b": 90.0})) == ["No record here from 30 to 75: Part 3"]
     both = [*own, part("b", 1, 60, 70)]
-    assert said(both, Beside(known=known - {"b_p9"})) == ["No record here from 30 to 60: Part 3"], "one reason for it"
+    assert texts(both, Beside(known=known - {"b_p9"})) == ["No record here from 30 to 60: Part 3"], "one reason for it"
 
 
 def test_what_is_there_and_not_in_the_report_is_not_called_without_a_record() -> None:
     own = [part("a", 1, 0, 10), part("a", 4, 40, 50)]
     files = frozenset({"a", "a_p2", "a_p3", "a_p4", "a_p5"})
-    assert said(own, Beside(known=files, files=files)) == [
+    assert texts(own, Beside(known=files, files=files)) == [
         "Not in this report from 10 to 40: Parts 2, 3",
         "Not in this report from 50 on: Part 5",
     ]
@@ -201,11 +201,11 @@ def test_what_is_there_and_not_in_the_report_is_not_called_without_a_record() ->
 
 def test_a_number_that_no_part_has_is_not_counted_up_to() -> None:
     own = [part("a", 1, 0, 10)]
-    assert said(own, Beside(known=frozenset({"a_p99999999"}))) == []
+    assert texts(own, Beside(known=frozenset({"a_p99999999"}))) == []
 
 
 def test_a_lost_link_is_no_time_without_a_record_and_a_stopped_server_is_one() -> None:
-    assert said([part("a", 1, 0, 10), part("a", 2, 60, 70)]) == []
+    assert texts([part("a", 1, 0, 10), part("a", 2, 60, 70)]) == []
     (one,) = missing([part("a", 1, 0, 10), part("b", 1, 60, 70)])
     assert one.sentence(lambda at_s: f"{at_s:g}") == "No record here from 10 to 60: nothing was recorded between them."
 
@@ -230,7 +230,7 @@ def test_what_is_damaged_within_a_part_is_a_time_without_a_record(tmp_path: Path
     assert one.sentence(lambda at_s: f"{at_s:.0f}") == "No record here from 10 to 20: s1.mcap is damaged there."
 
 
-def test_what_a_damaged_index_says_of_the_time_is_not_believed(tmp_path: Path) -> None:
+def test_the_times_of_a_damaged_index_are_not_trusted(tmp_path: Path) -> None:
     path = recorded(tmp_path, [], name="s1.mcap", length_s=60.0)
     with open_recording([path]) as recording:
         (file,) = recording.files

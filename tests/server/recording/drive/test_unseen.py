@@ -24,10 +24,10 @@ ENDS_S = 40.0
 Steps = Sequence[tuple[float, float]]
 
 
-def drive(speeds: Steps, *, heard: Sequence[float] = (), late: Steps = (), limit: Steps = ((0.0, 3.0),)) -> DriveFacts:
-    """`heard`: when messages came that have no speed."""
+def drive(speeds: Steps, *, others: Sequence[float] = (), late: Steps = (), limit: Steps = ((0.0, 3.0),)) -> DriveFacts:
+    """`others`: times of messages without a speed."""
     motion = Motion(ENDS_S)
-    came = sorted([(at_s, speed) for at_s, speed in speeds] + [(at_s, math.nan) for at_s in heard])
+    came = sorted([(at_s, speed) for at_s, speed in speeds] + [(at_s, math.nan) for at_s in others])
     for at_s, speed in came:
         motion.message_received("/any", at_s)
         if not math.isnan(speed):
@@ -52,7 +52,7 @@ def test_the_way_counts_from_the_last_speed_to_the_next_message() -> None:
 
 
 def test_a_speed_that_fell_silent_before_the_gap_counts_from_then() -> None:
-    facts = drive([*steady(4.0, 0.0, 8.0), *steady(4.0, 14.0)], heard=[8.5, 9.0, 9.5, 10.0])
+    facts = drive([*steady(4.0, 0.0, 8.0), *steady(4.0, 14.0)], others=[8.5, 9.0, 9.5, 10.0])
     (gap,) = blind_times(facts)
     assert (gap.from_s, gap.metres) == (10.0, 4 * 6 + 3 * 36 / 2)
 
@@ -63,7 +63,7 @@ def test_the_delay_of_the_link_is_part_of_the_way() -> None:
 
 
 def test_without_a_speed_or_a_limit_it_is_not_known() -> None:
-    silent = drive(steady(4.0, 20.0), heard=[0.0, 0.5, 1.0])
+    silent = drive(steady(4.0, 20.0), others=[0.0, 0.5, 1.0])
     assert [gap.metres for gap in blind_times(silent)] == [None]
     unlimited = drive([*steady(4.0, 0.0, 10.0), *steady(4.0, 14.0)], limit=())
     assert [gap.metres for gap in blind_times(unlimited)] == [None]
@@ -81,11 +81,11 @@ def test_a_late_link_has_the_farthest_way_of_what_it_showed() -> None:
     (late,) = late_times(facts)
     assert (late.from_s, late.to_s, late.late_s) == (8.0, 13.0, 1.5)
     assert late.metres == pytest.approx(6 * 2.0 + 3 * 4 / 2)  # 1.5 s under way, and half a second until the next one
-    assert late_times(drive([], late=[(0.0, 3.0)], heard=steady_times()))[0].metres is None
+    assert late_times(drive([], late=[(0.0, 3.0)], others=steady_times()))[0].metres is None
     assert late_times(drive(speeds, late=[(0.0, 0.4)])) == []
 
 
-def told(facts: DriveFacts) -> dict[str, Any]:
+def shown(facts: DriveFacts) -> dict[str, Any]:
     recording = cast(Recording, SimpleNamespace(count=1, damage=[], metadata={}, paths=(), files=(), start_s=0.0))
     return report_json(facts, recording, name="", load=None, verified=(), annotations=annotations.NONE)
 
@@ -96,7 +96,7 @@ def steady_times() -> list[float]:
 
 def test_the_report_has_them_on_its_sheet_and_in_its_tables() -> None:
     facts = drive([*steady(4.0, 0.0, 10.0), *steady(4.0, 14.0)], late=[(0.0, 0.1), (20.0, 0.8), (25.0, 0.1)])
-    found = told(facts)
+    found = shown(facts)
     assert found["blind"] == [{"from_s": 10.0, "to_s": 14.0, "unseen_m": 41.62}]
     assert found["late"] == [{"from_s": 20.0, "to_s": 25.0, "unseen_m": 7.74, "late_s": 0.8}]
     assert _blind(found, 0) == [
@@ -107,5 +107,5 @@ def test_the_report_has_them_on_its_sheet_and_in_its_tables() -> None:
     rows = {row[0]: row[-1] for row in report_rows(found) if row[0] in ("blind", "late")}
     assert rows == {"blind": "≤ 41.7 m unseen", "late": "≤ 7.8 m unseen"}
     other = replace(facts, late=(), are_settings_recorded=False)
-    found = told(other)
+    found = shown(other)
     assert _blind_head(found) == ("metres: last speed and at most 3.0 m/s² (as set today), delay of the link not known")

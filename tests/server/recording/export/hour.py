@@ -51,7 +51,7 @@ def drive(path: Path, seconds: float, version: RosVersion = 1, *, lap_s: float =
 
 
 def _messages(seconds: float, version: RosVersion, lap_s: float) -> Iterator[tuple[float, Message]]:
-    """Seconds since the beginning, and what was said."""
+    """Seconds since the beginning, and the message."""
     lap: list[tuple[float, Message]] = []
     for message in SimulatedCar(seed=3, ros_version=version).messages():
         at_s = message.at_s - START_S

@@ -13,7 +13,7 @@ from server.recording.own import own_schema
 from server.recording.read.read import open_recording
 from server.recording.read.schemas import Schema
 
-Own = tuple[int, str, Mapping[str, Any]]  # ns since 1970, topic, what it says
+Own = tuple[int, str, Mapping[str, Any]]  # ns since 1970, topic, its fields
 TOML = 'profile = "auto"\n\n[limits.speed_limit]\nmax_mps = 3.0\n'
 
 

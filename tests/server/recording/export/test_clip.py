@@ -41,7 +41,7 @@ ROWS: list[Row] = [
     (0.0, "/map", TEXT, {"data": "the map"}),
     *((0.1 * n, "/n", INT, {"data": n}) for n in range(200)),
 ]
-SAID: list[Own] = [
+ENTRIES: list[Own] = [
     in_force(0.0, TOML),
     logged(1.0, 1, "raised", state="UNACKED"),
     logged(2.0, 2, "raised", "gps_fix", state="UNACKED"),
@@ -61,7 +61,7 @@ def drive(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     folder = tmp_path_factory.mktemp("drive")
     write = write_ros1 if request.param == 1 else write_ros2
     source = write(folder / ("in.bag" if request.param == 1 else "in"), Drive(messages=ROWS, latched={"/map"}))
-    return as_ours(source, folder / "ours.mcap", SAID, address="ws://car:9090")
+    return as_ours(source, folder / "ours.mcap", ENTRIES, address="ws://car:9090")
 
 
 def test_it_holds_what_came_then_as_it_was(drive: Path, tmp_path: Path) -> None:
@@ -96,7 +96,7 @@ def test_at_its_beginning_stands_what_was_already_so(drive: Path, tmp_path: Path
         assert clip.topics["/map"].is_latched
 
 
-def test_it_says_where_it_was_cut_from(drive: Path, tmp_path: Path) -> None:
+def test_it_names_where_it_was_cut_from(drive: Path, tmp_path: Path) -> None:
     cut(drive, tmp_path / "clip.mcap", 11.0)
     with open_recording([tmp_path / "clip.mcap"]) as clip:
         begin_ms = BEGIN_S * 1000
@@ -125,7 +125,7 @@ def test_it_says_where_it_was_cut_from(drive: Path, tmp_path: Path) -> None:
         (21.9, 1, ["The recording ends 5.0 s before the clip should."]),
     ],
 )
-def test_what_of_it_was_not_recorded_is_said(
+def test_what_of_it_was_not_recorded_is_reported(
     drive: Path, tmp_path: Path, at_s: float, count: int, notes: list[str]
 ) -> None:
     outcome = cut(drive, tmp_path / "clip.mcap", at_s)

@@ -47,9 +47,9 @@ def test_an_export_names_it_once(
     out = tmp_path / "out"
     window = [] if around is None else ["--at", around, "--before", "2", "--after", "2"]
     assert main(["export", str(folder(tmp_path)), "--format", format, "--out", str(out), *window]) == 1
-    said = capsys.readouterr().err.splitlines()
+    lines = capsys.readouterr().err.splitlines()
     many, few = (5, 2) if around else (PARTS * EACH, PARTS * (EACH // 3))
-    (pose,) = [line for line in said if "/pose" in line and "left out" in line]
+    (pose,) = [line for line in lines if "/pose" in line and "left out" in line]
     assert f"/pose ({many} messages) is left out: messages encoded as 'protobuf' are not supported." in pose
-    (unknown,) = [line for line in said if f"channel {UNKNOWN}" in line and "left out" in line]
+    (unknown,) = [line for line in lines if f"channel {UNKNOWN}" in line and "left out" in line]
     assert f"channel {UNKNOWN} ({few} messages) is left out: the file does not declare what they are." in unknown

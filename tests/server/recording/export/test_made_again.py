@@ -1,4 +1,4 @@
-"""A report that was made is not answered again once somebody said more of the recording."""
+"""A report that was made is not returned again once the annotations of the recording have changed."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ def add_photo(path: Path) -> None:
     (folder / "late.photo.jpg").write_bytes(b"\xff\xd8\xff")
 
 
-SAID: dict[str, Callable[[Path], object]] = {
+CHANGES: dict[str, Callable[[Path], object]] = {
     "weather": lambda path: annotation_store.write(path, Annotations(weather="rain")),
     "late mark": lambda path: annotation_store.write_marks(path, [MARK], []),
     "late photo": add_photo,
 }
 
 
-@pytest.mark.parametrize("say", SAID.values(), ids=SAID)
-async def test_what_was_said_since_is_in_another_export(tmp_path: Path, say: Callable[[Path], object]) -> None:
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+async def test_what_was_changed_since_is_in_another_export(tmp_path: Path, change: Callable[[Path], object]) -> None:
     path = tmp_path / "recordings" / "car" / "car_1.mcap"
     path.parent.mkdir(parents=True)
     path.write_bytes(b"")
@@ -47,7 +47,7 @@ async def test_what_was_said_since_is_in_another_export(tmp_path: Path, say: Cal
     )
     first = await exports.begin("car_1", "csv")
     assert await exports.begin("car_1", "csv") is first
-    say(path)
+    change(path)
     second = await exports.begin("car_1", "csv")
     assert second is not first
     assert await exports.begin("car_1", "csv") is second

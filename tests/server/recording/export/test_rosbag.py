@@ -62,11 +62,11 @@ def test_rosbag_info_understands_it(
     recordings: Path, tmp_path: Path, name: str, compression: Literal["none", "bz2", "lz4"]
 ) -> None:
     bag = exported(recordings / name, tmp_path, compression)
-    said = subprocess.run(
+    info = subprocess.run(
         ["rosbag", "info", str(bag)], env=environment(tmp_path), capture_output=True, text=True, timeout=60, check=True
     )
-    assert said.stderr == ""
-    text = said.stdout
+    assert info.stderr == ""
+    text = info.stdout
     assert re.search(r"messages: +14229\n", text)
     assert re.search(r"duration: +55\.9s\n", text)
     assert re.search(rf"compression: +{compression}", text)
@@ -81,11 +81,11 @@ def test_rosbag_info_understands_it(
 def test_rosbag_play_plays_every_message_as_it_is(
     recordings: Path, tmp_path: Path, name: str, compression: Literal["none", "bz2", "lz4"]
 ) -> None:
-    """Heard by ROS's own recorder: every topic's messages, byte for byte and in order."""
+    """Received by ROS's own recorder: every topic's messages, byte for byte and in order."""
     bag = exported(recordings / name, tmp_path, compression)
     sent = messages(bag)
-    heard = tmp_path / "heard.bag"
-    with master(tmp_path) as port, recorder(tmp_path, port, heard, list(sent)):
+    received = tmp_path / "received.bag"
+    with master(tmp_path) as port, recorder(tmp_path, port, received, list(sent)):
         played = subprocess.run(
             ["rosbag", "play", "--quiet", "-r", str(QUICKER), "-d", "3", "--queue=20000", str(bag)],
             env=environment(tmp_path, port),
@@ -95,8 +95,8 @@ def test_rosbag_play_plays_every_message_as_it_is(
             check=False,
         )
         assert (played.returncode, played.stderr) == (0, "")
-        time.sleep(1.0)  # what the recorder has heard and not yet written: nothing tells when
-    assert messages(heard) == sent
+        time.sleep(1.0)  # what the recorder has received and not yet written: nothing shows when
+    assert messages(received) == sent
 
 
 def messages(path: Path) -> dict[str, list[bytes]]:
@@ -124,12 +124,12 @@ def master(folder: Path) -> Iterator[int]:
 @contextmanager
 def recorder(folder: Path, port: int, out: Path, topics: list[str]) -> Iterator[None]:
     log = folder / "record.log"
-    with log.open("wb") as said:
+    with log.open("wb") as output:
         process = subprocess.Popen(
             [RECORDER, "--buffsize=0", "-O", str(out), *topics],
             env=environment(folder, port),
-            stdout=said,
-            stderr=said,
+            stdout=output,
+            stderr=output,
             cwd=folder,
         )
         try:
@@ -142,8 +142,8 @@ def recorder(folder: Path, port: int, out: Path, topics: list[str]) -> Iterator[
 
 def subscribed(port: int) -> set[str]:
     """The topics that somebody listens to, as the master has it."""
-    with ServerProxy(f"http://127.0.0.1:{port}") as asked:
-        answer: Any = asked.getSystemState("/test")
+    with ServerProxy(f"http://127.0.0.1:{port}") as proxy:
+        answer: Any = proxy.getSystemState("/test")
     _, _, (_, subscribers, _) = answer
     return {topic for topic, _ in subscribers}
 

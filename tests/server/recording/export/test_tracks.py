@@ -86,7 +86,7 @@ def test_gpx_has_the_car_the_phone_and_the_alarm(tmp_path: Path) -> None:
     other = root.findall("g:trk[2]", GPX)[0]
     assert other.findtext("g:name", namespaces=GPX) == "9c <b>"
     times = [p.findtext("g:time", namespaces=GPX) for p in other.findall("g:trkseg/g:trkpt", GPX)]
-    assert times == ["2023-11-14T22:13:20.500Z", "2023-11-14T22:13:21.500Z"]  # when it was measured, not told
+    assert times == ["2023-11-14T22:13:20.500Z", "2023-11-14T22:13:21.500Z"]  # when it was measured, not reported
     assert outcome.entries == 33
     assert outcome.notes == []
 
@@ -178,7 +178,7 @@ NO_TRACK: dict[str, tuple[list[Row], str]] = {
 
 @pytest.mark.parametrize(("rows", "sentence"), NO_TRACK.values(), ids=NO_TRACK)
 @pytest.mark.parametrize("write", [gpx, geojson])
-def test_why_there_is_no_track_is_said(tmp_path: Path, rows: list[Row], sentence: str, write: Any) -> None:
+def test_why_there_is_no_track_is_reported(tmp_path: Path, rows: list[Row], sentence: str, write: Any) -> None:
     with pytest.raises(ExportRefused) as refusal:
         write(made(tmp_path, [SPEED, *rows]), tmp_path)
     assert str(refusal.value) == sentence

@@ -40,7 +40,7 @@ def test_rows_come_in_order_and_parts_are_read_when_their_time_has_come(times: l
         assert all(begin_ns <= row[0] for begin_ns in begun)
     assert [row[0] for row in merged] == sorted(row[0] for row in merged)
     assert sorted(merged) == sorted(row for part in parts for row in part.rows)
-    for number in range(len(parts)):  # what one chunk says at one moment stays in its order
+    for number in range(len(parts)):  # what one chunk has at one moment stays in its order
         assert [row for row in merged if row[1] == number] == list(parts[number].rows)
 
 

@@ -37,7 +37,7 @@ def typed(book: TypeBook, type: str) -> Schema:
 
 
 def written(path: Path, version: RosVersion, *, n: int = 5) -> PartFile:
-    """A file with a standard type, one of a bridge's, one that nobody knows, and our own words; not closed yet."""
+    """A file with a standard type, one of a bridge's, one without a definition, and our own entries; not closed yet."""
     book = TypeBook(version)
     book.learn(MORE)
     file = PartFile(path, profile=f"ros{version}", metadata={"vehicle": "car", "part": "1"})
@@ -90,10 +90,10 @@ def test_our_own_reader_gives_what_was_written(tmp_path: Path, version: RosVersi
         assert messages[-2].message["parts"] == [{"x": 4.0, "y": "é"}] * 4
         assert messages[-1].message == {"a": 4}
         assert messages[-1].at_s == pytest.approx(AT_NS / 1e9 + 0.04, abs=1e-6)
-        assert [(round(at_s - AT_NS / 1e9, 3), said["n"]) for at_s, said in recording.own("/catgraph/alarms")] == [
+        assert [(round(at_s - AT_NS / 1e9, 3), entry["n"]) for at_s, entry in recording.own("/catgraph/alarms")] == [
             (i / 100, i) for i in range(5)
         ]
-        assert list(recording.own("/vel")) == [], "what the car said is not ours"
+        assert list(recording.own("/vel")) == [], "what the car sent is not ours"
         assert recording.damage == []
         assert recording.notes == []
 
@@ -205,7 +205,7 @@ DETAILS = {
 }  # fmt: skip
 
 
-def test_a_definition_is_made_of_what_rosapi_says_of_a_type() -> None:
+def test_a_definition_is_made_of_what_rosapi_returns_for_a_type() -> None:
     text = text_of_details(DETAILS)
     assert text is not None
     book = TypeBook(1)

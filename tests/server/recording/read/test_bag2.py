@@ -71,9 +71,9 @@ def test_a_part_that_is_missing_is_named(tmp_path: Path, capsys: pytest.CaptureF
     folder = split(tmp_path, storage)
     gone = next(folder.glob("drive_2.*"))
     gone.unlink()
-    read, (said,) = numbers(folder)
+    read, (sentence,) = numbers(folder)
     assert read == [n for n in range(PARTS * EACH) if not 2 * EACH <= n < 3 * EACH]
-    assert re.fullmatch(rf"{gone.name} is missing beside drive_\d\.\w+: metadata\.yaml names it", said)
+    assert re.fullmatch(rf"{gone.name} is missing beside drive_\d\.\w+: metadata\.yaml names it", sentence)
     assert main(["check", str(folder)]) == 2
     assert main(["export", str(folder), "--format", "bag", "--out", str(tmp_path / "out.bag")]) == 1
     assert f"{gone.name} is missing" in capsys.readouterr().err
@@ -90,11 +90,11 @@ def test_a_part_that_the_metadata_do_not_name_yet_is_read(tmp_path: Path, storag
 @STORAGES
 @pytest.mark.parametrize("part", [0, 1, PARTS - 1])
 @pytest.mark.parametrize(
-    ("bytes_left", "filler", "said"),
+    ("bytes_left", "filler", "reason"),
     [(0, b"", "is empty: it has 0 bytes"), (60, b"", ""), (0, b"a text", "is not a recording: it is a text file")],
 )
 def test_a_part_that_cannot_be_read_is_named_and_the_rest_read(
-    tmp_path: Path, storage: Storage, part: int, bytes_left: int, filler: bytes, said: str
+    tmp_path: Path, storage: Storage, part: int, bytes_left: int, filler: bytes, reason: str
 ) -> None:
     """As a recorder leaves its last part that is killed."""
     folder = split(tmp_path, storage)
@@ -105,7 +105,7 @@ def test_a_part_that_cannot_be_read_is_named_and_the_rest_read(
         read, damage = numbers(folder)
         assert read == sorted(read)
         assert len(read) == (PARTS - 2) * EACH
-        assert len([one for one in damage if one.startswith(f"{torn.name} {said}")]) == 1
+        assert len([one for one in damage if one.startswith(f"{torn.name} {reason}")]) == 1
         assert len(damage) == 1 + (folder / "metadata.yaml").exists()
         assert str(tmp_path) not in " ".join(damage)
         (folder / "metadata.yaml").unlink(missing_ok=True)
@@ -190,14 +190,14 @@ def test_what_is_in_the_write_ahead_log_is_read_and_nothing_is_changed(tmp_path:
     assert {file.name: file.read_bytes() for file in path.parent.iterdir()} == before
 
 
-def test_a_torn_log_is_read_to_its_last_whole_transaction_and_said(tmp_path: Path) -> None:
+def test_a_torn_log_is_read_to_its_last_whole_transaction_and_reported(tmp_path: Path) -> None:
     path = left_open(tmp_path)
     log = path.with_name(path.name + "-wal")
     os.truncate(log, log.stat().st_size * 2 // 3)
-    read, (said,) = numbers(path)
+    read, (sentence,) = numbers(path)
     assert read == list(range(len(read)))
     assert EACH < len(read) < 2 * EACH
-    assert said.startswith("drive_0.db3 was never closed")
+    assert sentence.startswith("drive_0.db3 was never closed")
 
 
 def test_temporary_copies_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -297,17 +297,17 @@ NUMBERS = "- history: 1\n  depth: 1\n  reliability: 1\n  durability: {}\n  avoid
         ("- durability: [1]\n", False),
     ],
 )
-def test_quality_of_service_in_words_numbers_and_lists(offered: Any, expected: bool) -> None:
+def test_quality_of_service_in_names_numbers_and_lists(offered: Any, expected: bool) -> None:
     assert is_latched(offered) is expected
 
 
 @STORAGES
-@pytest.mark.parametrize("form", ["words", "numbers", "text", "odd"])
+@pytest.mark.parametrize("form", ["names", "numbers", "text", "odd"])
 def test_metadata_with_any_quality_of_service_are_read(tmp_path: Path, storage: Storage, form: str) -> None:
     folder = split(tmp_path, storage)
     metadata = YAML(typ="safe").load((folder / "metadata.yaml").read_text())
     profiles: dict[str, Any] = {
-        "words": [{"durability": "transient_local"}],
+        "names": [{"durability": "transient_local"}],
         "numbers": [{"history": 1, "durability": 1}],
         "text": NUMBERS.format(1),
         "odd": [{"durability": None, "deadline": 7}],

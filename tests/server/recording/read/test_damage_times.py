@@ -1,4 +1,4 @@
-"""When damaged parts were recorded is only said where the times that they declare can be right."""
+"""The time of damaged parts is only reported where the times that they declare can be right."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ S = 10**9
 START_S, LENGTH_S = 1_790_000_000, 100
 
 
-def said(first_s: float, last_s: float, start_s: float = START_S) -> str:
+def damage_of(first_s: float, last_s: float, start_s: float = START_S) -> str:
     damage = Damage(parts=5)
     damage.leave_out(round(first_s * S), round(last_s * S), ValueError())
     [sentence] = damage.sentences("a.mcap", round(start_s * S), round((start_s + LENGTH_S) * S))
     return sentence
 
 
-def test_likely_times_are_said() -> None:
+def test_likely_times_are_reported() -> None:
     expected = "a.mcap is damaged: 1 part of 5, between 10.0 s and 12.5 s, is left out"
-    assert said(START_S + 10.0, START_S + 12.5) == expected
-    assert said(20.0, 22.5, start_s=10.0) == expected  # a clock that was never set
+    assert damage_of(START_S + 10.0, START_S + 12.5) == expected
+    assert damage_of(20.0, 22.5, start_s=10.0) == expected  # a clock that was never set
 
 
 @pytest.mark.parametrize(
@@ -33,4 +33,4 @@ def test_likely_times_are_said() -> None:
     ],
 )
 def test_others_are_not(first_s: float, last_s: float) -> None:
-    assert said(first_s, last_s) == "a.mcap is damaged: 1 part of 5 is left out"
+    assert damage_of(first_s, last_s) == "a.mcap is damaged: 1 part of 5 is left out"

@@ -22,10 +22,10 @@ DEFINITIONS = {
     ODD: """
 bool flag
 float64 far
-string word
+string text
 uint8 tiny
 int64[] longs
-string[] words
+string[] texts
 float32[3] triple
 uint8[] blob
 char[2] letters

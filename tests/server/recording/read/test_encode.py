@@ -70,9 +70,9 @@ def test_json_gives_the_same_bytes_but_for_what_it_cannot_say(version: int) -> N
     decode = compile_decoder(type, store.fielddefs, version)  # type: ignore[arg-type]
     content = {"angle_min": -1.5, "range_max": 81.0, "ranges": [0.1, math.nan, math.inf, -math.inf, 3.0]}
     message = decode(raw_of(store, version, type, content))
-    said = orjson.loads(json_bytes(message))
-    assert said["ranges"][1:4] == [None, None, None]
-    ranges = decode(encode(said))["ranges"]
+    recorded = orjson.loads(json_bytes(message))
+    assert recorded["ranges"][1:4] == [None, None, None]
+    ranges = decode(encode(recorded))["ranges"]
     assert ranges[0] == np.float32(0.1)
     assert np.isnan(ranges[1:4]).all(), "null is NaN, whichever of the three it was"
     assert decode(encode(through_cbor(message)))["ranges"].tobytes() == message["ranges"].tobytes()

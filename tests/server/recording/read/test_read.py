@@ -151,16 +151,16 @@ def test_versions_cannot_be_mixed(tmp_path: Path) -> None:
         open_recording([one, two])
 
 
-def test_what_cannot_be_read_with_the_asked_file_is_named(tmp_path: Path) -> None:
+def test_what_cannot_be_read_with_the_requested_file_is_named(tmp_path: Path) -> None:
     one, two = write_ros1(tmp_path / "1.bag", SHORT), write_ros2(tmp_path / "2", SHORT)
     spoilt = tmp_path / "3.mcap"
     spoilt.write_bytes(b"spoilt")
-    for asked, other, version in ((one, two, 1), (two, one, 2), (spoilt, two, 1)):
-        with open_recording([one, two, spoilt], asked=asked) as recording:
+    for named, other, version in ((one, two, 1), (two, one, 2), (spoilt, two, 1)):
+        with open_recording([one, two, spoilt], asked=named) as recording:
             assert (recording.ros_version, recording.topics["/n"].count) == (version, 9)
             damaged, mixed = recording.damage
             assert damaged.startswith("3.mcap ")
-            assert mixed == f"{other.name} is of another version of ROS and cannot be read with {asked.name}"
+            assert mixed == f"{other.name} is of another version of ROS and cannot be read with {named.name}"
     with pytest.raises(RecordingUnreadable):
         open_recording([spoilt], asked=spoilt)
 
@@ -305,7 +305,7 @@ def test_real_drives_hold_what_rosbags_finds(recordings: Path, file: str) -> Non
                 assert np.array_equal(mine.message["ranges"], other.ranges)  # type: ignore[attr-defined]
 
 
-def test_the_real_drive_is_as_its_readme_says(recordings: Path) -> None:
+def test_the_real_drive_is_as_its_readme_describes(recordings: Path) -> None:
     with open_recording([recordings / REAL[0]]) as recording:
         assert (recording.ros_version, recording.count, len(recording.topics)) == (1, 14_228, 9)
         assert recording.duration_s == pytest.approx(55.9, abs=0.1)

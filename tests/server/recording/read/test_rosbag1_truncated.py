@@ -81,12 +81,12 @@ def test_wherever_it_ends_what_is_whole_is_read(tmp_path: Path, compression: str
                 CutBag1(path)
             continue
         with open_recording([path]) as recording:
-            heard = sum(1 for _ in recording.messages())
+            count = sum(1 for _ in recording.messages())
             assert "a.bag was never closed" in recording.damage[0]
         if compression == "none":  # of the chunk that ends too early, its whole messages too
-            assert whole <= heard < whole + max(counts)
+            assert whole <= count < whole + max(counts)
         else:
-            assert heard == whole
+            assert count == whole
     assert len(there) == sum(counts) == MESSAGES
 
 
@@ -108,7 +108,7 @@ def test_a_recorder_that_is_killed_leaves_what_it_wrote(tmp_path: Path, compress
 
 
 def test_what_is_odd_ends_it_and_takes_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A header of 4 GB, a chunk that says it holds more than may be read, records of other kinds, a bag of nothing."""
+    """A header of 4 GB, a chunk that declares more than may be read, records of other kinds, a bag of nothing."""
     path = unindexed(written(tmp_path / "a.bag", compression="bz2"))
     content = path.read_bytes()
     with CutBagChunks(path) as chunks:
@@ -151,7 +151,7 @@ def test_damage_costs_what_it_hit_and_is_named(tmp_path: Path) -> None:
 
 
 def test_a_record_is_of_one_kind(tmp_path: Path) -> None:
-    """What says that it is a connection and a message is not read as another message."""
+    """What is marked as a connection and a message is not read as another message."""
     path = unindexed(written(tmp_path / "a.bag", compression="none"))
     content = path.read_bytes()
     twice = b"\x04\0\0\0op=\x07\x04\0\0\0op=\x02"

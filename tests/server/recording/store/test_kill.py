@@ -120,8 +120,8 @@ async def asked_through_node(client: httpx.AsyncClient, address: str) -> None:
     at = f"{address}/agents/ocelot/api/recordings"
     (row,) = (await client.get(at)).json()["recordings"]
     assert row["stored"]["state"] == "stored"
-    asked = await client.post(f"{at}/{ID}/store", json={"delete": False})
-    assert (asked.status_code, asked.json()["state"]) == (202, "stored")
+    answer = await client.post(f"{at}/{ID}/store", json={"delete": False})
+    assert (answer.status_code, answer.json()["state"]) == (202, "stored")
     assert (await client.delete(f"{at}/{ID}/store")).json()["is_asked"] is False
 
 

@@ -161,7 +161,7 @@ async def test_a_note_that_comes_while_the_file_is_deleted_is_kept(car: Car, s3:
 
 
 @pytest.mark.field
-async def test_a_clip_that_could_not_be_made_is_said_and_made_later(
+async def test_a_clip_that_could_not_be_made_is_reported_and_made_later(
     car: Car, s3: S3, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def killed(arguments: object, progress: object) -> None:

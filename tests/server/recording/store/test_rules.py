@@ -82,19 +82,19 @@ def test_names_of_parts() -> None:
     assert [place_of(key) for key in ("catalogue/../x.json", "catalogue/a/b/c.json", "files/a/b.json")] == [None] * 3
 
 
-def test_the_pace_is_kept_and_asks_whether_it_may_go_on() -> None:
+def test_the_pace_is_kept_and_checks_whether_it_may_continue() -> None:
     now = 0.0
-    asked = []
+    checked = []
 
     def sleep(s: float) -> None:
         nonlocal now
         now += s
 
-    pace = Pace(lambda: 1000.0, lambda: asked.append(now), now=lambda: now, sleep=sleep)
+    pace = Pace(lambda: 1000.0, lambda: checked.append(now), now=lambda: now, sleep=sleep)
     for _ in range(10):
         pace.take(500)
     assert now == pytest.approx(5.0)
-    assert max(b - a for a, b in itertools.pairwise(asked)) <= 0.2 + 1e-9
+    assert max(b - a for a, b in itertools.pairwise(checked)) <= 0.2 + 1e-9
     Pace(lambda: 0.0, lambda: None, now=lambda: now, sleep=sleep).take(10**9)
     assert now == pytest.approx(5.0)
 
@@ -151,7 +151,7 @@ def test_a_login_from_a_file_that_others_cannot_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("status", "code", "kind", "words"),
+    ("status", "code", "kind", "text"),
     [
         (507, "", Kind.FULL, "is full"),
         (500, "XMinioStorageFull", Kind.FULL, "is full"),
@@ -164,7 +164,7 @@ def test_a_login_from_a_file_that_others_cannot_read(tmp_path: Path) -> None:
         (500, "InternalError", Kind.OTHER, "status 500 (InternalError)"),
     ],
 )
-def test_troubles_in_words(status: int, code: str, kind: Kind, words: str) -> None:
+def test_the_text_of_troubles(status: int, code: str, kind: Kind, text: str) -> None:
     trouble = of_answer(status, code, host="h", bucket="b")
     assert trouble.kind is kind
-    assert words in str(trouble)
+    assert text in str(trouble)

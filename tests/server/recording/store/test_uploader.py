@@ -117,7 +117,7 @@ async def test_a_damaged_part_is_found_before_it_counts_as_stored(car: Car, s3: 
 
 
 @pytest.mark.field
-async def test_a_recording_is_deleted_only_after_a_verified_copy_and_only_if_asked_for(car: Car, s3: S3) -> None:
+async def test_a_recording_is_deleted_only_after_a_verified_copy_and_only_on_request(car: Car, s3: S3) -> None:
     path = car.folder / f"{ID}.mcap"
     content = path.read_bytes()
     async with car.running() as now:
@@ -199,7 +199,7 @@ async def test_a_request_that_is_taken_back_ends_the_upload(car: Car, s3: S3) ->
         ((503, "SlowDown"), "requests a pause (503)."),
     ],
 )
-async def test_a_store_that_refuses_is_named_and_asked_again(
+async def test_a_store_that_refuses_is_named_and_tried_again(
     car: Car, s3: S3, fault: tuple[int, str], sentence: str
 ) -> None:
     s3.fault = lambda method, path: fault if "part-" in path else None

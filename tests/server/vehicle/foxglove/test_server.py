@@ -39,7 +39,7 @@ class Answers:
     """The marks of a link."""
 
     def __init__(self) -> None:
-        self.asked: list[str] = []
+        self.requested: list[str] = []
         self.answered_s: list[tuple[float, float]] = []
 
     def open(self, at_s: float) -> None: ...
@@ -50,7 +50,7 @@ class Answers:
         self.answered_s.append((sent_s, at_s))
 
     def subscribe(self, topic: str, queue_length: int, throttle_s: float = 0.0) -> None:
-        self.asked.append(topic)
+        self.requested.append(topic)
 
 
 @asynccontextmanager
@@ -125,7 +125,7 @@ async def test_a_channel_that_comes_later_and_again_under_another_number_is_subs
     assert [one["twist"]["twist"]["linear"]["x"] for one in came(ear, "/odom")] == [1.0, 2.0, 3.0]
 
 
-async def test_what_cannot_be_read_is_said_once_and_harms_nothing() -> None:
+async def test_what_cannot_be_read_is_reported_once_and_harms_nothing() -> None:
     ear = Ear()
     with peer() as car:
         car.offer_raw("/proto", "foxglove.LocationFix", "protobuf", "protobuf", b"\x0a\x00")
@@ -230,7 +230,7 @@ async def test_pings_are_answered_behind_the_messages() -> None:
         car.offer("/odom", ODOMETRY, "cdr")
         async with linked(car.address, ear, "/odom", marks=marks) as source:
             await subscribed(source, "/odom")
-            assert marks.asked == ["/odom"]
+            assert marks.requested == ["/odom"]
             await until(lambda: marks.answered_s)
             before = len(marks.answered_s)
             while len(marks.answered_s) < before + 3:
@@ -329,7 +329,7 @@ async def test_a_session_judges_and_records_the_car(tmp_path: Path, version: Any
     [((), None, "capability clientPublish"), (BOTH, ["protobuf"], "its encodings are protobuf")],
 )
 @pytest.mark.slow
-async def test_the_slow_down_says_why_it_cannot_be_armed(
+async def test_the_slow_down_names_why_it_cannot_be_armed(
     capabilities: tuple[Capability, ...], encodings: list[str] | None, why: str
 ) -> None:
     with peer(capabilities, encodings) as car:

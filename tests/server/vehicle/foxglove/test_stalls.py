@@ -45,7 +45,7 @@ class Marks:
 
 @dataclass(slots=True)
 class Sent:
-    """In the system's hands: the answer to a ping, or the message of a topic that entered the queue then."""
+    """Held by the system: the answer to a ping, or the message of a topic that entered the queue then."""
 
     bytes_left: float
     at_s: float

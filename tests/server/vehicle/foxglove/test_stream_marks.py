@@ -1,4 +1,4 @@
-"""A ping counts as answered by the first message that entered the server's queue after it, whatever its answer says."""
+"""A ping counts as answered by the first message that entered the server's queue after it, whatever its content."""
 
 from __future__ import annotations
 

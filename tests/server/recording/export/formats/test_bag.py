@@ -203,10 +203,10 @@ def test_what_ros_1_has_no_place_for_is_named(tmp_path: Path) -> None:
     made.write(BEGIN_S * 10**9 + 5, "/n", INT, "int32 data", "cdr", b"\0\1\0\0\7")
     outcome = export(made.close(), tmp_path / "out.bag")
     assert outcome.entries == 1
-    said = "\n".join(outcome.notes)
-    assert "/wide (1 messages) is left out" in said
-    assert "/odd (1 messages) is left out: it was recorded as JSON" in said
-    assert "1 messages on /n are left out: its 5 bytes do not fit its type." in said
+    notes = "\n".join(outcome.notes)
+    assert "/wide (1 messages) is left out" in notes
+    assert "/odd (1 messages) is left out: it was recorded as JSON" in notes
+    assert "1 messages on /n are left out: its 5 bytes do not fit its type." in notes
 
 
 def test_fields_without_a_place_are_named(tmp_path: Path) -> None:
@@ -293,7 +293,7 @@ def test_times_that_no_bag_can_hold(tmp_path: Path, time_ns: int, fits: bool) ->
     bag.close()
 
 
-def test_a_standard_type_told_by_a_bridge_has_its_true_sum(tmp_path: Path) -> None:
+def test_a_standard_type_from_a_bridge_has_its_true_sum(tmp_path: Path) -> None:
     """A bridge tells fields and no constants, and without them the sum would be another."""
     definition = (
         "std_msgs/Header header\nsensor_msgs/NavSatStatus status\nfloat64 latitude\nfloat64 longitude\n"

@@ -71,7 +71,7 @@ def test_every_signal_has_a_table_with_its_units() -> None:
 
 ROWS: list[Row] = [
     (0.0, "/catvehicle/vel", TWIST, {"linear": {"x": 1.5}}),
-    (0.5, "/catvehicle/vel", TWIST, {"linear": {"x": float("nan")}}),  # says nothing: no row
+    (0.5, "/catvehicle/vel", TWIST, {"linear": {"x": float("nan")}}),  # has no value: no row
     (0.6, "/catvehicle/brake", WRENCH, {"force": {"x": 12.5}}),
     (0.7, "/catvehicle/steering", WRENCH, {"torque": {"z": -20.0}}),
     (0.8, "/DistanceEstimator/dist", FLOAT, {"data": 81.0}),
@@ -186,14 +186,14 @@ def test_the_log_the_phone_and_the_settings_are_beside_them(tmp_path: Path) -> N
 
 def test_the_readme_tells_what_is_there_and_what_is_not(tmp_path: Path) -> None:
     export(made(tmp_path, ROWS), tmp_path / "out.zip")
-    said = text(tmp_path / "out.zip", "README.txt")
-    assert "Began:      2023-11-14 22:13:20 UTC" in said
-    assert "Length:     1.3 s" in said
-    assert "speed.csv" in said
-    assert "speed is /catvehicle/vel (geometry_msgs/Twist)" in said
-    assert "No alarm log was recorded" in said
-    assert "/other (std_msgs/String, 1 messages) fills no signal and has no table." in said
-    assert "An empty cell means: not known. It never means 0." in said
+    readme = text(tmp_path / "out.zip", "README.txt")
+    assert "Began:      2023-11-14 22:13:20 UTC" in readme
+    assert "Length:     1.3 s" in readme
+    assert "speed.csv" in readme
+    assert "speed is /catvehicle/vel (geometry_msgs/Twist)" in readme
+    assert "No alarm log was recorded" in readme
+    assert "/other (std_msgs/String, 1 messages) fills no signal and has no table." in readme
+    assert "An empty cell means: not known. It never means 0." in readme
 
 
 def test_a_simulator_s_tyre_angle_is_percent_as_on_the_page(tmp_path: Path) -> None:

@@ -59,12 +59,12 @@ def test_our_own_channels_are_text_in_it_and_every_message_is_understood(tmp_pat
     outcome, bag = export(ours, tmp_path, name="catgraph/../drive of Monday")
     assert bag.name == "catgraph_.._drive_of_Monday"
     with AnyReader([bag]) as reader:
-        said = [(c, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
+        read = [(c, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
         assert {c.topic for c in reader.connections} == {"/n", "/scan", "/catgraph/alarms"}
         qos = {c.topic: c.ext.offered_qos_profiles for c in reader.connections}
-    assert len(said) == outcome.entries == 7
-    assert [m.data for c, m in said if c.topic == "/n"] == [0, 1, 2, 3, 4]
-    (alarm,) = (json.loads(m.data) for c, m in said if c.topic == "/catgraph/alarms")
+    assert len(read) == outcome.entries == 7
+    assert [m.data for c, m in read if c.topic == "/n"] == [0, 1, 2, 3, 4]
+    (alarm,) = (json.loads(m.data) for c, m in read if c.topic == "/catgraph/alarms")
     assert alarm["text"] == raised["text"]
     assert qos["/n"][0].durability.name == "TRANSIENT_LOCAL"
     assert qos["/scan"] == []
