@@ -16,7 +16,7 @@ test('what waits comes first, of it what still stands; then danger, then the new
   ], [{ id: 'hidden', title: 'hidden', priority: 'critical', by: ['worst'], raised_ms: null }]);
   assert.deepEqual(rows.map(({ title }) => title), ['worst', 'new', 'old', 'ended', 'known', 'shelved', 'hidden']);
   assert.equal(countWords(rows), '4 unacknowledged');
-  assert.equal(rows.at(-1)?.words, 'cause: worst');
+  assert.equal(rows.at(-1)?.detail, 'cause: worst');
 });
 
 test('whatever is unacknowledged can be acknowledged, also once it has returned; what sounds can be silenced', () => {
@@ -72,7 +72,7 @@ test('who took the sound is said, and until when', () => {
 
 test('a row says what is measured of what is allowed, where both are known', () => {
   const quantity = (/** @type {number} */ value, unit = 'm/s') => ({ label: '', value, unit });
-  const words = (/** @type {any} */ more) => shown([alarm('a', { verdict: 'fault', measured: quantity(12.6), limit: quantity(11), ...more })])[0]?.words;
+  const words = (/** @type {any} */ more) => shown([alarm('a', { verdict: 'fault', measured: quantity(12.6), limit: quantity(11), ...more })])[0]?.detail;
   assert.equal(words({}), '12.6 m/s (limit 11.0 m/s)');
   const labelled = (/** @type {string} */ label, /** @type {number} */ value, unit = 's') => ({ label, value, unit });
   assert.equal(words({ measured: labelled('Silent for', 16.4), limit: labelled('Allowed', 1) }), 'no message for 16.4 s (limit 1.0 s)');
