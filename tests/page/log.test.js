@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { heldWords } from '../../static/js/shell/connect-layout.js';
-import { asked, dayWords, eventWords, joined, lowest, standingRows, tookWords } from '../../static/js/alarms/log-layout.js';
+import { filterParams, dayWords, eventWords, joined, lowest, standingRows, tookWords } from '../../static/js/alarms/log-layout.js';
 import { dialogWords, loadWords, snackWords, standingWords } from '../../static/js/alarms/standing.js';
 
 const ALARM = /** @type {any} */ ({ active: true, text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
@@ -67,9 +67,9 @@ test('what is here and what was fetched make one list; a blind time is never fil
 });
 
 test('a filter is asked of the server as the page means it', () => {
-  assert.deepEqual(asked({ kind: 'all', text: '  ' }), {});
-  assert.deepEqual(asked({ kind: 'other', text: 'a&b ' }), { alarm: '', text: 'a&b' });
-  assert.deepEqual(asked({ kind: 'advisory', text: '' }), { priority: 'advisory' });
+  assert.deepEqual(filterParams({ kind: 'all', text: '  ' }), {});
+  assert.deepEqual(filterParams({ kind: 'other', text: 'a&b ' }), { alarm: '', text: 'a&b' });
+  assert.deepEqual(filterParams({ kind: 'advisory', text: '' }), { priority: 'advisory' });
 });
 
 test('days are told as people tell them', () => {

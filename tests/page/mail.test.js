@@ -41,7 +41,7 @@ test('the size says what becomes of it', () => {
   assert.match(sizeNote(null, 18, 'link'), /^It is compressed\. Above 18.0 MB it is sent as a link/);
 });
 
-for (const [name, given, word, says] of /** @type {[string, object, string, string | RegExp][]} */ ([
+for (const [name, given, label, detail] of /** @type {[string, object, string, string | RegExp][]} */ ([
   ['being made', { is_ready: false, share: 0.42 }, 'Preparing 42 %', ''],
   ['not begun', { is_ready: false }, 'Preparing', ''],
   ['due', {}, 'Queued', ''],
@@ -54,8 +54,8 @@ for (const [name, given, word, says] of /** @type {[string, object, string, stri
 ])) {
   test(`a mail that is ${name} says so`, () => {
     const found = stateOf(mail(given), NOW_MS);
-    assert.equal(found.word, word);
-    assert.equal(found.says, says);
+    assert.equal(found.label, label);
+    assert.equal(found.detail, detail);
     assert.equal(found.isBad, name === 'refused');
   });
 }

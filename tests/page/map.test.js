@@ -199,7 +199,7 @@ const inked = (ink, turn = 'fresh') => (/** @type {string} */ name) => ({ ink: n
 
 test('a car of now, with its ellipse', () => {
   const car = carOf(frameOf(FIX), inked('fresh'));
-  assert.deepEqual([car.isLive, car.label, car.says, car.heading_deg, car.isHeadingLive], [true, 'Car ±5 m', '', 87, true]);
+  assert.deepEqual([car.isLive, car.label, car.message, car.heading_deg, car.isHeadingLive], [true, 'Car ±5 m', '', 87, true]);
   assert.equal(carOf(frameOf({ ...FIX, covariance_m2: [100, 17.64, 0] }), inked('ageing')).label, 'Car ±10 m');
   assert.equal(carOf(frameOf({ ...FIX, covariance_m2: null, sigma_m: 4.2 }), inked('fresh')).label, 'Car ±4.2 m');
 });
@@ -215,7 +215,7 @@ test('a car that is not known to be there is never shown as live, and why is sai
   ])) {
     const car = carOf(frameOf(value), inked(ink));
     assert.equal(car.isLive, false);
-    assert.match(car.says, words);
+    assert.match(car.message, words);
   }
   assert.deepEqual(carOf(frameOf(FIX), inked('stale')).label, 'Car STALE 3.4 s');
   assert.equal(carOf(frameOf({ ...FIX, status: -1 }), inked('fresh')).place, null); // coordinates without a fix are none
@@ -230,18 +230,18 @@ test('unknown quality and unknown heading are said and drawn as that', () => {
 
 test('every reason of a phone is said; a coarse fix is still one of now', () => {
   const live = phoneOf(frameOf(FIX, PHONE), 0.1);
-  assert.deepEqual([live.isLive, live.label, live.says], [true, 'Phone ±5 m', '']);
+  assert.deepEqual([live.isLive, live.label, live.message], [true, 'Phone ±5 m', '']);
   near(live.age_s ?? 0, 0.9, 1e-9);
-  assert.match(phoneOf(frameOf(FIX), 0).says, /^No phone is sharing its position/);
+  assert.match(phoneOf(frameOf(FIX), 0).message, /^No phone is sharing its position/);
   for (const why of ['denied', 'unavailable', 'timeout', 'insecure', 'hidden', 'old', 'late', 'silent']) {
     const found = phoneOf(frameOf(FIX, { ...PHONE, used: false, why, why_text: `Because of ${why}` }), 0);
-    assert.deepEqual([found.isLive, found.says, found.label], [false, `Because of ${why}.`, 'Phone STALE 0.8 s']);
+    assert.deepEqual([found.isLive, found.message, found.label], [false, `Because of ${why}.`, 'Phone STALE 0.8 s']);
   }
   const coarse = phoneOf(frameOf(FIX, { ...PHONE, accuracy_m: 80, used: false, why: 'coarse', why_text: 'To 80 m only' }), 0);
-  assert.deepEqual([coarse.isLive, coarse.label, coarse.says], [true, 'Phone ±80 m', 'To 80 m only.']);
+  assert.deepEqual([coarse.isLive, coarse.label, coarse.message], [true, 'Phone ±80 m', 'To 80 m only.']);
   assert.equal(phoneOf(frameOf(FIX, { ...PHONE, lat_deg: null, lon_deg: null, age_s: null, used: false, why: 'denied', why_text: 'No' }), 0).place, null);
   assert.equal(phoneOf(frameOf(FIX, PHONE), 4.5).isLive, false); // the page itself has heard nothing for so long
-  assert.match(phoneOf(frameOf(FIX, { ...PHONE, count: 3 }), 0).says, /^Compared with Pixel 7 · a3f2, one of 3 phones\.$/);
+  assert.match(phoneOf(frameOf(FIX, { ...PHONE, count: 3 }), 0).message, /^Compared with Pixel 7 · a3f2, one of 3 phones\.$/);
 });
 
 test('apart is as the server compared them at one moment; where it did not, as the two fixes have it', () => {

@@ -74,5 +74,5 @@ test('the log: the mark of a critical alarm, found by that filter; what is of no
 test('the time line of a replay draws it, and Files counts it', () => {
   const { marks } = read({ kind: 'timeline', length_s: 9, bucket_s: 1, speed_mps: [], gaps: [], notes: [], marks: [{ at_s: 2, alarm: 'wheel_lost', title: 'Wheel lost', priority: 'extreme', text: '', duration_s: null }] });
   assert.equal(placedMarks(marks, [0, 9], 90)[0]?.priority, 'critical');
-  assert.deepEqual(countsOf({ critical: 1, extreme: 2, advisory: 1 }).map(({ words }) => words), ['3 critical alarms', '1 advisory']);
+  assert.deepEqual(countsOf({ critical: 1, extreme: 2, advisory: 1 }).map(({ text }) => text), ['3 critical alarms', '1 advisory']);
 });

@@ -79,7 +79,7 @@ test('a chosen unit is taken back as a topic is, and named as it is read', () =>
 
 test('what else could carry a signal stands without the one that does, and not endlessly', () => {
   const offers = [{ topic: '/a', type: 'T' }, { topic: '/b', type: 'T', frame: 'rear', why: 'no publisher' }];
-  assert.deepEqual(otherWords(offers, '/a'), [{ topic: '/b', says: 'T\nframe rear\nno publisher' }]);
+  assert.deepEqual(otherWords(offers, '/a'), [{ topic: '/b', detail: 'T\nframe rear\nno publisher' }]);
   assert.deepEqual(otherWords(null, '/a'), []);
   const many = otherWords(Array.from({ length: 500 }, (_, i) => ({ topic: `/t${i}`, type: 'T' })), '/t0');
   assert.deepEqual([many.length, many.at(-1)?.topic], [7, 'and 493 more']);
