@@ -81,8 +81,8 @@ test('only the holder answers a request, the oldest first', () => {
   assert.deepEqual([0, 0.1, 9.9, -1].map(seconds), ['0 s', '1 s', '10 s', '0 s']);
 });
 
-const PHONE = { sound: 'ready', screen: 'ready', position: 'ready', positionSays: '', rides: false, vibrates: true, battery: 0.6, charging: false, isOnline: true, network: 'wifi', lag_s: 0.1, isApple: false, isSecure: true, isReplaying: false };
-const tags = (more) => Object.fromEntries(rowsOf({ ...PHONE, ...more }).map((row) => [row.what, [row.tag, row.kind, row.says]]));
+const PHONE = { sound: 'ready', screen: 'ready', position: 'ready', positionSays: '', isInCar: false, vibrates: true, battery: 0.6, charging: false, isOnline: true, network: 'wifi', lag_s: 0.1, isApple: false, isSecure: true, isReplaying: false };
+const tags = (more) => Object.fromEntries(rowsOf({ ...PHONE, ...more }).map((row) => [row.what, [row.tag, row.kind, row.text]]));
 
 test('a phone that is armed says so', () => {
   assert.equal(verdictOf(PHONE).can, true);
@@ -115,7 +115,7 @@ test('battery, network and position: low, far and missing', () => {
   assert.deepEqual(tags({ lag_s: 1.5 })['Network'].slice(0, 2), ['Slow', 'warn']);
   assert.match(tags({ network: 'cellular' })['Network'][2], /join the car’s Wi-Fi/);
   assert.match(tags({ position: 'missing', isSecure: false })['Position'][2], /needs HTTPS/);
-  assert.match(tags({ positionSays: 'The phone finds no position.', rides: true })['Position'][2], /finds no position\. This device is in the car\./);
+  assert.match(tags({ positionSays: 'The phone finds no position.', isInCar: true })['Position'][2], /finds no position\. This device is in the car\./);
   assert.match(tags({ screen: 'missing', isSecure: false })['Screen stays awake'][2], /needs HTTPS/);
 });
 
@@ -129,9 +129,9 @@ test('which phones are iPhones', () => {
 const at = (id, more = {}) => ({ id, label: `phone ${id}`, handheld: true, lat_deg: 32.23, lon_deg: -110.95, accuracy_m: 5, sigma_m: 3.3, alt_m: null, speed_mps: null, heading_deg: null, at_ms: 0, age_s: 0.5, used: true, why: null, why_text: null, compared: false, chosen: false, ...more });
 
 test('each phone in its own words', () => {
-  assert.deepEqual(phoneRow(at('aaaa', { chosen: true, compared: true }), 0.1, 'aaaa'), { id: 'aaaa', name: 'You', says: 'Accurate to 5 m, 0.6 s ago.', tag: 'In the car', isChosen: true });
+  assert.deepEqual(phoneRow(at('aaaa', { chosen: true, compared: true }), 0.1, 'aaaa'), { id: 'aaaa', name: 'You', text: 'Accurate to 5 m, 0.6 s ago.', tag: 'In the car', isChosen: true });
   const denied = phoneRow(at('bbbb', { used: false, why: 'denied', why_text: 'Location permission denied on this phone', age_s: null, accuracy_m: null }), 0, 'aaaa');
-  assert.deepEqual([denied.name, denied.says, denied.tag], ['phone bbbb', 'Location permission denied on this phone.', '']);
+  assert.deepEqual([denied.name, denied.text, denied.tag], ['phone bbbb', 'Location permission denied on this phone.', '']);
   assert.equal(nameOf(at('cccc', { label: null }), 'aaaa'), 'A phone');
 });
 
@@ -161,7 +161,7 @@ test('among several the phone that is compared has its own name too', () => {
 
 test('a device shows the key by which agents know it, where any asks for it', () => {
   /** @type {any} */
-  const facts = { sound: 'ready', screen: 'ready', position: 'ready', positionSays: '', rides: false, vibrates: true, battery: 1, charging: true, isOnline: true, network: '', lag_s: 0, isApple: false, isSecure: true, isReplaying: false };
+  const facts = { sound: 'ready', screen: 'ready', position: 'ready', positionSays: '', isInCar: false, vibrates: true, battery: 1, charging: true, isOnline: true, network: '', lag_s: 0, isApple: false, isSecure: true, isReplaying: false };
   const rows = (/** @type {string | null} */ key) => rowsOf({ ...facts, key }).filter(({ what }) => what === 'Signed orders').map(({ tag, kind }) => [tag, kind]);
   assert.deepEqual([rows(null), rows(''), rows('k4f2a91c3000')], [[], [['Not available', 'warn']], [['4f2a91c3', 'plain']]]);
 });

@@ -38,8 +38,8 @@ test('who is in control answers, or the first to act where nobody is', () => {
 test('what is put off waits, also with other options, and for another car it is asked', () => {
   const later = new Set([keyOf('car', question())]);
   const more = question({ options: [], options_count: 3 });
-  assert.deepEqual(dealt('car', [more, brake], later), { asked: [brake], waiting: [more] });
-  assert.deepEqual(dealt('van', [more, brake], later).asked, [more, brake]);
+  assert.deepEqual(dealt('car', [more, brake], later), { open: [brake], waiting: [more] });
+  assert.deepEqual(dealt('van', [more, brake], later).open, [more, brake]);
   assert.equal(waitingWords([question(), brake], (name) => name.toUpperCase()), 'Not chosen: SCAN, unit of BRAKE');
   assert.match(waitingWords([1, 2, 3, 4, 5].map((n) => question({ signal: `s${n}` })), (name) => name), /s1, s2, s3 and 2 more$/);
 });
@@ -89,7 +89,7 @@ test('the list of signals and Settings say that a source is not chosen', () => {
   const signal = /** @type {any} */ ({ label: 'Laser', topic: null, type: null, value: null, freshness: 'not_published', note: null });
   assert.equal(kindWords(signal, 'not_chosen'), 'press to choose');
   assert.equal(kindWords(signal), 'no such topic');
-  assert.deepEqual([topicWords(signal, undefined, true, true).says, topicWords(signal, undefined, true, true).icon], ['not chosen: press to choose', 'warn']);
+  assert.deepEqual([topicWords(signal, undefined, true, true).detail, topicWords(signal, undefined, true, true).icon], ['not chosen: press to choose', 'warn']);
 });
 
 test('a note on the mounting leads to its settings', () => {

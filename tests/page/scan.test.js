@@ -221,20 +221,20 @@ test('the arrow keys begin at the nearest and step from return to return', () =>
 test('a mark stays through a gap of a second, then it is let go; touched again it is taken away', () => {
   const mark = new ScanMark();
   mark.touch(ROOM, 8.3, 0, 1, 0);
-  assert.equal(mark.words, '8.3 m, straight ahead');
+  assert.equal(mark.text, '8.3 m, straight ahead');
   assert.equal(mark.hear(scan([]), 900), true);
   assert.equal(mark.isSeen, false);
   assert.equal(mark.hear(ROOM, 950), true);
   assert.equal(mark.isSeen, true);
   assert.equal(mark.hear(scan([]), 1960), false);
-  assert.equal(mark.words, '');
+  assert.equal(mark.text, '');
   mark.touch(ROOM, 8.3, 0, 1, 0);
   mark.touch(ROOM, 8.3, 0, 1, 0);
   assert.equal(mark.at, null);
   mark.step(ROOM, -1, 20, 0);
-  assert.equal(mark.at === null ? null : mark.words, '8.3 m, straight ahead');
+  assert.equal(mark.at === null ? null : mark.text, '8.3 m, straight ahead');
   mark.step(ROOM, -1, 20, 0);
-  assert.equal(mark.words, '12.4 m, 14° right');
+  assert.equal(mark.text, '12.4 m, 14° right');
 });
 
 test('words give way to words: half a line, a line, or they are left out', () => {
