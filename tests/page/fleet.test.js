@@ -34,7 +34,7 @@ test('who was not taken in time comes first, then the least time left, then what
   assert.equal(said['up'], 'unassigned | at Supervisor for 0:11 | Take it,Hand over');
   assert.equal(said['soon'], 'unassigned | Supervisor in 0:04 | Take it,Hand over');
   assert.equal(said['mine'], 'assigned to you | no timer | Open,Hand over,Release');
-  assert.equal(said['asked'], 'Desk 2 asks you to take over | asked for 0:00 | Accept,Decline');
+  assert.equal(said['asked'], 'offered to you by Desk 2 | offered for 0:00 | Accept,Decline');
   assert.equal(said['acked'], 'assigned to Desk 2, acknowledged | no timer | Take over');
   assert.equal(order.find(({ name }) => name === 'gone')?.title, 'No data: car may be moving');
   assert.equal(headOf(order, order.length), '8 · 4 unassigned');
@@ -48,7 +48,7 @@ test('a car that is off on purpose is in no count and sounds nothing, and says w
   const [lost, off] = itemsOf(of);
   assert.deepEqual([lost?.name, lost && keysOf(lost), lost?.sound], ['a', 'Open,Silence,It is off', 'high']);
   assert.deepEqual([off?.isOff, off && keysOf(off), off?.sound, off?.since_s, off?.kind], [true, 'Not off', 'none', 60, '']);
-  assert.match(off?.who.text ?? '', /^said by Ann at /);
+  assert.match(off?.who.text ?? '', /^set by Ann at /);
   const row = carRows(of, ['a'], false).find(({ name }) => name === 'b');
   assert.deepEqual([row?.text, row?.kind, row?.isLost, row?.isAsking], ['Off on purpose', '', false, false]);
 });
@@ -85,7 +85,7 @@ test('the length of a timer is what was left of it when it began', () => {
 test('an offer of mine can be withdrawn, and a car whose agent states no item is only opened', () => {
   const offered = { by: 'Me', name: 'Desk 2', page: 'desk2', since_ms: NOW - 3000 };
   const [one] = itemsOf(seen({ a: needy({ assigned: person('me'), offered, escalates_ms: null }) }));
-  assert.equal(`${one?.who.text} | ${keysOf(one)}`, 'assigned to you. Desk 2 is asked | Open,Withdraw');
+  assert.equal(`${one?.who.text} | ${keysOf(one)}`, 'assigned to you, offered to Desk 2 | Open,Withdraw');
   const { attention, ...old } = needy();
   assert.equal(keysOf(itemsOf(seen({ a: old }))[0]), 'Open');
   assert.deepEqual(itemsOf(seen({ a: summary({ attention: undefined }) })), []);
@@ -177,7 +177,7 @@ test('each car has one place in the grid, named by its number where that tells i
   assert.deepEqual(labelsOf(['C01', 'C02']), ['01', '02']);
   assert.deepEqual(labelsOf(['Ocelot', 'C02']), ['Ocelot', 'C02']);
   const rows = carRows(seen({ b: null, a: needy(), c: summary() }), ['a', 'b'], false);
-  assert.deepEqual(placesOf(rows).map(({ name, kind, says }) => `${name} ${kind} ${says}`), ['a crit a, Speed above limit', 'b lost b, no data', 'c  c, driving']);
+  assert.deepEqual(placesOf(rows).map(({ name, kind, title }) => `${name} ${kind} ${title}`), ['a crit a, Speed above limit', 'b lost b, no data', 'c  c, driving']);
 });
 
 test('a range names a row of numbers, else the first few', () => {

@@ -1,4 +1,4 @@
-// Who is on duty, in words; a hand-over; who is called next, and who asks for control, in the attention queue.
+// The texts of who is on duty, of a hand-over, and of the attention queue: who is called next, and who requests control.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -81,10 +81,10 @@ test('an item goes on to who is on duty, or says that nobody is', () => {
 test('a request for control that nobody answers is an item', () => {
   const summary = (/** @type {any} */ more) => /** @type {any} */ ({ holder: 'Ann', requests: [{ page: 'b', name: 'Ben', left_s: 7.2 }], ...more });
   const one = requestItem('ocelot', summary({}), 1.0);
-  assert.deepEqual([one?.key, one?.title, one?.detail], ['ocelot control', 'Ben asks for control', 'Granted in 7 s unless Ann keeps it']);
+  assert.deepEqual([one?.key, one?.title, one?.detail], ['ocelot control', 'Ben requests control', 'Granted in 7 s unless Ann keeps it']);
   assert.equal(requestItem('ocelot', summary({ requests: [] }), 0), null);
   assert.equal(requestItem('ocelot', summary({ requests: undefined }), 0), null, 'an older agent does not state it');
-  assert.match(requestItem('ocelot', summary({ requests: [{ page: 'b', name: 'Ben', left_s: 1 }, { page: 'c', name: 'Cem', left_s: 5 }] }), 9)?.detail ?? '', /Granted in 0 s .* 1 other asks too/);
+  assert.match(requestItem('ocelot', summary({ requests: [{ page: 'b', name: 'Ben', left_s: 1 }, { page: 'c', name: 'Cem', left_s: 5 }] }), 9)?.detail ?? '', /Granted in 0 s .* 1 other request/);
 });
 
 test('what others left is shown once in a duty, where it is known within 10 s of its beginning', () => {

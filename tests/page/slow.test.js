@@ -155,7 +155,7 @@ test('the sheet: what would be commanded, who competes, and the one thing this p
   assert.equal(sheet(slow('not_armed', { rivals: null })).facts[3]?.[2], true, 'not known is no "none"');
   assert.equal(sheet(slow('not_armed')).facts[3]?.[1], 'none');
   const other = sheet(slow('not_armed'), { mayControl: false, holder: 'Ben' });
-  assert.deepEqual([other.act, other.says], ['ask', 'Ben is in control and can arm it.']);
+  assert.deepEqual([other.act, other.message], ['ask', 'Ben is in control and can arm it.']);
   assert.equal(sheet(slow('armed')).act, 'disarm');
   assert.match(sheet(slow('armed')).text, /^Armed by Ann\./);
   assert.deepEqual([sheet(slow('armed'), { isViewer: true }).act, sheet(slow('not_armed'), { isReplay: true }).act, sheet(slow('not_armed'), { isSilent: true }).act, sheet(ordered()).act], [null, null, null, null]);
