@@ -1,4 +1,4 @@
-// Mail in words: addresses, sizes, states, and the link for the phone's own mail program.
+// The texts of mail: addresses, sizes, states, and the link for the phone's own mail program.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -34,7 +34,7 @@ for (const [addresses, problem] of /** @type {[string[], RegExp | null][]} */ ([
   });
 }
 
-test('the size says what becomes of it', () => {
+test('the size decides how it is sent', () => {
   assert.equal(sizeNote(4_200_000, 18, 'split'), '4.2 MB as recorded, compressed: one mail.');
   assert.match(sizeNote(18_000_001, 18, 'split'), /Above 18.0 MB it is sent as several mails, with a sentence on how to join them\.$/);
   assert.match(sizeNote(60_000_000, 18, 'link'), /^60.0 MB as recorded.*a link to this server\.$/);
@@ -70,13 +70,13 @@ test('each state has the keys that do something', () => {
   assert.deepEqual(keysOf(mail({ state: 'cancelled' })), { cancel: null, resend: 'Send again' });
 });
 
-test('one line says what it is', () => {
+test('one line names what it is', () => {
   assert.equal(aboutOf(mail()), 'car_1 · MCAP · 4.2 MB');
   assert.equal(aboutOf(mail({ recordings: ['a', 'b'], format: 'html', way: 'link', size_bytes: null })), '2 recordings · Report · as a link');
   assert.equal(aboutOf(mail({ way: 'split', parts: [part(), part()] })), 'car_1 · MCAP · 4.2 MB · 2 parts');
 });
 
-test('who is refused is named where it is not said already', () => {
+test('who is refused is named where the reply does not name them already', () => {
   const refused = [{ address: 'b@x', state: 'refused', said: '550 no' }, { address: 'a@x', state: 'accepted', said: '' }];
   assert.deepEqual(refusedOf(mail({ to: ['a@x', 'b@x'], parts: [part({ recipients: refused }), part({ recipients: refused })] })), ['b@x: 550 no']);
   assert.deepEqual(refusedOf(mail({ to: ['a@x', 'b@x'], said: 'b@x: 550 no; 1 of 2', parts: [part({ recipients: refused })] })), []);

@@ -19,7 +19,7 @@ test('initials of names', () => {
   assert.deepEqual(['A. K.', 'Anna Maria Keller', 'anna', 'Ö', '山田 太郎', '<b>x</b>', '---', '𝒜 b'].map(initialsOf), ['AK', 'AK', 'A', 'Ö', '山太', 'B', '?', '𝒜B']);
 });
 
-test('the chip says who is on duty and what they do', () => {
+test('the chip shows who is on duty and what they do', () => {
   assert.equal(chipOf(MINE, 'page-a', false, duty({ me })).text, 'AK controls');
   assert.equal(chipOf(MINE, 'page-a', false, duty()).text, 'You');
   assert.equal(chipOf(FREE, 'page-a', false, duty({ me })).text, 'AK on duty');
@@ -59,7 +59,7 @@ test('who signs on is shown what people who are off duty left acknowledged, and 
   assert.equal(lines[0]?.text, '12 m/s. Acknowledged by M. R. (Desk).');
 });
 
-test('the queue says whose alarms are left without an owner on duty', (t) => {
+test('the queue shows whose alarms are left without an owner on duty', (t) => {
   t.mock.timers.enable({ apis: ['Date'], now: AT });
   const of = (/** @type {any} */ unowned) => unownedWords(/** @type {any} */ ({ unowned }));
   assert.equal(of({ count: 1, by: 'A. K. (Pixel)', since_ms: AT }), 'acknowledged by A. K. (Pixel), off duty since 13:58');
@@ -68,7 +68,7 @@ test('the queue says whose alarms are left without an owner on duty', (t) => {
   assert.deepEqual([of(null), of(undefined)], ['', '']);
 });
 
-test('an item goes on to who is on duty, or says that nobody is', () => {
+test('an item goes on to who is on duty, or shows that nobody is', () => {
   const item = (/** @type {any} */ more) => /** @type {any} */ ({ since_ms: 0, assigned: null, offered: null, escalates_ms: null, escalated_ms: null, ...more });
   assert.equal(supervisorWords(item({ escalated_ms: 0, supervisors: ['J. D.'] }), 11_000), 'escalated to J. D. for 0:11');
   assert.equal(supervisorWords(item({ escalated_ms: 0, supervisors: [] }), 11_000), 'escalated: no supervisor is on duty, 0:11');

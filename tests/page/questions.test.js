@@ -16,7 +16,7 @@ const question = (more = {}) => ({ signal: 'scan', kind: 'source', words: 'Two l
 const brake = question({ signal: 'brake', kind: 'unit' });
 const none = { ink: /** @type {const} */ ('not_published'), age_s: null };
 
-test('a value that is missing because a question stands says so, and no other', () => {
+test('a value that is missing because a question stands is shown as that, and no other', () => {
   assert.equal(withQuestion(none, 'scan', [question()]).ink, 'not_chosen');
   assert.equal(withQuestion({ ink: 'no_value', age_s: null }, 'brake', [brake]).ink, 'not_in_unit');
   assert.equal(withQuestion(none, 'speed', [question(), brake]).ink, 'not_published');
@@ -32,10 +32,10 @@ test('who is in control answers, or the first to act where nobody is', () => {
   assert.equal(mayAnswer({ isViewer: false, page: 'q', control: control({ holder: null, page: null }) }), true);
   assert.equal(mayAnswer({ isViewer: true, page: 'q', control: control({ holder: null, page: null }) }), false);
   assert.equal(mayAnswer({ isViewer: false, page: '', control: control({ page: '' }) }), false);
-  assert.equal(mayAnswer({ isViewer: false, page: 'p', control: null }), false); // nobody has told who is in control
+  assert.equal(mayAnswer({ isViewer: false, page: 'p', control: null }), false); // who is in control is not received yet
 });
 
-test('what is put off waits, also with other options, and for another car it is asked', () => {
+test('what is put off waits, also with other options, and for another car it is shown', () => {
   const later = new Set([keyOf('car', question())]);
   const more = question({ options: [], options_count: 3 });
   assert.deepEqual(dealt('car', [more, brake], later), { open: [brake], waiting: [more] });

@@ -115,7 +115,7 @@ test('a number in a field has the mark of the language', () => {
   assert.ok(['1.100', '', 'x', '1,2,3'].every((typed) => Number.isNaN(decimalOf(typed, ','))));
 });
 
-test('what cannot be set is refused in words', () => {
+test('what cannot be set is refused with a text', () => {
   const why = (/** @type {string} */ typed) => /** @type {any} */ (readNumber(typed, speed)).refused;
   assert.equal(why(''), 'Speed limit: a number is required.');
   assert.equal(why('  '), 'Speed limit: a number is required.');
@@ -131,7 +131,7 @@ test('headings in the order of the server, each once', () => {
   assert.deepEqual(groupsOf(settings().schema).map(({ heading, names }) => [heading, names.length]), [['Speed', 1], ['Vehicle', 1], ['Expected rates', 1]]);
 });
 
-test('a search finds every word, in any order, whatever the case or accent', () => {
+test('a search finds every term, in any order, whatever the case or accent', () => {
   const texts = [rate.title, rate.description, rate.heading, rate.unit];
   assert.ok(found('', texts) && found('  RATE speed ', texts) && found("car's hz", texts) && found('éxpected', texts));
   assert.ok(!found('rate laser', texts) && !found('<script>', texts) && !found('.*', texts));
@@ -146,7 +146,7 @@ test('a change back is what differs, and null where the default was in force', (
   assert.deepEqual(changeTo(after, DEFAULTS), changeTo(after, before));
 });
 
-test('a change in words', () => {
+test('a change as text', () => {
   const now = settings({ topics: { speed: '/other' } });
   assert.deepEqual(changeLines(now, { values: { 'speed_limit.max_mps': null }, topics: { speed: null }, profile: 'catvehicle' }, () => 'Speed'), [
     'Speed limit: 9.0 → 11.0 m/s', 'Topic of Speed: /other → chosen automatically', 'Kind of car: as recognised → CATVehicle',
@@ -160,7 +160,7 @@ const signal = (more = {}) => ({
   count: 9, rejected: 0, rejected_why: null, value: { speed_mps: 1 }, lowest: null, highest: null, ...more,
 });
 
-test('a topic says what it carries, how fast, and what is wrong with it', () => {
+test('a topic shows what it carries, how fast, and what is wrong with it', () => {
   assert.deepEqual(topicWords(signal(), undefined, true), { topic: '/vel', detail: 'speed · Twist', icon: 'ok', rate: '20.0' });
   assert.deepEqual(topicWords(signal(), '/vel', true).detail, 'speed · Twist · chosen by you');
   assert.deepEqual(topicWords(signal({ note: 'Float64, expected Float32' }), undefined, true), { topic: '/vel', detail: 'speed · Twist\nFloat64, expected Float32', icon: 'warn', rate: '20.0' });
@@ -191,7 +191,7 @@ test('a file that cannot hold settings is not sent', () => {
   assert.match(fileProblem({ size: 65537, name: 'x'.repeat(900) }) ?? '', /^“x{60}” is too large: .* 64 kB\.$/);
 });
 
-test('a trial of a sound says plainly where this phone cannot sound', () => {
+test('a trial of a sound names where this phone cannot sound', () => {
   assert.match(trialWords('missing', 'high'), /has no sound: this device sounds no alarms/);
   assert.match(trialWords('blocked', 'high'), /no alarm can be heard/);
   assert.match(trialWords('busy', 'low'), /An alarm sounds now/);
