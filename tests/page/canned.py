@@ -282,7 +282,7 @@ def trends(now: float, begin: int, steps: int) -> Json:
 def drives() -> list[Json]:
     """Rows of GET /api/recordings: what a week of drives leaves behind."""
     north = [(-1) ** n * 3.0 + 7 * n for n in range(14)]
-    rows = [
+    listed = [
         (4.4, 768.0, 57.1, {"critical": 1, "warning": 2, "advisory": 0}, ""),
         (22.7, 1865.0, 138.0, {"critical": 0, "warning": 1, "advisory": 3}, ""),
         (49.0, 512.0, 38.0, {"critical": 2, "warning": 0, "advisory": 0}, ""),
@@ -291,7 +291,7 @@ def drives() -> list[Json]:
         (123.6, 1082.0, 80.3, None, ""),
     ]
     rows = []
-    for n, (ago_h, length_s, megabytes, alarms, title) in enumerate(rows):
+    for n, (ago_h, length_s, megabytes, alarms, title) in enumerate(listed):
         places = [(y * math.cos(n + i / 9) / 1e5, y * math.sin(n + i / 9) / 1e5) for i, y in enumerate(north)]
         way = [
             TrackPoint(at_s=float(i), lat_deg=lat, lon_deg=lon, distance_m=0.0) for i, (lat, lon) in enumerate(places)

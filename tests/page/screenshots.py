@@ -885,10 +885,10 @@ async def mail(server: Canned, page: Page) -> None:
 @scene("outbox")
 async def outbox(server: Canned, page: Page) -> None:
     def part(state: str, reply: str, refused: str | None = None) -> dict[str, Any]:
-        rows = {"address": "ann@example.org", "state": "refused" if refused else "accepted", "said": refused or ""}
+        recipient = {"address": "ann@example.org", "state": "refused" if refused else "accepted", "said": refused or ""}
         return {
             "part": 1, "parts": 1, "state": state, "said": reply, "attempts": 1,
-            "next_ms": at("14:21:00") if state == "queued" else None, "recipients": [rows],
+            "next_ms": at("14:21:00") if state == "queued" else None, "recipients": [recipient],
         }  # fmt: skip
 
     rows = (

@@ -177,9 +177,9 @@ async def test_another_car_is_shown_without_a_reload_and_nothing_of_the_first(br
         await expect(page.locator("#panel-settings .group").first).to_be_visible()
         async with page.expect_request(
             lambda request: "/api/trends" in request.url or "/api/track" in request.url
-        ) as request:
+        ) as track:
             await page.evaluate("location.hash = '#map'")
-        assert "vehicle=Kodkod_2" in (await request.value).url
+        assert "vehicle=Kodkod_2" in (await track.value).url
 
         await page.goto(fleet.watch.address)  # without a name: the one that this phone had last
         await shows(phone, "Kodkod_2")

@@ -137,8 +137,8 @@ async def test_a_recording_that_means_harm_is_only_listed(phone: Phone, tmp_path
         await row.locator(".t").tap()
         await expect(phone.page.locator("#sheet-file h2")).to_contain_text("<img src=x onerror=")
         await harmless(phone)
-        row = (await client.get(f"/api/recordings/{ID}")).json()
-        assert "<img" in row["title"], "kept as it was written"
+        listed = (await client.get(f"/api/recordings/{ID}")).json()
+        assert "<img" in listed["title"], "kept as it was written"
         svg = await client.get(f"/api/recordings/{ID}/track.svg")
         assert "<img" not in svg.text
         assert "sandbox" in svg.headers["content-security-policy"]

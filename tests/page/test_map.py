@@ -169,8 +169,8 @@ async def test_a_page_that_comes_late_and_one_after_a_radio_gap_have_the_whole_t
     async with roaming(speed_mps=8.0, covariance_m2=(0.04, 0.04, 0.0)) as car:
         async with serving(Config(vehicles=(Vehicle(name="car", address=car.address),))) as address:
             radio = Radio(int(address.rpartition(":")[2]))
-            async with radio.on_air() as address:
-                await phone.open(f"{address}/#home")
+            async with radio.on_air() as radio_address:
+                await phone.open(f"{radio_address}/#home")
                 await phone.live()
                 await asyncio.sleep(3.0)
                 await phone.page.evaluate("location.hash = '#map'")  # whatever alarm a busy machine raises

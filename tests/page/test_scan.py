@@ -373,7 +373,7 @@ ODD = {
     "blind": lambda t: drives.laser(t, np.full(181, np.nan)),
     "narrow": lambda t: drives.laser(t, 7.0 + 0.1 * np.sin(np.arange(61) + t), -np.pi / 6, np.pi / 180),
 }
-ODD = {
+EXPECTED = {
     "one beam": ("blind", "1 of 1 beams", "not in view"),
     "no beams": ("blind", "0 of 0 beams", "not in view"),
     "10 000 beams": ("12.0", "of 10000 beams", "invalid"),
@@ -408,7 +408,7 @@ async def test_no_scan_is_too_odd(phone: Phone) -> None:
         scanning = asyncio.create_task(scan())
         async with serving(Config(vehicles=(Vehicle(name="car", address=car.address),))) as address:
             await phone.open(f"{address}/#scan")
-            for odd, (distance, beams, text) in ODD.items():
+            for odd, (distance, beams, text) in EXPECTED.items():
                 laser["scan"] = ODD[odd]
                 await expect(phone.f("beams", "#panel-scan")).to_contain_text(beams, timeout=12_000)
                 await phone.acknowledge_all()

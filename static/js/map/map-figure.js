@@ -313,8 +313,8 @@ function place(text, x, y) {
  * @param {string} [beneath]
  */
 function write(text, number, beneath = '') {
-  const shown = `${number}|${beneath}`;
-  if (text.getAttribute('data-words') === shown) return;
-  text.setAttribute('data-words', shown);
+  const key = `${number}|${beneath}`;
+  if (text.getAttribute('data-words') === key) return;
+  text.setAttribute('data-words', key);
   text.replaceChildren(svg('tspan', { class: 'num' }, number), ...(beneath ? [svg('tspan', { class: 'beneath', x: 0, dy: 18 }, beneath)] : []));
 }
