@@ -16,7 +16,7 @@ test('what waits comes first, of it what still stands; then danger, then the new
   ], [{ id: 'hidden', title: 'hidden', priority: 'critical', by: ['worst'], raised_ms: null }]);
   assert.deepEqual(rows.map(({ title }) => title), ['worst', 'new', 'old', 'ended', 'known', 'shelved', 'hidden']);
   assert.equal(countWords(rows), '4 unacknowledged');
-  assert.equal(rows.at(-1)?.words, 'cause: worst');
+  assert.equal(rows.at(-1)?.detail, 'cause: worst');
 });
 
 test('whatever is unacknowledged can be acknowledged, also once it has returned; what sounds can be silenced', () => {
@@ -30,7 +30,7 @@ test('whatever is unacknowledged can be acknowledged, also once it has returned;
   assert.deepEqual(shown([alarm('a')], [], false)[0]?.keys, []);
 });
 
-test('an acknowledged alarm whose owner is off duty says so, can be taken over, and is not called acknowledged alone', (t) => {
+test('an acknowledged alarm whose owner is off duty is named so, can be taken over, and is not called acknowledged alone', (t) => {
   t.mock.timers.enable({ apis: ['Date'], now: new Date(2026, 10, 19, 23, 0).getTime() });
   const off = { state: 'ACKED', acknowledged_by: 'A. K. (Pixel)', off_duty_ms: new Date(2026, 10, 19, 14, 2, 30).getTime(), actions: ['shelve'], for_s: 90 };
   const rows = shown([alarm('a', off)]);
@@ -65,25 +65,25 @@ test('no row of a page is sliced, and each is on one page', () => {
   assert.deepEqual(pagesOf([], 400), [0]);
 });
 
-test('who took the sound is said, and until when', () => {
+test('who took the sound is shown, and until when', () => {
   assert.match(silentWords(alarm('a', { silenced_until_ms: 1000, silenced_by: 'Ann' })), /^silent until \d\d:\d\d:\d\d by Ann$/);
   assert.equal(silentWords(alarm('a')), '');
 });
 
-test('a row says what is measured of what is allowed, where both are known', () => {
+test('a row shows the measured value and its limit, where both are known', () => {
   const quantity = (/** @type {number} */ value, unit = 'm/s') => ({ label: '', value, unit });
-  const words = (/** @type {any} */ more) => shown([alarm('a', { verdict: 'fault', measured: quantity(12.6), limit: quantity(11), ...more })])[0]?.words;
-  assert.equal(words({}), '12.6 m/s (limit 11.0 m/s)');
+  const detail = (/** @type {any} */ more) => shown([alarm('a', { verdict: 'fault', measured: quantity(12.6), limit: quantity(11), ...more })])[0]?.detail;
+  assert.equal(detail({}), '12.6 m/s (limit 11.0 m/s)');
   const labelled = (/** @type {string} */ label, /** @type {number} */ value, unit = 's') => ({ label, value, unit });
-  assert.equal(words({ measured: labelled('Silent for', 16.4), limit: labelled('Allowed', 1) }), 'no message for 16.4 s (limit 1.0 s)');
-  assert.equal(words({ measured: labelled('Rate', 5, 'Hz'), limit: labelled('Expected', 20, 'Hz') }), '5.0 Hz (expected 20.0 Hz)');
-  assert.equal(words({ measured: labelled('Slow', 3, ''), limit: labelled('Of', 5, '') }), '3 of 5');
-  assert.equal(words({ limit: quantity(3, 's') }), 'now');
-  assert.match(words({ verdict: 'unknown', text: 'Speed is 4.2 s old' }) ?? '', /^Not checked now: Speed is 4.2 s old/);
-  assert.equal(words({ state: 'RTN_UNACKED', active: false }), 'then');
+  assert.equal(detail({ measured: labelled('Silent for', 16.4), limit: labelled('Allowed', 1) }), 'no message for 16.4 s (limit 1.0 s)');
+  assert.equal(detail({ measured: labelled('Rate', 5, 'Hz'), limit: labelled('Expected', 20, 'Hz') }), '5.0 Hz (expected 20.0 Hz)');
+  assert.equal(detail({ measured: labelled('Slow', 3, ''), limit: labelled('Of', 5, '') }), '3 of 5');
+  assert.equal(detail({ limit: quantity(3, 's') }), 'now');
+  assert.match(detail({ verdict: 'unknown', text: 'Speed is 4.2 s old' }) ?? '', /^Not checked now: Speed is 4.2 s old/);
+  assert.equal(detail({ state: 'RTN_UNACKED', active: false }), 'then');
 });
 
-test('states are said in the words of ISA-18.2', () => {
+test('states are named in the terms of ISA-18.2', () => {
   const state = (/** @type {any} */ more) => shown([alarm('a', more)])[0]?.state;
   assert.equal(state({}), 'unacknowledged');
   assert.equal(state({ state: 'RTN_UNACKED', active: false }), 'returned unacknowledged');
@@ -97,17 +97,17 @@ test('what is shelved or suppressed is not called acknowledged', () => {
   assert.equal(countWords([]), '');
 });
 
-test('an empty list says "no alarms" only where alarms could have come', () => {
+test('an empty list shows "no alarms" only where alarms could have come', () => {
   const usual = { isSilent: false, isReplay: false, isPaused: false, isChecked: true };
-  const words = (/** @type {Partial<typeof usual>} */ more) => noneWords({ ...usual, ...more });
-  assert.equal(words({}), 'No alarms.');
-  assert.equal(words({ isReplay: true }), 'No alarms at this moment of the recording.');
+  const detail = (/** @type {Partial<typeof usual>} */ more) => noneWords({ ...usual, ...more });
+  assert.equal(detail({}), 'No alarms.');
+  assert.equal(detail({ isReplay: true }), 'No alarms at this moment of the recording.');
   for (const more of [{ isSilent: true }, { isPaused: true }, { isPaused: true, isReplay: true }, { isChecked: false }, { isChecked: false, isReplay: true }]) {
-    assert.doesNotMatch(words(more), /^No alarms/);
+    assert.doesNotMatch(detail(more), /^No alarms/);
   }
 });
 
-test('a quiet list says which alarm ended last and how many came lately', () => {
+test('a quiet list shows which alarm ended last and how many came lately', () => {
   /** @param {string | null} alarm @param {string} change @param {number} at_ms */
   const row = (alarm, change, at_ms) => /** @type {any} */ ({ event: { alarm, change, at_ms, title: 'Car not moving', text: '' }, gap: null });
   const at_ms = new Date(2026, 4, 6, 14, 3, 58).getTime();

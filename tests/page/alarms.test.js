@@ -52,7 +52,7 @@ test('strip, list, dialog, snackbar, title and sound have one order: unacknowled
   }
 });
 
-test('what has ended is asked about only once nothing active is unacknowledged', () => {
+test('a dialog for an ended alarm comes only once nothing active is unacknowledged', () => {
   const ended = alarm({ state: 'RTN_UNACKED', active: false });
   assert.equal(layOut([ended, warning()]).dialog, null, 'its dialog would cover the warning');
   assert.equal(layOut([ended, warning({ state: 'ACKED' })]).dialog?.id, ended.id);
@@ -60,7 +60,7 @@ test('what has ended is asked about only once nothing active is unacknowledged',
   assert.equal(layOut([warning(), alarm({ raised_ms: -1 })]).dialog?.id, 'speed_limit', 'what is active is, whatever is newer');
 });
 
-test('the loudest unacknowledged alarm is heard', () => {
+test('the loudest unacknowledged alarm sounds', () => {
   const page = { isServerLost: false, isLossAcknowledged: false };
   assert.equal(soundOf(state({ alarms: [warning(), alarm()] }), page), 'high');
   assert.equal(soundOf(state({ alarms: [warning(), alarm({ state: 'ACKED' })] }), page), 'medium');
@@ -88,7 +88,7 @@ test('which dialog stands', () => {
   assert.equal(kind(state({ session: { phase: 'lost' } }), { isAnswered: true }), null);
   assert.equal(kind(state({ session: { phase: 'lost' } }), { isChoosing: true }), null);
   assert.equal(kind(state({ link: { cut: 'bridge-car', topics_heard: 0, car_age_s: null } })), 'mute');
-  assert.equal(kind(state({ link: { cut: 'bridge-car', topics_heard: 4 } })), null); // the veil says it
+  assert.equal(kind(state({ link: { cut: 'bridge-car', topics_heard: 4 } })), null); // the veil shows it
   assert.equal(kind(state({ session: { phase: 'failed' } })), 'failed');
   assert.equal(kind(state({ session: { phase: 'failed' } }), { isChoosing: true }), null);
   assert.equal(kind(state({ session: { phase: 'idle' } })), null);
@@ -116,7 +116,7 @@ test('a dialog that was answered stays closed until something else is lost', () 
   assert.equal(lossKey(state(), false), 'none');
 });
 
-test('the words of a lost link warn of a moving car', () => {
+test('the text of a lost link warns of a moving car', () => {
   const frame = state({ session: { phase: 'lost' }, link: { cut: 'server-bridge', attempts: 3, trying_for_s: 6 } });
   const [bold, plain, more] = linkWords('lost', chainOf({ frame, isSilent: false, silence_s: 0, lag_s: 0, heard_ms: 0 }), frame);
   assert.equal(bold, 'The bridge stopped answering.');
@@ -127,7 +127,7 @@ test('the words of a lost link warn of a moving car', () => {
 /** @param {any} frame */
 const strip = (frame, more = {}) => stripOf(frame, { isSilent: false, paused_s: 42.7, chain: chainOf({ frame, isSilent: false, silence_s: 0, lag_s: 0, heard_ms: 0 }), ...more });
 
-test('the strip says the worst that stands', () => {
+test('the strip shows the worst standing alarm', () => {
   const checks = /** @type {any} */ ([{ id: 'a', label: 'A', verdict: 'ok' }, { id: 'b', label: 'B', verdict: 'unknown' }]);
   assert.deepEqual([strip(state({ checks })).text, strip(state({ checks })).end], ['No alarms', '1 OK · 1 not checked']);
   assert.deepEqual(strip(state({ alarms: [alarm()] })), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: '2.3 s', hasReturned: false, isKnown: false, opens: 'alarms' });
@@ -141,7 +141,7 @@ test('the strip says the worst that stands', () => {
   assert.equal(strip(state({ alarms: [alarm({ state: 'SHELVED', priority: 'warning' })] })).text, 'No alarms');
 });
 
-test('what still stands comes before what has returned, and the strip says which it is', () => {
+test('what still stands comes before what has returned, and the strip shows which it is', () => {
   const returned = alarm({ state: 'RTN_UNACKED', active: false });
   const both = strip(state({ alarms: [returned, warning({ active: true })] }));
   assert.deepEqual([both.kind, both.text, both.hasReturned, both.end], ['warn', warning().title, false, '1 of 2']);

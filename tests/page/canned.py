@@ -42,7 +42,7 @@ UNKNOWN = {"GPS drift": "not checked: moving", "Command": "not checked: not arme
 
 
 def signal(label: str, kind: str | None, value: Json | None, **more: Any) -> Json:
-    """One signal of a state, fresh unless told otherwise."""
+    """One signal of a state, fresh unless set otherwise."""
     hz = more.pop("hz", 20.0)
     known = value is not None
     return {
@@ -282,7 +282,7 @@ def trends(now: float, begin: int, steps: int) -> Json:
 def drives() -> list[Json]:
     """Rows of GET /api/recordings: what a week of drives leaves behind."""
     north = [(-1) ** n * 3.0 + 7 * n for n in range(14)]
-    told = [
+    listed = [
         (4.4, 768.0, 57.1, {"critical": 1, "warning": 2, "advisory": 0}, ""),
         (22.7, 1865.0, 138.0, {"critical": 0, "warning": 1, "advisory": 3}, ""),
         (49.0, 512.0, 38.0, {"critical": 2, "warning": 0, "advisory": 0}, ""),
@@ -291,7 +291,7 @@ def drives() -> list[Json]:
         (123.6, 1082.0, 80.3, None, ""),
     ]
     rows = []
-    for n, (ago_h, length_s, megabytes, alarms, title) in enumerate(told):
+    for n, (ago_h, length_s, megabytes, alarms, title) in enumerate(listed):
         places = [(y * math.cos(n + i / 9) / 1e5, y * math.sin(n + i / 9) / 1e5) for i, y in enumerate(north)]
         way = [
             TrackPoint(at_s=float(i), lat_deg=lat, lon_deg=lon, distance_m=0.0) for i, (lat, lon) in enumerate(places)
@@ -449,7 +449,7 @@ class Canned:
         self.state = live()
         self.silent = False
         self.is_scanning = True
-        self.heard: list[Json] = []
+        self.received: list[Json] = []
         self.refuses: dict[str, str] = {}  # why, by the kind of command
         self.role = "operator"
         self.duty: Json | None = None  # who is on duty at the page's device
@@ -462,7 +462,7 @@ class Canned:
         self.candidates: dict[str, list[Json]] = {}  # of a signal, in the place of those by type
         self.settings: Json = {}  # what differs of `GET /api/settings`
         self.checks: dict[str, Json] = {}  # the answer for each check that is requested by its id
-        self.timeline: Json | None = None  # of the recording that a page asks to replay
+        self.timeline: Json | None = None  # of the recording that a page requests to replay
         self.mails: list[Json] = []
         self.marks: list[Json] = []  # of every recording
         self.vehicle = "car"
@@ -491,7 +491,7 @@ class Canned:
         try:
             while True:
                 message = await socket.receive_json()
-                self.heard.append(message)
+                self.received.append(message)
                 if message.get("kind") == "watch":
                     self._watching = message["scan"]
                 if message.get("kind") == "take" and self.floods:

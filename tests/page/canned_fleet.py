@@ -56,7 +56,7 @@ def car(name: str, speed_mps: float, at: tuple[float, float, float] | None, **mo
 
 
 def cut(listed: Json, ago_s: float) -> Json:
-    """A car that is not heard at its bridge."""
+    """A car without data at its bridge."""
     summary = listed["summary"]
     summary["link"] |= {"cut": "bridge-car", "car_age_s": ago_s}
     summary["speed"] |= {"freshness": "stale", "age_s": ago_s}
@@ -81,12 +81,12 @@ def three() -> list[Json]:
 
 def quiet() -> list[Json]:
     """Five cars, of which none needs a person."""
-    told = (
+    rows = (
         ("Caracal", 0.0, (-40.0, -300.0, 270.0), "Desk 2"), ("Kodkod", 8.0, (-260.0, -40.0, 12.0), "Field 2"),
         ("Margay", 3.1, (470.0, -260.0, 225.0), None), ("Ocelot", 4.2, (280.0, -10.0, 75.0), None),
         ("Serval", 6.1, (50.0, 120.0, 100.0), "Desk 2"),
     )  # fmt: skip
-    return [car(name, speed, at, holder=holder) for name, speed, at, holder in told]
+    return [car(name, speed, at, holder=holder) for name, speed, at, holder in rows]
 
 
 def events() -> list[Json]:

@@ -1,4 +1,4 @@
-"""What a canned state asks of the operator in control, and the candidates that it asks about."""
+"""The questions to the operator in control in a canned state, and their candidates."""
 
 from __future__ import annotations
 

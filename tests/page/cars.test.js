@@ -23,7 +23,7 @@ test('a short name has at most 8 characters, keeps its number, and no two are al
   assert.ok(all.every((one) => one.length > 0 && one.length <= 8), all.join());
 });
 
-test('forty cars of one long name are still told apart', () => {
+test('forty cars of one long name are still distinguished', () => {
   const all = [...shortNames(Array.from({ length: 40 }, (_, i) => `expedition-vehicle-${'abcdefgh'[i % 8]}x${i}y`)).values()];
   assert.equal(new Set(all).size, 40);
   assert.ok(all.every((one) => one.length <= 8));
@@ -38,7 +38,7 @@ test('the car that needs a person most comes first', () => {
   assert.deepEqual(order, ['newest', 'speeding', 'gone', 'warned', 'ended', 'acked', 'lost', 'calm', 'idle']);
 });
 
-test('a row says what asks, for how long, who is in control, and how old its speed is', () => {
+test('a row shows what needs an answer, for how long, who is in control, and how old its speed is', () => {
   const [one] = rows({ serval: summary({ worst: worst(), waiting: 2, holder: 'Ann', page: 'my-page' }) });
   assert.equal(one?.text, 'Speed above limit, 7.1 s +1');
   assert.deepEqual([one?.operator, one?.speed, one?.chain?.word, one?.isFilled, one?.recording], ['You', { ink: 'fresh', value_mps: 4.2 }, 'Live', true, '04:12']);
@@ -63,14 +63,14 @@ test('the badge counts other cars that need a person, in the shape of the worst'
   assert.equal(badgeOf(rows({ own: summary(), a: summary() }), 'own'), null);
 });
 
-test('an alarm that was left asks no more for this occurrence, and the next one does', () => {
+test('an alarm that was left is not shown again for this occurrence, and is for the next one', () => {
   const now = rows({ own: summary(), serval: summary({ worst: worst(), waiting: 1 }) });
   const left = new Set(askingOf(now, 'own', new Set()).map(keyOf));
   assert.deepEqual([left.size, askingOf(now, 'own', left).length, askingOf(now, 'serval', new Set()).length], [1, 0, 0]);
   assert.equal(askingOf(rows({ own: summary(), serval: summary({ worst: worst({ occurrence: 4 }) }) }), 'own', left).length, 1);
 });
 
-test('a phone hears for another car only what it would announce of it', () => {
+test('the next alarm of another car sounds on a phone only where it would announce it', () => {
   const of = (/** @type {any} */ more, isLeft = false, lag_s = 0.1) => {
     const all = rows({ own: summary(), serval: summary(more && { worst: worst(more) }) }, lag_s);
     return announcedOf(all, 'own', new Set(isLeft ? all.map(keyOf) : []));
@@ -79,7 +79,7 @@ test('a phone hears for another car only what it would announce of it', () => {
   const cases = [
     [null, false, 0.1, true, 'no alarm'],
     [{}, false, 0.1, true, 'it sounds now'],
-    [{}, true, 0.1, false, 'a critical one was left: a warning would not be heard'],
+    [{}, true, 0.1, false, 'a critical one was left: a warning would not sound'],
     [{ sound: 'none' }, false, 0.1, false, 'silenced'],
     [{ priority: 'warning' }, true, 0.1, true, 'a warning that was left: the next one sounds'],
     [{ state: 'ACKED' }, true, 0.1, true, 'acknowledged'],
@@ -90,7 +90,7 @@ test('a phone hears for another car only what it would announce of it', () => {
   assert.deepEqual(announcedOf(rows({ own: summary(), serval: null, b: summary(), a: summary() }), 'own', new Set()), ['a', 'b']);
 });
 
-test('the louder sound is heard, and the count-down of this car above all', () => {
+test('the louder sound plays, and the count-down of this car above all', () => {
   const asking = rows({ serval: summary({ worst: worst() }) });
   assert.deepEqual([louder(null, asking), louder('medium', asking), louder('count', asking), louder('low', []), louder(null, [])], ['high', 'high', 'count', 'low', null]);
   assert.equal(louder('high', rows({ serval: summary({ worst: worst({ sound: 'medium' }) }) })), 'high');

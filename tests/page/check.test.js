@@ -18,7 +18,7 @@ test('three numbers; what is not known is a dash', () => {
   assert.deepEqual(read(null), ['Measured –', 'Limit –', 'Not checked for –']);
 });
 
-test('the line of the thresholds says when the alarm begins, and at what value it ends', () => {
+test('the line of the thresholds shows when the alarm begins, and at what value it ends', () => {
   const delays = { on_s: 0.3, off_s: 2 };
   assert.equal(thresholdWords({ delays, ends: { side: 'below', value: 10.5, unit: 'm/s' } }), 'alarm after 0.3 s, ends below 10.5 m/s after 2 s');
   assert.equal(thresholdWords({ delays, ends: { side: 'above', value: 20, unit: '%' } }), 'alarm after 0.3 s, ends above 20.0 % after 2 s');

@@ -11,7 +11,7 @@ test('the fastest frame has no age, a slower one its delay', () => {
   assert.equal(clock.note(SKEW + 200, 1195), 0); // faster than any before
 });
 
-test('a frame held up for seconds is told as old, and a steady delay is never taken for an offset', () => {
+test('a frame held up for seconds is shown as old, and a steady delay is never taken for an offset', () => {
   const clock = new ServerClock();
   clock.note(SKEW, 0);
   for (let s = 1; s <= 600; s += 1) assert.ok(clock.note(SKEW + s * 1000, s * 1000 + 5000) > 4800, `after ${s} s`);
@@ -29,10 +29,10 @@ test('a late greeting is no offset: over all connections to one run of a server 
   assert.equal(clock.greeted({ run: 'b', time_ms: SKEW - 3_600_000 }, 62_000, 61_900), 0); // another server's clock
 });
 
-test('a first greeting that is late is as old as the dial and 0.2 s allow, and what is asked and answered tells more', () => {
+test('a first greeting that is late is as old as the dial and 0.2 s allow, and a request with its answer narrows it', () => {
   const clock = new ServerClock();
   assert.equal(clock.greeted({ run: 'a', time_ms: SKEW + 300 }, 1600, 0), 1400); // made 0.3 s after the dial, 1.3 s under way: nobody can know
-  assert.equal(clock.note(SKEW + 1900, 2100, 1800), 100); // asked 0.1 s before it was made: it was 0 to 0.3 s under way
+  assert.equal(clock.note(SKEW + 1900, 2100, 1800), 100); // requested 0.1 s before it was made: it was 0 to 0.3 s under way
   assert.ok(Math.abs(clock.note(SKEW + 2000, 3300) - 1200) < 1);
 });
 

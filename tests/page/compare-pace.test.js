@@ -15,14 +15,14 @@ class Server {
   /** @type {string | null} */
   refuses = null;
   /** @type {string[]} */
-  said = [];
+  messages = [];
 
   /** @param {{a: number, b: number}} lengths @param {{a: number, b: number}} most */
   constructor(lengths, most = { a: Infinity, b: Infinity }) {
     const replay = (/** @type {'a' | 'b'} */ name) => ({ token: name, length_s: lengths[name], at_s: 0, start_ms: 0, is_playing: false, is_seeking: false, rate: 1, reached_rate: /** @type {number | null} */ (null) });
     this.replays = { a: replay('a'), b: replay('b') };
     this.most = most;
-    this.pace = new Pace(/** @type {any} */ ({ now: () => this.now_ms, ask: (/** @type {string} */ _, /** @type {any} */ order) => this.ask(order) }), (sentence) => this.said.push(sentence));
+    this.pace = new Pace(/** @type {any} */ ({ now: () => this.now_ms, ask: (/** @type {string} */ _, /** @type {any} */ order) => this.ask(order) }), (sentence) => this.messages.push(sentence));
   }
 
   /** @param {any} order */
@@ -133,14 +133,14 @@ test('a moment that was sought is not given up for a frame of before', async () 
   assert.ok(server.replays.a.at_s > 40 && server.replays.b.at_s > 40);
 });
 
-test('a refused order is said once, and the time line stands', async () => {
+test('a refused order is shown once, and the time line stands', async () => {
   const server = new Server({ a: 60, b: 60 });
   await server.begin();
   server.refuses = 'No.';
   server.pace.toggle();
   await server.run(0.1);
   assert.equal(server.pace.isPlaying, false);
-  assert.ok(server.said.includes('No.'));
+  assert.ok(server.messages.includes('No.'));
 });
 
 test('out of sight nothing is ordered', async () => {

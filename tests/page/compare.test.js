@@ -65,7 +65,7 @@ test('A leads where it is, B where A is not', () => {
   assert.equal(leaderAt(110, A, B, 20), null);
 });
 
-test('what is missing of a side is said', () => {
+test('what is missing of a side is named', () => {
   const replay = /** @type {any} */ ({ hangs_s: null, is_seeking: false, silent_s: 0.1, is_settled: true });
   assert.deepEqual(placeOf(5, 20, 90), { kind: 'before', by_s: 15 });
   assert.deepEqual(placeOf(112, 20, 90), { kind: 'after', by_s: 2 });
@@ -89,7 +89,7 @@ test('holes are on the time line, and a signal that was never recorded is one', 
   assert.equal(holesOf(null, 'speed', 5, 60).length, 2);
 });
 
-test('times and the shift in words', () => {
+test('times and the shift as text', () => {
   assert.equal(lineTime(72.34), '1:12.3');
   assert.equal(lineTime(-5), '−0:05.0');
   assert.equal(lineTime(-0.01), '0:00.0');

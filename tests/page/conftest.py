@@ -67,20 +67,24 @@ def canned(canned_server: Canned) -> Canned:
     return canned_server
 
 
-def words_of(said: ConsoleMessage) -> str:
+def words_of(message: ConsoleMessage) -> str:
     """With the address, of what could not be loaded."""
-    return f"{said.text} {said.location['url']}" if said.text.startswith("Failed to load resource") else said.text
+    return (
+        f"{message.text} {message.location['url']}"
+        if message.text.startswith("Failed to load resource")
+        else message.text
+    )
 
 
-def is_complaint(said: ConsoleMessage) -> bool:
-    """Whether the page says on its console that something is wrong. It is not that these tests keep its worker away,
+def is_complaint(message: ConsoleMessage) -> bool:
+    """Whether the page reports on its console that something is wrong. It is not that these tests keep its worker away,
     that a page on a slow machine shows its first number some seconds after it preloaded the font, or that the browser
     asks for the site's icon while the page is being left, and refuses itself."""
-    text = said.text
+    text = message.text
     is_advice = "blocked by Playwright" in text or ("catgraph-numerals" in text and "was preloaded" in text)
-    is_icon = "apple-touch-icon" in text + said.location["url"]
+    is_icon = "apple-touch-icon" in text + message.location["url"]
     is_left = is_icon and ("from origin 'null'" in text or "net::ERR_FAILED" in text)
-    return said.type in ("error", "warning") and not (is_advice or is_left)
+    return message.type in ("error", "warning") and not (is_advice or is_left)
 
 
 async def press(keys: Locator) -> None:
@@ -109,7 +113,7 @@ IN_FRONT = """(tab) => {
 
 
 class Phone:
-    """A phone with the page open, and what its console said."""
+    """A phone with the page open, and the lines of its console."""
 
     def __init__(self, page: Page) -> None:
         self.page = page
@@ -117,7 +121,7 @@ class Phone:
         self.stutter_s = 0.0
         self._handled: list[Locator] = []
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("console", lambda said: self.complaints.append(words_of(said)) if is_complaint(said) else None)
+        page.on("console", lambda message: self.complaints.append(words_of(message)) if is_complaint(message) else None)
 
     @property
     def slack_s(self) -> float:
@@ -185,7 +189,7 @@ class Phone:
         self._handled.append(acknowledge)
 
     async def release_the_car(self) -> None:
-        """Presses the key and confirms it, and again where the page says that it came too late: a busy machine is."""
+        """Presses the key and confirms it, and again where the page shows that it came too late: a busy machine is."""
         async with asyncio.timeout(60):
             while await self.f("release").is_visible():
                 with contextlib.suppress(PlaywrightError):  # it goes where the press before was carried out
@@ -203,7 +207,7 @@ class Phone:
     async def press_toggle(self, key: Locator) -> None:
         """Presses a key that can be on or off, where it lies now.
 
-        A test's own tap that meets another element scrolls on to find the key, and so leaves the tab: it is not asked
+        A test's own tap that meets another element scrolls on to find the key, and so leaves the tab: it is not called
         to. What pushes the key away under the finger is a banner that comes or goes.
         """
         other = {"true": "false", "false": "true"}[str(await key.get_attribute("aria-pressed"))]
@@ -225,14 +229,14 @@ LOST = re.compile(
     r"Service Worker registration blocked|WebSocket connection to"
     r"|Failed to load resource: net::ERR_(CONNECTION|EMPTY|CONTENT_LENGTH|SOCKET_NOT_CONNECTED)|ERR_CONNECTION"
     r"|404 \(Not Found\) \S+[?&]replay="  # of a connection that another one replaced
-    r"|The page now draws the scan itself"  # on a machine that lets its thread wait; test_scan.py asks for it
-    # A web node that has not heard the agent yet, where the port of one process would not be listened at yet:
+    r"|The page now draws the scan itself"  # on a machine that lets its thread wait; test_scan.py provokes it
+    # A web node that has not received from the agent yet, where the port of one process would not be listened at yet:
     + (r"|the server responded with a status of 503" if IS_PARTED else "")
 )
 
 
 async def new_phone(browser: Browser, **more: Any) -> Phone:
-    """A phone of its own; `more` are options of its browser. Whoever asks for it closes its context."""
+    """A phone of its own; `more` are options of its browser. The caller closes its context."""
     return await phone_in(await browser.new_context(**PHONE | more))
 
 
@@ -243,7 +247,7 @@ async def phone_in(context: BrowserContext) -> Phone:
 
 @pytest_asyncio.fixture(loop_scope="session", scope="session")
 async def kept_phones(browser: Browser) -> AsyncIterator[list[Phone]]:
-    """The phone that one test hands on to the next, once there is one."""
+    """The phone that one test passes on to the next, once there is one."""
     phones: list[Phone] = []
     yield phones
     for phone in phones:
@@ -309,7 +313,7 @@ async def phone(browser: Browser, kept_phones: list[Phone], request: pytest.Fixt
     machine.cancel()
     if request.node.stash.get(FAILED, False):
         await picture(phone, request.node.name)
-    complaints = [said for said in phone.complaints if not LOST.search(said)]
+    complaints = [line for line in phone.complaints if not LOST.search(line)]
     if is_own or complaints:
         await phone.page.context.close()
     else:

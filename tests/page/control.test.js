@@ -1,4 +1,4 @@
-// What a page says of control, of who hears alarms, of its own phone and of the phones at the car.
+// The texts of control, of who hears alarms, of its own phone and of the phones at the car.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -13,7 +13,7 @@ const FREE = { holder: null, page: null, fence: null, former: null, requests: []
 const ANNS = { ...FREE, holder: 'Ann', page: 'page-a', fence: 7 };
 const here = (page, name, more = {}) => ({ page, name, can: true, why: null, why_text: null, here: true, awake: 'ready', vibrates: true, battery: null, charging: null, heard_s: 0.1, ...more });
 
-test('the chip says you, a name, no one, or that nobody knows', () => {
+test('the chip shows you, a name, no one, or that nobody knows', () => {
   assert.deepEqual(['page-a', 'page-b'].map((page) => chipOf(ANNS, page, false).text), ['You', 'Ann']);
   assert.equal(chipOf(FREE, 'page-a', false).text, 'No one');
   assert.equal(chipOf(FREE, '', false).is, 'free'); // a page without a name is not the holder of nothing
@@ -42,18 +42,18 @@ test('how many hear alarms', () => {
   assert.equal(reachOf(null).isBad, false);
 });
 
-test('what happened to control is told to whom it concerns', () => {
+test('what happened to control is announced to whom it concerns', () => {
   const event = (act, page, before_page, by_page) => ({ n: 1, at_ms: 0, alarm: null, change: 'control', text: 'So it is.', by: null, act, page, before_page, by_page });
-  const told = (...args) => ['page-a', 'page-b', 'page-c'].map((page) => noticeOf(event(...args), page)?.title ?? null);
-  assert.deepEqual(told('taken', 'page-a', null, 'page-a'), [null, 'Control was taken', 'Control was taken']);
-  assert.deepEqual(told('taken_over', 'page-b', 'page-a', 'page-b'), ['You lost control', null, 'Control changed']);
-  assert.deepEqual(told('handed_over', 'page-b', 'page-a', 'page-a'), [null, 'You are in control', 'Control changed']);
-  assert.deepEqual(told('granted', 'page-b', 'page-a', null), ['You lost control', 'You are in control', 'Control changed']);
-  assert.deepEqual(told('lapsed', null, 'page-a', null), ['You lost control', 'Nobody is in control', 'Nobody is in control']);
-  assert.deepEqual(told('returned', 'page-a', null, 'page-a'), ['You are in control again', 'Control is back', 'Control is back']);
-  assert.deepEqual(told('requested', 'page-a', null, 'page-b'), [null, null, 'Control requested']);
-  assert.deepEqual(told('kept', 'page-a', null, 'page-a'), [null, 'Control is kept', 'Control is kept']);
-  assert.deepEqual(told('released', null, 'page-a', 'page-a'), [null, 'Nobody is in control', 'Nobody is in control']);
+  const notices = (...args) => ['page-a', 'page-b', 'page-c'].map((page) => noticeOf(event(...args), page)?.title ?? null);
+  assert.deepEqual(notices('taken', 'page-a', null, 'page-a'), [null, 'Control was taken', 'Control was taken']);
+  assert.deepEqual(notices('taken_over', 'page-b', 'page-a', 'page-b'), ['You lost control', null, 'Control changed']);
+  assert.deepEqual(notices('handed_over', 'page-b', 'page-a', 'page-a'), [null, 'You are in control', 'Control changed']);
+  assert.deepEqual(notices('granted', 'page-b', 'page-a', null), ['You lost control', 'You are in control', 'Control changed']);
+  assert.deepEqual(notices('lapsed', null, 'page-a', null), ['You lost control', 'Nobody is in control', 'Nobody is in control']);
+  assert.deepEqual(notices('returned', 'page-a', null, 'page-a'), ['You are in control again', 'Control is back', 'Control is back']);
+  assert.deepEqual(notices('requested', 'page-a', null, 'page-b'), [null, null, 'Control requested']);
+  assert.deepEqual(notices('kept', 'page-a', null, 'page-a'), [null, 'Control is kept', 'Control is kept']);
+  assert.deepEqual(notices('released', null, 'page-a', 'page-a'), [null, 'Nobody is in control', 'Nobody is in control']);
   assert.equal(noticeOf(event('lapsed', null, 'page-a', null), 'page-b')?.offers, 'take');
   assert.equal(noticeOf(event('taken_over', 'page-b', 'page-a', 'page-b'), 'page-a')?.offers, 'request');
 });
@@ -73,23 +73,23 @@ test('the sheet offers what can be done from here', () => {
 });
 
 test('only the holder answers a request, the oldest first', () => {
-  const asked = { ...ANNS, requests: [{ page: 'page-b', name: 'Ben', left_s: 3 }, { page: 'page-c', name: 'Cem', left_s: 8 }] };
-  assert.equal(askedOf(asked, 'page-a')?.name, 'Ben');
-  assert.equal(askedOf(asked, 'page-b'), null);
+  const contested = { ...ANNS, requests: [{ page: 'page-b', name: 'Ben', left_s: 3 }, { page: 'page-c', name: 'Cem', left_s: 8 }] };
+  assert.equal(askedOf(contested, 'page-a')?.name, 'Ben');
+  assert.equal(askedOf(contested, 'page-b'), null);
   assert.equal(askedOf(ANNS, 'page-a'), null);
   assert.equal(askedOf(null, 'page-a'), null);
   assert.deepEqual([0, 0.1, 9.9, -1].map(seconds), ['0 s', '1 s', '10 s', '0 s']);
 });
 
-const PHONE = { sound: 'ready', screen: 'ready', position: 'ready', positionSays: '', rides: false, vibrates: true, battery: 0.6, charging: false, isOnline: true, network: 'wifi', lag_s: 0.1, isApple: false, isSecure: true, isReplaying: false };
-const tags = (more) => Object.fromEntries(rowsOf({ ...PHONE, ...more }).map((row) => [row.what, [row.tag, row.kind, row.says]]));
+const PHONE = { sound: 'ready', screen: 'ready', position: 'ready', positionSays: '', isInCar: false, vibrates: true, battery: 0.6, charging: false, isOnline: true, network: 'wifi', lag_s: 0.1, isApple: false, isSecure: true, isReplaying: false };
+const tags = (more) => Object.fromEntries(rowsOf({ ...PHONE, ...more }).map((row) => [row.what, [row.tag, row.kind, row.text]]));
 
-test('a phone that is armed says so', () => {
+test('a phone that is armed is shown as ready', () => {
   assert.equal(verdictOf(PHONE).can, true);
   assert.ok(rowsOf(PHONE).every((row) => row.kind === 'plain'));
 });
 
-test('each thing that keeps a phone from alarming has its own words', () => {
+test('each thing that keeps a phone from alarming has its own text', () => {
   const why = (more) => verdictOf({ ...PHONE, ...more }).text;
   assert.match(why({ sound: 'interrupted' }), /a call or another app uses the sound/);
   assert.match(why({ sound: 'asks' }), /the page was not touched yet/);
@@ -100,7 +100,7 @@ test('each thing that keeps a phone from alarming has its own words', () => {
   assert.match(why({ isReplaying: true }), /shows a recording/);
 });
 
-test('what an iPhone lacks is said as such', () => {
+test('what an iPhone lacks is named as such', () => {
   const found = tags({ isApple: true, vibrates: false, battery: null, charging: null, screen: 'missing' });
   assert.equal(found['Vibration'][2], 'On an iPhone no page can vibrate.');
   assert.equal(found['Battery'][2], 'An iPhone does not show its battery level to pages. Check it yourself.');
@@ -115,7 +115,7 @@ test('battery, network and position: low, far and missing', () => {
   assert.deepEqual(tags({ lag_s: 1.5 })['Network'].slice(0, 2), ['Slow', 'warn']);
   assert.match(tags({ network: 'cellular' })['Network'][2], /join the car’s Wi-Fi/);
   assert.match(tags({ position: 'missing', isSecure: false })['Position'][2], /needs HTTPS/);
-  assert.match(tags({ positionSays: 'The phone finds no position.', rides: true })['Position'][2], /finds no position\. This device is in the car\./);
+  assert.match(tags({ positionSays: 'The phone finds no position.', isInCar: true })['Position'][2], /finds no position\. This device is in the car\./);
   assert.match(tags({ screen: 'missing', isSecure: false })['Screen stays awake'][2], /needs HTTPS/);
 });
 
@@ -128,10 +128,10 @@ test('which phones are iPhones', () => {
 
 const at = (id, more = {}) => ({ id, label: `phone ${id}`, handheld: true, lat_deg: 32.23, lon_deg: -110.95, accuracy_m: 5, sigma_m: 3.3, alt_m: null, speed_mps: null, heading_deg: null, at_ms: 0, age_s: 0.5, used: true, why: null, why_text: null, compared: false, chosen: false, ...more });
 
-test('each phone in its own words', () => {
-  assert.deepEqual(phoneRow(at('aaaa', { chosen: true, compared: true }), 0.1, 'aaaa'), { id: 'aaaa', name: 'You', says: 'Accurate to 5 m, 0.6 s ago.', tag: 'In the car', isChosen: true });
+test('each phone with its own text', () => {
+  assert.deepEqual(phoneRow(at('aaaa', { chosen: true, compared: true }), 0.1, 'aaaa'), { id: 'aaaa', name: 'You', text: 'Accurate to 5 m, 0.6 s ago.', tag: 'In the car', isChosen: true });
   const denied = phoneRow(at('bbbb', { used: false, why: 'denied', why_text: 'Location permission denied on this phone', age_s: null, accuracy_m: null }), 0, 'aaaa');
-  assert.deepEqual([denied.name, denied.says, denied.tag], ['phone bbbb', 'Location permission denied on this phone.', '']);
+  assert.deepEqual([denied.name, denied.text, denied.tag], ['phone bbbb', 'Location permission denied on this phone.', '']);
   assert.equal(nameOf(at('cccc', { label: null }), 'aaaa'), 'A phone');
 });
 
@@ -159,9 +159,9 @@ test('among several the phone that is compared has its own name too', () => {
   assert.equal(label(2, 'bbbb'), 'You ±5 m');
 });
 
-test('a device shows the key by which agents know it, where any asks for it', () => {
+test('a device shows the key by which agents know it, where any requires a signature', () => {
   /** @type {any} */
-  const facts = { sound: 'ready', screen: 'ready', position: 'ready', positionSays: '', rides: false, vibrates: true, battery: 1, charging: true, isOnline: true, network: '', lag_s: 0, isApple: false, isSecure: true, isReplaying: false };
+  const facts = { sound: 'ready', screen: 'ready', position: 'ready', positionSays: '', isInCar: false, vibrates: true, battery: 1, charging: true, isOnline: true, network: '', lag_s: 0, isApple: false, isSecure: true, isReplaying: false };
   const rows = (/** @type {string | null} */ key) => rowsOf({ ...facts, key }).filter(({ what }) => what === 'Signed orders').map(({ tag, kind }) => [tag, kind]);
   assert.deepEqual([rows(null), rows(''), rows('k4f2a91c3000')], [[], [['Not available', 'warn']], [['4f2a91c3', 'plain']]]);
 });

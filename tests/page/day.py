@@ -163,7 +163,7 @@ async def held(phone: Phone, key: Locator, for_s: float) -> float:
 
 
 async def read_back(sheet: Locator) -> None:
-    """Says and presses line after line of a hand-over, until there is none left."""
+    """Reads and presses line after line of a hand-over, until there is none left."""
     following = sheet.locator(".tick[data-next]")
     until_s = time.monotonic() + 30
     while not await sheet.get_by_text("all lines are read back").count():

@@ -1,4 +1,4 @@
-// The departure check, in words and places.
+// The texts and places of the departure check.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -59,7 +59,7 @@ test('the list as it is edited', () => {
   assert.ok(!isSame(rows, moved(rows, 'b', -1)), 'another order is another list');
 });
 
-test('its state in a few words', () => {
+test('its state in short', () => {
   assert.equal(stateWords(undefined), 'Departure check: not begun');
   assert.equal(stateWords(check([DONE, CLOCK])), 'Departure check: 1 of 2, 1 failed');
   assert.equal(stateWords(check([DONE], { state: 'signed', by: 'A. K. (Pixel)' })), 'Departure check: signed by A. K. (Pixel)');

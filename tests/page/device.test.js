@@ -16,7 +16,7 @@ const AGENTS = /** @type {const} */ ([
   ['', 'Browser'],
 ]);
 
-test('the kind of device is told by its user agent', () => {
+test('the kind of device is known by its user agent', () => {
   for (const [agent, kind] of AGENTS) assert.equal(kindOf(agent), kind === 'Mobile' ? 'Android phone' : kind);
 });
 

@@ -45,7 +45,7 @@ test('a value is found at the cursor, and none across a gap', () => {
   assert.deepEqual(foundAt(trend([1]), BUCKETS, 99), { kind: 'unknown' });
 });
 
-test('what is found in words, with its sign and both ends of a bucket', () => {
+test('the found value as text, with its sign and both ends of a bucket', () => {
   assert.equal(foundWords({ kind: 'value', low: 3.04, high: 3.04 }, specFor('speed', undefined)), '3.0');
   assert.equal(foundWords({ kind: 'value', low: -4, high: 2 }, specFor('steering', undefined)), '−4 to +2');
   assert.equal(foundWords({ kind: 'none' }, specFor('distance', undefined)), 'none in range');
@@ -134,19 +134,19 @@ test('the chart of a replay stays where the moment is, and turns to it when it l
   assert.deepEqual(scope.view, [0, 100]);
 });
 
-test('what is not live, or not all of it, is said', () => {
+test('what is not live, or not all of it, is shown', () => {
   const answer = /** @type {any} */ ({ start_ms: new Date(2026, 10, 19, 14).getTime(), known_s: 90, length_s: 90, is_sketch: false, signals: {}, offered: {} });
-  const words = (/** @type {any} */ feed, /** @type {boolean} */ follows, /** @type {boolean} */ isReplay) => stateWords({ answer, isLate: false, ...feed }, [0, 60], follows, isReplay);
-  assert.equal(words({}, true, false), '');
-  assert.equal(words({}, false, false), 'Held at 14:01:00: not live');
-  assert.equal(words({ isLate: true }, true, false), 'No answer since 14:01:30');
-  assert.equal(words({ isLate: true }, false, true), '');
-  assert.equal(words({ answer: { ...answer, length_s: 900 } }, true, true), 'Read up to 14:01:30');
-  assert.match(words({ answer: { ...answer, is_sketch: true } }, true, true), /^Sketch/);
-  assert.equal(words({ answer: null }, true, false), 'Loading…');
+  const text = (/** @type {any} */ feed, /** @type {boolean} */ follows, /** @type {boolean} */ isReplay) => stateWords({ answer, isLate: false, ...feed }, [0, 60], follows, isReplay);
+  assert.equal(text({}, true, false), '');
+  assert.equal(text({}, false, false), 'Held at 14:01:00: not live');
+  assert.equal(text({ isLate: true }, true, false), 'No answer since 14:01:30');
+  assert.equal(text({ isLate: true }, false, true), '');
+  assert.equal(text({ answer: { ...answer, length_s: 900 } }, true, true), 'Read up to 14:01:30');
+  assert.match(text({ answer: { ...answer, is_sketch: true } }, true, true), /^Sketch/);
+  assert.equal(text({ answer: null }, true, false), 'Loading…');
 });
 
-test('an empty chart says what would fill it', () => {
+test('an empty chart shows what would fill it', () => {
   const of = (/** @type {boolean[]} */ ...has) => /** @type {any} */ ({
     signals: Object.fromEntries(has.map((_, i) => [`s${i}`, {}])), offered: Object.fromEntries(has.map((one, i) => [`s${i}`, { label: `S${i}`, unit: '', has_data: one }])),
   });

@@ -33,45 +33,45 @@ function dialled(queue) {
 /** A socket that takes it over, and dials by itself after that. */
 function wired() {
   /** @type {unknown[]} */
-  const heard = [];
+  const received = [];
   const dials = { count: 0 };
   const pageSocket = new PageSocket(
     {
-      opened: () => heard.push('open'), closed: () => heard.push('closed'),
-      text: (text, at_ms) => heard.push([text, at_ms]), bytes: (bytes) => heard.push(bytes.byteLength),
+      opened: () => received.push('open'), closed: () => received.push('closed'),
+      text: (text, at_ms) => received.push([text, at_ms]), bytes: (bytes) => received.push(bytes.byteLength),
     },
     () => {
       dials.count += 1;
       return takeEarly() ?? /** @type {any} */ (new Socket());
     },
   );
-  return { pageSocket, heard, dials };
+  return { pageSocket, received, dials };
 }
 
-test('what came before the script is heard first, in its order and with the moment when it came', async () => {
+test('what came before the script is delivered first, in its order and with the moment when it came', async () => {
   const { early, socket } = dialled([
     { type: 'open', at_ms: 10 }, { type: 'message', data: 'hello', at_ms: 20 }, { type: 'message', data: new ArrayBuffer(3), at_ms: 30 },
   ]);
-  const { pageSocket, heard } = wired();
+  const { pageSocket, received } = wired();
   pageSocket.look(100);
-  assert.deepEqual(heard, []); // whoever dials hears nothing before it listens
+  assert.deepEqual(received, []); // nothing is delivered before there is a listener
   await Promise.resolve();
   early.handle?.({ type: 'message', data: 'later', at_ms: 110 });
-  assert.deepEqual(heard, ['open', ['hello', 20], 3, ['later', 110]]);
+  assert.deepEqual(received, ['open', ['hello', 20], 3, ['later', 110]]);
   assert.equal(pageSocket.send({ kind: 'hello' }), true);
   assert.deepEqual(socket.sent, ['{"kind":"hello"}']);
 });
 
 test('one that opens after it was taken over is as any other', async () => {
   const { early } = dialled([]);
-  const { pageSocket, heard } = wired();
+  const { pageSocket, received } = wired();
   pageSocket.look(0);
   await Promise.resolve();
   assert.equal(pageSocket.send({}), false);
   early.handle?.({ type: 'open', at_ms: 5 });
   early.handle?.({ type: 'message', data: 'hello', at_ms: 6 });
   early.handle?.({ type: 'close', at_ms: 7 });
-  assert.deepEqual(heard, ['open', ['hello', 6], 'closed']);
+  assert.deepEqual(received, ['open', ['hello', 6], 'closed']);
 });
 
 test('one that failed is not taken over, and none is taken twice', () => {

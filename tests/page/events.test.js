@@ -14,14 +14,14 @@ test('each event exactly once and in order, whatever is sent again', () => {
   assert.equal(log.last, 3);
 });
 
-test('a page that begins asks for a little of the past and announces none of it', () => {
+test('a page that begins requests a little of the past and announces none of it', () => {
   const log = new EventLog();
   assert.equal(log.greet(hello('a', 117), 0, 0), 67);
   log.take([event(68), event(117)]);
   assert.equal(log.caughtUp(), null);
 });
 
-test('after a gap the page says what happened meanwhile, once', () => {
+test('after a gap the page announces what happened meanwhile, once', () => {
   const log = new EventLog();
   log.greet(hello('a', 0), 0, 0);
   log.take([event(1)]);
@@ -48,7 +48,7 @@ test('a blind time goes on over a connection that broke before its events came',
   assert.deepEqual(log.caughtUp(), { blind_s: 60, raised: 2, cleared: 1, at_ms: 70 });
 });
 
-test('a short flicker is no gap, and a quiet gap says so', () => {
+test('a short flicker is no gap, and a quiet gap is shown as one', () => {
   const log = new EventLog();
   log.greet(hello('a', 3), 0, 0);
   log.take([event(3)]);
@@ -59,7 +59,7 @@ test('a short flicker is no gap, and a quiet gap says so', () => {
   assert.equal(gap && gapWords(gap), 'No data for 8 s; no alarm began or ended');
 });
 
-test('a server of before that counts afresh is heard from its first event on', () => {
+test('a server of before that counts afresh is read from its first event on', () => {
   const log = new EventLog();
   log.greet(hello('a', 117, false), 0, 0);
   log.take([event(117)]);

@@ -30,7 +30,7 @@ test('sizes have three figures at most and a unit that fits', () => {
     [0, '0 B'], [-5, '0 B'], [940, '940 B'], [1500, '1.5 kB'], [18_400, '18 kB'], [999_400, '999 kB'], [999_600, '1.0 MB'], [18_600_000, '18.6 MB'], [138_000_000, '138 MB'],
     [1_900_000_000, '1.9 GB'], [41_000_000_000, '41.0 GB'], [2_500_000_000_000, '2.5 TB'], [null, '–'],
   ]);
-  for (const [bytes, words] of cases) assert.equal(sizeWords(bytes), words);
+  for (const [bytes, text] of cases) assert.equal(sizeWords(bytes), text);
 });
 
 test('lengths and distances', () => {
@@ -80,7 +80,7 @@ test('the facts in one sentence, and what is unknown as unknown', () => {
   assert.deepEqual(warningWords(row()), []);
 });
 
-test('what is asked of the server', () => {
+test('the query to the server', () => {
   const query = (/** @type {string} */ choice, text = '') => Object.fromEntries(new URLSearchParams(queryOf({ text, choice: choiceOf(choice), limit: 50 }, NOW)));
   assert.deepEqual(query('all', '  wet  '), { limit: '50', text: 'wet' });
   assert.deepEqual(query('vehicle:a:b&c'), { limit: '50', vehicle: 'a:b&c' });

@@ -30,17 +30,17 @@ test('who was not taken in time comes first, then the least time left, then what
     warned: needy({ escalates_ms: null }, { priority: 'warning' }),
   }));
   assert.deepEqual(order.map(({ name }) => name), ['up', 'soon', 'later', 'gone', 'asked', 'warned', 'acked', 'mine']);
-  const said = Object.fromEntries(order.map((one) => [one.name, `${one.who.text} | ${one.next} | ${keysOf(one)}`]));
-  assert.equal(said['up'], 'unassigned | at Supervisor for 0:11 | Take it,Hand over');
-  assert.equal(said['soon'], 'unassigned | Supervisor in 0:04 | Take it,Hand over');
-  assert.equal(said['mine'], 'assigned to you | no timer | Open,Hand over,Release');
-  assert.equal(said['asked'], 'Desk 2 asks you to take over | asked for 0:00 | Accept,Decline');
-  assert.equal(said['acked'], 'assigned to Desk 2, acknowledged | no timer | Take over');
+  const texts = Object.fromEntries(order.map((one) => [one.name, `${one.who.text} | ${one.next} | ${keysOf(one)}`]));
+  assert.equal(texts['up'], 'unassigned | at Supervisor for 0:11 | Take it,Hand over');
+  assert.equal(texts['soon'], 'unassigned | Supervisor in 0:04 | Take it,Hand over');
+  assert.equal(texts['mine'], 'assigned to you | no timer | Open,Hand over,Release');
+  assert.equal(texts['asked'], 'offered to you by Desk 2 | offered for 0:00 | Accept,Decline');
+  assert.equal(texts['acked'], 'assigned to Desk 2, acknowledged | no timer | Take over');
   assert.equal(order.find(({ name }) => name === 'gone')?.title, 'No data: car may be moving');
   assert.equal(headOf(order, order.length), '8 · 4 unassigned');
 });
 
-test('a car that is off on purpose is in no count and sounds nothing, and says who said so', () => {
+test('a car that is off on purpose is in no count and sounds nothing, and shows who set it', () => {
   const of = seen({ a: undefined, b: undefined }, { kept: new Map([['a', { summary: summary(), at_ms: 0 }], ['b', { summary: summary(), at_ms: 0 }]]) });
   const [a, b] = of.cars.cars;
   Object.assign(a, { trouble: 'The agent of a does not answer.', age_s: 41 });
@@ -48,12 +48,12 @@ test('a car that is off on purpose is in no count and sounds nothing, and says w
   const [lost, off] = itemsOf(of);
   assert.deepEqual([lost?.name, lost && keysOf(lost), lost?.sound], ['a', 'Open,Silence,It is off', 'high']);
   assert.deepEqual([off?.isOff, off && keysOf(off), off?.sound, off?.since_s, off?.kind], [true, 'Not off', 'none', 60, '']);
-  assert.match(off?.who.text ?? '', /^said by Ann at /);
+  assert.match(off?.who.text ?? '', /^set by Ann at /);
   const row = carRows(of, ['a'], false).find(({ name }) => name === 'b');
   assert.deepEqual([row?.text, row?.kind, row?.isLost, row?.isAsking], ['Off on purpose', '', false, false]);
 });
 
-test('what somebody acknowledged who is off duty is asked for like what nobody has', (t) => {
+test('what somebody acknowledged who is off duty needs an answer like what nobody has', (t) => {
   t.mock.timers.enable({ apis: ['Date'], now: NOW });
   const unowned = { count: 1, by: 'A. K. (Pixel)', since_ms: NOW - 60_000 };
   const acked = (/** @type {any} */ more) => summary({ worst: worst({ state: 'ACKED', priority: 'warning' }), attention: item({ escalates_ms: null }), ...more });
@@ -85,13 +85,13 @@ test('the length of a timer is what was left of it when it began', () => {
 test('an offer of mine can be withdrawn, and a car whose agent states no item is only opened', () => {
   const offered = { by: 'Me', name: 'Desk 2', page: 'desk2', since_ms: NOW - 3000 };
   const [one] = itemsOf(seen({ a: needy({ assigned: person('me'), offered, escalates_ms: null }) }));
-  assert.equal(`${one?.who.text} | ${keysOf(one)}`, 'assigned to you. Desk 2 is asked | Open,Withdraw');
+  assert.equal(`${one?.who.text} | ${keysOf(one)}`, 'assigned to you, offered to Desk 2 | Open,Withdraw');
   const { attention, ...old } = needy();
   assert.equal(keysOf(itemsOf(seen({ a: old }))[0]), 'Open');
   assert.deepEqual(itemsOf(seen({ a: summary({ attention: undefined }) })), []);
 });
 
-test('a car that never sent data is listed, and asks for nobody', () => {
+test('a car that never sent data is listed, and needs nobody', () => {
   const all = seen({ a: undefined, b: summary() });
   assert.deepEqual(itemsOf(all), []);
   const rows = carRows(all, [], false);
@@ -140,8 +140,8 @@ test('over ten cars with one cause are one item and one row, and unfold', () => 
 });
 
 test('in a flood a question to this page stays apart, old alarms do not count, and what I took is a group of mine', () => {
-  const asked = needy({ assigned: person('other'), offered: { by: 'Desk 2', name: 'Me', page: 'me', since_ms: NOW }, escalates_ms: null });
-  assert.equal(grouped(itemsOf(seen({ ...flooded(12), asked })), new Set()).items.length, 2);
+  const offered = needy({ assigned: person('other'), offered: { by: 'Desk 2', name: 'Me', page: 'me', since_ms: NOW }, escalates_ms: null });
+  assert.equal(grouped(itemsOf(seen({ ...flooded(12), offered })), new Set()).items.length, 2);
   const old = flooded(12);
   for (const one of Object.values(old)) /** @type {any} */ (one).worst.raised_ms = NOW - 601_000;
   assert.equal(grouped(itemsOf(seen(old)), new Set()).items.length, 12);
@@ -149,7 +149,7 @@ test('in a flood a question to this page stays apart, old alarms do not count, a
   assert.deepEqual(mine.map(keysOf), ['Release all,Show 12']);
 });
 
-test('a row says what is known, and nothing of before as if it were now', () => {
+test('a row shows what is known, and nothing of before as if it were now', () => {
   const [calm] = carRows(seen({ a: summary() }), [], false);
   assert.deepEqual([calm?.text, calm?.mode, calm?.operator, calm?.age, calm?.energy.text, calm?.isQuiet], ['–', 'driving', 'No one', '0.2', '64', true]);
   const standing = summary({ speed: { value_mps: 0.02, freshness: 'fresh', age_s: 0.1, horizon_s: 1 } });
@@ -166,7 +166,7 @@ test('rows stand in the order of the queue, then by name as people count', () =>
   assert.ok(natural('C2', 'C10') < 0);
 });
 
-test('nothing needs a person is said only of cars that are monitored', () => {
+test('nothing needs a person is shown only of cars that are monitored', () => {
   const line = (/** @type {any} */ cars) => lineOf([], [], 0, carRows(seen(cars), [], false));
   assert.deepEqual([line({ a: summary() }).text, line({ a: summary() }).icon, line({ a: summary() }).end], ['Nothing needs a person', 'ok', '']);
   assert.deepEqual([line({ a: summary(), b: summary({ phase: 'idle' }) }).icon, line({ a: summary(), b: summary({ paused: true }) }).end], ['unknown', '1 of 2 not monitored']);
@@ -177,7 +177,7 @@ test('each car has one place in the grid, named by its number where that tells i
   assert.deepEqual(labelsOf(['C01', 'C02']), ['01', '02']);
   assert.deepEqual(labelsOf(['Ocelot', 'C02']), ['Ocelot', 'C02']);
   const rows = carRows(seen({ b: null, a: needy(), c: summary() }), ['a', 'b'], false);
-  assert.deepEqual(placesOf(rows).map(({ name, kind, says }) => `${name} ${kind} ${says}`), ['a crit a, Speed above limit', 'b lost b, no data', 'c  c, driving']);
+  assert.deepEqual(placesOf(rows).map(({ name, kind, title }) => `${name} ${kind} ${title}`), ['a crit a, Speed above limit', 'b lost b, no data', 'c  c, driving']);
 });
 
 test('a range names a row of numbers, else the first few', () => {

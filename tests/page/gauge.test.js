@@ -30,7 +30,7 @@ test('any scale has a readable number of ticks and its own end', () => {
   }
 });
 
-test('the words of the limit stay inside the picture', () => {
+test('the label of the limit stays inside the picture', () => {
   for (let limit_mps = 0.5; limit_mps <= 20; limit_mps += 0.25) {
     const { limit } = faceOf({ speed_max: 15, acceleration_max_mps2: 3, limit: limit_mps });
     assert.ok(limit && limit.y >= 14 && limit.y <= 61 && limit.x >= 2 && limit.x <= 378, JSON.stringify(limit));
@@ -41,9 +41,9 @@ test('the words of the limit stay inside the picture', () => {
 });
 
 test('a scale in km/h or mph reads as round numbers, its odd end to one decimal', () => {
-  const words = (/** @type {number} */ max) => faceOf({ speed_max: max, acceleration_max_mps2: 3, limit: null }).labels.slice(0, -2).map(({ text }) => text);
-  assert.deepEqual(words(54), ['0', '25', '54']); // 50 would stand on the end of the acceleration
-  assert.deepEqual(words(33.554), ['0', '10', '20', '33.6']);
+  const labels = (/** @type {number} */ max) => faceOf({ speed_max: max, acceleration_max_mps2: 3, limit: null }).labels.slice(0, -2).map(({ text }) => text);
+  assert.deepEqual(labels(54), ['0', '25', '54']); // 50 would stand on the end of the acceleration
+  assert.deepEqual(labels(33.554), ['0', '10', '20', '33.6']);
   for (let max = 1; max <= 216; max += 0.7) {
     const { labels } = faceOf({ speed_max: max, acceleration_max_mps2: 3, limit: null });
     for (const [i, one] of labels.entries()) {

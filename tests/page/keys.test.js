@@ -13,13 +13,13 @@ test('each key is declared once, and none orders a slow-down', () => {
   assert.deepEqual(KEYS.filter(({ act, does }) => /slow|order|arm/.test(`${act} ${does.replace('alarm', '')}`)), []);
 });
 
-test('a key asks for what is declared, in either case', () => {
+test('a key has its declared action, in either case', () => {
   assert.equal(keyOf(pressed('a'), free)?.act, 'acknowledge');
   assert.equal(keyOf(pressed('S'), free)?.act, 'silence');
   assert.equal(keyOf(pressed('3'), free)?.act, 'tab');
   assert.equal(keyOf(pressed('?'), free)?.act, 'help');
   assert.equal(keyOf(pressed('x'), free), null);
-  assert.equal(keyOf(pressed(' '), free), null, 'the replay obeys it itself');
+  assert.equal(keyOf(pressed(' '), free), null, 'the replay handles it itself');
 });
 
 test('no key acts while something else has it, held down, with a modifier, or turned off', () => {
@@ -30,7 +30,7 @@ test('no key acts while something else has it, held down, with a modifier, or tu
   }
 });
 
-test('the key of a shutter marks on a phone, and is the loudness of a desk', () => {
+test('the key of a shutter marks on a phone, and is the loudness of a desktop', () => {
   assert.equal(keyOf(pressed('AudioVolumeUp'), { ...free, isTouch: true })?.act, 'mark');
   assert.equal(keyOf(pressed('AudioVolumeUp'), free), null);
   assert.equal(keyOf(pressed('m'), free)?.act, 'mark');

@@ -55,7 +55,7 @@ function tabOf(answers) {
 
 const settled = () => new Promise((resolve) => { setImmediate(resolve); });
 
-test('a tab is fetched once, when it first comes to the front, and told of every change after that', async () => {
+test('a tab is fetched once, when it first comes to the front, and notified of every change after that', async () => {
   const { tab, seen } = tabOf([async () => 'module']);
   tab.look();
   assert.equal(seen.fetched, 0);
@@ -69,7 +69,7 @@ test('a tab is fetched once, when it first comes to the front, and told of every
   assert.deepEqual([seen.fetched, seen.looks], [1, 1]); // behind, a scan is not sent any more
 });
 
-test('a tab that cannot be fetched says so, and is fetched again when it is opened again', async (t) => {
+test('a tab that cannot be fetched shows it, and is fetched again when it is opened again', async (t) => {
   t.mock.method(console, 'warn', () => {});
   const { tab, seen, fields } = tabOf([() => Promise.reject(new Error('gone')), async () => 'module']);
   seen.isShown = true;

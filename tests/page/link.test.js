@@ -11,7 +11,7 @@ test('live: every node answers, and the age is the car’s at the glass', () => 
   assert.ok(chain.nodes.every((node) => node.isKnown && !node.isBad));
 });
 
-test('a weak radio is said, whether it is live or not', () => {
+test('a weak radio is shown, whether it is live or not', () => {
   const trip = { mean_ms: 900, spread_ms: 100 };
   const live = chainOf({ ...now, frame: state(), trip });
   assert.deepEqual([live.word, live.isWeak, live.detail], ['Live', true, 'Weak radio: an answer takes 0.9 s.']);
@@ -20,7 +20,7 @@ test('a weak radio is said, whether it is live or not', () => {
   assert.equal(chainOf({ ...now, frame: state(), trip: { mean_ms: 160, spread_ms: 20 } }).isWeak, undefined);
 });
 
-test('each silence is said of the part that fell silent', () => {
+test('each silence is assigned to the part that fell silent', () => {
   const server = chainOf({ ...now, frame: state(), isSilent: true, silence_s: 3.4 });
   assert.deepEqual([server.word, server.cut, server.sentence, server.nodes[1]?.mark], ['Lost', 0, 'The server fell silent.', 'silent 3.4 s']);
   assert.deepEqual(server.nodes.map((node) => node.isKnown), [true, false, false, false]);
@@ -41,7 +41,7 @@ test('a server that answers and has nothing of the car accuses what is between',
   assert.equal(chainOf({ ...now, frame: state(), unserved: 'It was not heard.' }).word, 'Live', 'what came since is newer');
 });
 
-test('the words of the server’s problem are used where it has any', () => {
+test('the text of the server’s problem is used where it has any', () => {
   const problem = { code: 'refused', title: 'Nothing listens.', hint: 'Start it.', mark: 'refused' };
   const chain = chainOf({ ...now, frame: state({ session: { phase: 'failed' }, link: { cut: 'server-bridge', problem } }) });
   assert.deepEqual([chain.cut, chain.sentence, chain.detail, chain.nodes[2]?.mark], [1, 'Nothing listens.', 'Start it.', 'refused']);

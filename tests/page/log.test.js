@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { heldWords } from '../../static/js/shell/connect-layout.js';
-import { asked, dayWords, eventWords, joined, lowest, standingRows, tookWords } from '../../static/js/alarms/log-layout.js';
+import { filterParams, dayWords, eventWords, joined, lowest, standingRows, tookWords } from '../../static/js/alarms/log-layout.js';
 import { dialogWords, loadWords, snackWords, standingWords } from '../../static/js/alarms/standing.js';
 
 const ALARM = /** @type {any} */ ({ active: true, text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
@@ -32,7 +32,7 @@ test('what its check finds well is never the text of an alarm that stands', () =
   assert.equal(standingWords({ ...clearing, active: false, state: 'RTN_UNACKED' }), 'No GPS fix on this phone for 16 s · returned unacknowledged');
 });
 
-test('too many alarms are told in one line; what can be borne is a number only', () => {
+test('too many alarms are shown in one line; what can be borne is a number only', () => {
   const load = { in_10_min: 0, flood: false, bearable: true, chattering: [] };
   assert.equal(loadWords(load), '');
   assert.equal(loadWords({ ...load, in_10_min: 11, flood: true, bearable: false }), 'Alarm flood: 11 in 10 min');
@@ -40,7 +40,7 @@ test('too many alarms are told in one line; what can be borne is a number only',
   assert.equal(loadWords(undefined), '');
 });
 
-test('what stood when the server ended is said where a car is chosen', () => {
+test('what stood when the server ended is shown where a car is chosen', () => {
   const held = { address: 'ws://192.168.4.1:9090', alarms: 2, paused: false };
   assert.equal(heldWords(held), 'The server was restarted while it monitored 192.168.4.1:9090: 2 alarms were active. Connect to it to continue.');
   assert.match(heldWords({ ...held, alarms: 1, paused: true }), /1 alarm was active and monitoring was paused/);
@@ -66,13 +66,13 @@ test('what is here and what was fetched make one list; a blind time is never fil
   assert.equal(lowest(/** @type {any} */ ([GAP])), null);
 });
 
-test('a filter is asked of the server as the page means it', () => {
-  assert.deepEqual(asked({ kind: 'all', text: '  ' }), {});
-  assert.deepEqual(asked({ kind: 'other', text: 'a&b ' }), { alarm: '', text: 'a&b' });
-  assert.deepEqual(asked({ kind: 'advisory', text: '' }), { priority: 'advisory' });
+test('a filter becomes the query that the page means', () => {
+  assert.deepEqual(filterParams({ kind: 'all', text: '  ' }), {});
+  assert.deepEqual(filterParams({ kind: 'other', text: 'a&b ' }), { alarm: '', text: 'a&b' });
+  assert.deepEqual(filterParams({ kind: 'advisory', text: '' }), { priority: 'advisory' });
 });
 
-test('days are told as people tell them', () => {
+test('days are named as people name them', () => {
   const now_ms = new Date(2026, 10, 21, 0, 0, 5).getTime();
   const day = (/** @type {[number, number, number, number?]} */ ...at) => dayWords(new Date(at[0], at[1], at[2], at[3] ?? 12).getTime(), now_ms);
   assert.equal(day(2026, 10, 21, 0), 'Today');
@@ -106,18 +106,18 @@ test('a dialog tells how bad it was, where that is not what is measured now', ()
   const speed = (/** @type {number} */ value) => ({ label: 'Speed', value, unit: 'm/s' });
   const fast = { ...ALARM, active: true, verdict: 'fault', trip_text: ALARM.text, raised_ms: noon_ms, for_s: 3.5, advice: 'Brake.', measured: speed(12.6), limit: speed(11), worst: { ...speed(12.84), side: 'above' } };
   assert.equal(dialogWords(fast), 'Active for 3.5 s. Began 12:00:00. Highest 12.8 m/s. Brake.');
-  assert.equal(dialogWords({ ...fast, measured: speed(12.81) }), 'Active for 3.5 s. Began 12:00:00. Brake.', 'what reads the same is not said twice');
+  assert.equal(dialogWords({ ...fast, measured: speed(12.81) }), 'Active for 3.5 s. Began 12:00:00. Brake.', 'what reads the same is not written twice');
   assert.equal(dialogWords({ ...fast, active: false, measured: speed(12.84) }), 'It has returned to normal. Began 12:00:00. Highest 12.8 m/s.');
   assert.match(dialogWords({ ...fast, worst: { ...speed(3.9), side: 'below' } }), /Lowest 3\.9 m\/s\./);
 });
 
-test('what a hand-over made of an alarm is said, and one that is unacknowledged again looks like a raise', () => {
-  const words = (/** @type {string} */ change) => eventWords(event(1, { change, by: 'Ben' }));
-  assert.deepEqual([words('handed_over').icon, words('handed_over').title, words('handed_over').text], ['ok', 'Speed above limit taken over', '12.6 m/s · by Ben']);
-  assert.deepEqual([words('unacknowledged').icon, words('unacknowledged').title], ['crit', 'Speed above limit unacknowledged again']);
+test('what a hand-over made of an alarm is shown, and one that is unacknowledged again looks like a raise', () => {
+  const row = (/** @type {string} */ change) => eventWords(event(1, { change, by: 'Ben' }));
+  assert.deepEqual([row('handed_over').icon, row('handed_over').title, row('handed_over').text], ['ok', 'Speed above limit taken over', '12.6 m/s · by Ben']);
+  assert.deepEqual([row('unacknowledged').icon, row('unacknowledged').title], ['crit', 'Speed above limit unacknowledged again']);
 });
 
-test('what the log had lost says from where it is', () => {
+test('an event that the log had lost names where it is from', () => {
   const brought = { brought_from: 'car_20261128T080000Z' };
   assert.equal(eventWords(event(1, { by: 'Ben', ...brought })).text, '12.6 m/s · by Ben · brought back from car_20261128T080000Z');
   assert.equal(eventWords(event(2, { alarm: null, change: 'connected', text: 'Connected', ...brought })).text, 'brought back from car_20261128T080000Z');

@@ -1,4 +1,4 @@
-// Mail in words: addresses, sizes, states, and the link for the phone's own mail program.
+// The texts of mail: addresses, sizes, states, and the link for the phone's own mail program.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -34,14 +34,14 @@ for (const [addresses, problem] of /** @type {[string[], RegExp | null][]} */ ([
   });
 }
 
-test('the size says what becomes of it', () => {
+test('the size decides how it is sent', () => {
   assert.equal(sizeNote(4_200_000, 18, 'split'), '4.2 MB as recorded, compressed: one mail.');
   assert.match(sizeNote(18_000_001, 18, 'split'), /Above 18.0 MB it is sent as several mails, with a sentence on how to join them\.$/);
   assert.match(sizeNote(60_000_000, 18, 'link'), /^60.0 MB as recorded.*a link to this server\.$/);
   assert.match(sizeNote(null, 18, 'link'), /^It is compressed\. Above 18.0 MB it is sent as a link/);
 });
 
-for (const [name, given, word, says] of /** @type {[string, object, string, string | RegExp][]} */ ([
+for (const [name, given, label, detail] of /** @type {[string, object, string, string | RegExp][]} */ ([
   ['being made', { is_ready: false, share: 0.42 }, 'Preparing 42 %', ''],
   ['not begun', { is_ready: false }, 'Preparing', ''],
   ['due', {}, 'Queued', ''],
@@ -54,8 +54,8 @@ for (const [name, given, word, says] of /** @type {[string, object, string, stri
 ])) {
   test(`a mail that is ${name} says so`, () => {
     const found = stateOf(mail(given), NOW_MS);
-    assert.equal(found.word, word);
-    assert.equal(found.says, says);
+    assert.equal(found.label, label);
+    assert.equal(found.detail, detail);
     assert.equal(found.isBad, name === 'refused');
   });
 }
@@ -70,13 +70,13 @@ test('each state has the keys that do something', () => {
   assert.deepEqual(keysOf(mail({ state: 'cancelled' })), { cancel: null, resend: 'Send again' });
 });
 
-test('one line says what it is', () => {
+test('one line names what it is', () => {
   assert.equal(aboutOf(mail()), 'car_1 · MCAP · 4.2 MB');
   assert.equal(aboutOf(mail({ recordings: ['a', 'b'], format: 'html', way: 'link', size_bytes: null })), '2 recordings · Report · as a link');
   assert.equal(aboutOf(mail({ way: 'split', parts: [part(), part()] })), 'car_1 · MCAP · 4.2 MB · 2 parts');
 });
 
-test('who is refused is named where it is not said already', () => {
+test('who is refused is named where the reply does not name them already', () => {
   const refused = [{ address: 'b@x', state: 'refused', said: '550 no' }, { address: 'a@x', state: 'accepted', said: '' }];
   assert.deepEqual(refusedOf(mail({ to: ['a@x', 'b@x'], parts: [part({ recipients: refused }), part({ recipients: refused })] })), ['b@x: 550 no']);
   assert.deepEqual(refusedOf(mail({ to: ['a@x', 'b@x'], said: 'b@x: 550 no; 1 of 2', parts: [part({ recipients: refused })] })), []);

@@ -22,9 +22,9 @@ WATCH = """() => {
   requestAnimationFrame(note);
   window.scans = 0;
   const kept = Worker.prototype.postMessage;
-  Worker.prototype.postMessage = function (told, ...more) {
-    window.scans += told.picture ? 1 : 0;  // the next one is asked for when one is drawn
-    return kept.call(this, told, ...more);
+  Worker.prototype.postMessage = function (message, ...more) {
+    window.scans += message.picture ? 1 : 0;  // the next one is requested when one is drawn
+    return kept.call(this, message, ...more);
   };
 }"""
 
@@ -34,7 +34,7 @@ class Cost:
     """Of a time in which the page was watched."""
 
     share: float  # of the main thread: its own processor time times the throttle, so that others here do not count
-    own_share: float  # of it what the page itself asks for: scripts, style and layout, without the painting
+    own_share: float  # of it what the page itself causes: scripts, style and layout, without the painting
     wall_share: float  # with the processor really throttled, by the clock on the wall: they do
     scans_hz: float  # drawings of the plot; this and the rest with the processor throttled
     frames_hz: float

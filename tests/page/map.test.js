@@ -87,7 +87,7 @@ test('the grid is turned with the map and stays bounded', () => {
   }
 });
 
-test('the matrix of the ground says the same as a pixel', () => {
+test('the matrix of the ground agrees with a pixel', () => {
   for (const anchor of PLACES.slice(0, 3)) {
     for (const up_deg of [0, 77, 200]) {
       const now = view({ centre: placeAt(anchor, { east_m: 120, north_m: -80 }), up_deg, mpp: 0.5 });
@@ -185,7 +185,7 @@ test('a picture lies with its corners on theirs', () => {
   nearAll(put(0, 600), pixelOf(corners[2] ?? HERE, now, SIZE), 1e-6);
 });
 
-// -- what is said ------------------------------------------------------------------------------------------------------
+// -- texts ------------------------------------------------------------------------------------------------------
 
 const FIX = { lat_deg: 32.2319, lon_deg: -110.9501, status: 0, sigma_m: 5, covariance_m2: [25, 25, 0] };
 const PHONE = {
@@ -199,13 +199,13 @@ const inked = (ink, turn = 'fresh') => (/** @type {string} */ name) => ({ ink: n
 
 test('a car of now, with its ellipse', () => {
   const car = carOf(frameOf(FIX), inked('fresh'));
-  assert.deepEqual([car.isLive, car.label, car.says, car.heading_deg, car.isHeadingLive], [true, 'Car ±5 m', '', 87, true]);
+  assert.deepEqual([car.isLive, car.label, car.message, car.heading_deg, car.isHeadingLive], [true, 'Car ±5 m', '', 87, true]);
   assert.equal(carOf(frameOf({ ...FIX, covariance_m2: [100, 17.64, 0] }), inked('ageing')).label, 'Car ±10 m');
   assert.equal(carOf(frameOf({ ...FIX, covariance_m2: null, sigma_m: 4.2 }), inked('fresh')).label, 'Car ±4.2 m');
 });
 
-test('a car that is not known to be there is never shown as live, and why is said', () => {
-  for (const [value, ink, words] of /** @type {[any, string, RegExp][]} */ ([
+test('a car that is not known to be there is never shown as live, and the reason is shown', () => {
+  for (const [value, ink, text] of /** @type {[any, string, RegExp][]} */ ([
     [FIX, 'stale', /^The car’s position is 3\.4 s old: the car may be elsewhere\.$/],
     [null, 'never', /^No position received/],
     [null, 'no_value', /^The car’s messages hold no usable position\.$/],
@@ -215,33 +215,33 @@ test('a car that is not known to be there is never shown as live, and why is sai
   ])) {
     const car = carOf(frameOf(value), inked(ink));
     assert.equal(car.isLive, false);
-    assert.match(car.says, words);
+    assert.match(car.message, text);
   }
   assert.deepEqual(carOf(frameOf(FIX), inked('stale')).label, 'Car STALE 3.4 s');
   assert.equal(carOf(frameOf({ ...FIX, status: -1 }), inked('fresh')).place, null); // coordinates without a fix are none
 });
 
-test('unknown quality and unknown heading are said and drawn as that', () => {
+test('unknown quality and unknown heading are named and drawn as that', () => {
   const car = carOf(frameOf({ ...FIX, sigma_m: null, covariance_m2: null }, null, null), inked('fresh', 'not_published'));
   assert.deepEqual([car.ellipse, car.label, car.heading_deg], [null, 'Car, accuracy and heading unknown', null]);
   const standing = carOf(frameOf(FIX), inked('fresh', 'stale'));
   assert.deepEqual([standing.isHeadingLive, standing.label], [false, 'Car ±5 m, heading 3.4 s old']);
 });
 
-test('every reason of a phone is said; a coarse fix is still one of now', () => {
+test('every reason of a phone is shown; a coarse fix is still one of now', () => {
   const live = phoneOf(frameOf(FIX, PHONE), 0.1);
-  assert.deepEqual([live.isLive, live.label, live.says], [true, 'Phone ±5 m', '']);
+  assert.deepEqual([live.isLive, live.label, live.message], [true, 'Phone ±5 m', '']);
   near(live.age_s ?? 0, 0.9, 1e-9);
-  assert.match(phoneOf(frameOf(FIX), 0).says, /^No phone is sharing its position/);
+  assert.match(phoneOf(frameOf(FIX), 0).message, /^No phone is sharing its position/);
   for (const why of ['denied', 'unavailable', 'timeout', 'insecure', 'hidden', 'old', 'late', 'silent']) {
     const found = phoneOf(frameOf(FIX, { ...PHONE, used: false, why, why_text: `Because of ${why}` }), 0);
-    assert.deepEqual([found.isLive, found.says, found.label], [false, `Because of ${why}.`, 'Phone STALE 0.8 s']);
+    assert.deepEqual([found.isLive, found.message, found.label], [false, `Because of ${why}.`, 'Phone STALE 0.8 s']);
   }
   const coarse = phoneOf(frameOf(FIX, { ...PHONE, accuracy_m: 80, used: false, why: 'coarse', why_text: 'To 80 m only' }), 0);
-  assert.deepEqual([coarse.isLive, coarse.label, coarse.says], [true, 'Phone ±80 m', 'To 80 m only.']);
+  assert.deepEqual([coarse.isLive, coarse.label, coarse.message], [true, 'Phone ±80 m', 'To 80 m only.']);
   assert.equal(phoneOf(frameOf(FIX, { ...PHONE, lat_deg: null, lon_deg: null, age_s: null, used: false, why: 'denied', why_text: 'No' }), 0).place, null);
-  assert.equal(phoneOf(frameOf(FIX, PHONE), 4.5).isLive, false); // the page itself has heard nothing for so long
-  assert.match(phoneOf(frameOf(FIX, { ...PHONE, count: 3 }), 0).says, /^Compared with Pixel 7 · a3f2, one of 3 phones\.$/);
+  assert.equal(phoneOf(frameOf(FIX, PHONE), 4.5).isLive, false); // the page itself has received nothing for so long
+  assert.match(phoneOf(frameOf(FIX, { ...PHONE, count: 3 }), 0).message, /^Compared with Pixel 7 · a3f2, one of 3 phones\.$/);
 });
 
 test('apart is as the server compared them at one moment; where it did not, as the two fixes have it', () => {
@@ -249,8 +249,8 @@ test('apart is as the server compared them at one moment; where it did not, as t
   const [car, phone] = [carOf(frame, inked('fresh')), phoneOf(frame, 0)];
   assert.deepEqual(apartOf(frame, 0, car, phone), { distance_m: 10.4, bearing_deg: 323.4, allowed_m: 14 });
   assert.equal(apartOf(frameOf(FIX, { ...PHONE, explained_m: 3 }), 0, car, phone)?.allowed_m, 10);
-  for (const told of [{ ...PHONE, used: false, why: 'coarse' }, { ...PHONE, apart_m: null }, { ...PHONE, compared_age_s: 5.1 }]) {
-    const found = apartOf(frameOf(FIX, told), 0, car, phone);
+  for (const phone of [{ ...PHONE, used: false, why: 'coarse' }, { ...PHONE, apart_m: null }, { ...PHONE, compared_age_s: 5.1 }]) {
+    const found = apartOf(frameOf(FIX, phone), 0, car, phone);
     near(found?.distance_m ?? 0, 10, 0.01);
     near(found?.bearing_deg ?? 0, 323.13, 0.01); // the phone is 6 m east and 8 m south of the car
     assert.equal(found?.allowed_m, null);
@@ -259,7 +259,7 @@ test('apart is as the server compared them at one moment; where it did not, as t
   assert.equal(apartOf(frame, 0, car, { ...phone, isLive: false }), null);
 });
 
-test('distances, bearings and the picture in words', () => {
+test('distances, bearings and the picture as text', () => {
   assert.deepEqual([0, 10.44, 99.96, 320.4, 1234, 99_960, 9_099_076].map((one) => distanceWords(one).join(' ')), ['0.0 m', '10.4 m', '100 m', '320 m', '1.2 km', '100 km', '9099 km']);
   assert.equal(bearingWords(323.4), '323° NW');
   const frame = frameOf(FIX, PHONE);
@@ -278,7 +278,7 @@ const row = (number, east_m, at_s = number, joins = 0) => {
   return [number, lat_deg, lon_deg, at_s, joins];
 };
 
-test('a page that comes late asks for all of the track, and then for what is new', () => {
+test('a page that comes late requests all of the track, and then what is new', () => {
   const track = new Track();
   assert.equal(track.lacks('a 1', 0), null);
   assert.equal(track.lacks('a 1', 7), 0);
@@ -309,7 +309,7 @@ test('rows that are none are left out, and a track is bounded', () => {
   assert.ok(track.points.length <= MOST && track.last === 3 * MOST);
 });
 
-test('lines end where the way is not known; what was not seen is told apart; a dot each ten seconds', () => {
+test('lines end where the way is not known; what was not seen is distinguished; a dot each ten seconds', () => {
   const track = new Track();
   track.lacks('a 1', 9);
   track.take('a 1', [row(1, 0, 101), row(2, 5, 104), row(3, 10, 111), row(4, 20, 140, 1), row(5, 25, 149), row(6, 900, 150, 2), row(7, 905, 161)]);
@@ -347,17 +347,17 @@ test('the number stands beside its way and never on it', () => {
   assert.ok(besideWay([[252, 312], [206, 250]], SIZE)[0] < 206); // as the pictures of the design have it: at the left
 });
 
-test('words stand where nothing is taken, as near to their place as can be, or nowhere', () => {
+test('a label is drawn where nothing is taken, as near to its place as possible, or not at all', () => {
   const keys = { left: 218, top: 80, width: 188, height: 44 };
   const head = { left: 64, top: 0, width: 412, height: 28 };
-  const words = { left: 210, top: 90, width: 90, height: 19 };
-  assert.equal(clearTop(words, [], 130), 90);
-  const top = clearTop(words, [keys, head], 130);
+  const label = { left: 210, top: 90, width: 90, height: 19 };
+  assert.equal(clearTop(label, [], 130), 90);
+  const top = clearTop(label, [keys, head], 130);
   assert.ok(top !== null && top < 80 && top > 40, String(top));
-  assert.ok(![keys, head].some((one) => overlap({ ...words, top: top ?? 0 }, one)));
-  assert.equal(clearTop({ ...words, top: 2 }, [keys, head], 130), 29);
-  assert.equal(clearTop(words, [{ left: 0, top: 0, width: 400, height: 130 }], 130), null);
-  assert.equal(clearTop({ ...words, left: 10 }, [keys, head], 130), 90); // beside the keys
+  assert.ok(![keys, head].some((one) => overlap({ ...label, top: top ?? 0 }, one)));
+  assert.equal(clearTop({ ...label, top: 2 }, [keys, head], 130), 29);
+  assert.equal(clearTop(label, [{ left: 0, top: 0, width: 400, height: 130 }], 130), null);
+  assert.equal(clearTop({ ...label, left: 10 }, [keys, head], 130), 90); // beside the keys
 });
 
 test('a name that finds no room near its place stands beside its mark, right of it before left', () => {

@@ -31,7 +31,7 @@ function storage(mostBytes = Infinity) {
 function database(state = {}) {
   /** @type {Map<string, Mark>} */
   const kept = new Map();
-  const asked = (/** @type {any} */ result) => {
+  const request = (/** @type {any} */ result) => {
     const request = /** @type {any} */ ({ result: structuredClone(result) });
     queueMicrotask(() => request.onsuccess?.());
     return request;
@@ -40,8 +40,8 @@ function database(state = {}) {
     const at = /** @type {any} */ ({ error: null });
     let isFull = false;
     at.objectStore = () => ({
-      get: (/** @type {string} */ id) => asked(kept.get(id)),
-      getAll: () => asked([...kept.values()]),
+      get: (/** @type {string} */ id) => request(kept.get(id)),
+      getAll: () => request([...kept.values()]),
       put: (/** @type {Mark} */ one) => {
         if (state.isFull && (one.voice?.blob || one.photo?.blob)) isFull = true;
         else kept.set(one.id, structuredClone(one));
@@ -56,7 +56,7 @@ function database(state = {}) {
 
 const none = () => Promise.reject(new Error('refused'));
 
-test('without a database marks are listed without their voice, and a full storage says so', async () => {
+test('without a database marks are listed without their voice, and a full storage is shown', async () => {
   const kept = storage();
   const keep = new MarkKeep(kept, none);
   assert.equal((await keep.change('a', same, mark('a'))).kept, 'whole');
@@ -92,13 +92,13 @@ test('of two copies the newer counts, and a voice that only the page has is not 
   assert.equal(joined(mark('a', { turn: 3, photo: part({ blob: null, made: '2' }) }), mark('a', { photo: part({ made: '1' }) })).photo?.blob, null, 'it was replaced');
 });
 
-test('what was lost with a full storage is told of, and a voice that was being spoken is cut', () => {
+test('what was lost with a full storage is reported, and a voice that was being spoken is cut', () => {
   const lost = bereft(mark('a', { stored: 1, voice: part({ blob: null }), photo: part({ blob: null }) }));
   assert.deepEqual(moreWords(lost), ['voice lost: the storage was full', 'photo lost: the storage was full']);
   assert.match(headWords(lost), / voice lost$/);
   assert.match(headWords(orphaned(mark('a', { voice: part({ isOpen: true }) }))), / voice cut$/);
   assert.deepEqual(moreWords(bereft(orphaned(mark('a', { voice: part({ isOpen: true, blob: null }) })))), ['voice lost: the storage was full']);
-  assert.deepEqual(moreWords(joined(mark('a', { voice: part({ blob: null }) }), lost)), ['voice lost: the storage was full'], 'it stays told');
+  assert.deepEqual(moreWords(joined(mark('a', { voice: part({ blob: null }) }), lost)), ['voice lost: the storage was full'], 'it stays shown');
   assert.deepEqual(moreWords(joined(lost, mark('a', { voice: part(), photo: part({ note: 'photo 2 MB' }) }))), ['voice 6.2 s', 'photo 2 MB'], 'a page still has it');
   const stored = mark('a', { stored: 1, voice: part({ blob: null, isStored: true }) });
   assert.deepEqual(bereft(stored), stored);
@@ -118,8 +118,8 @@ function locks() {
   };
 }
 
-/** A page of a car, with a server that takes everything once it is there. @param {() => Promise<IDBDatabase>} open @param {string[]} heard */
-function page(open, heard) {
+/** A page of a car, with a server that takes everything once it is there. @param {() => Promise<IDBDatabase>} open @param {string[]} received */
+function page(open, received) {
   const state = { now_ms: 0, isThere: false };
   /** @type {Map<string, () => void>} */
   const listeners = new Map();
@@ -131,7 +131,7 @@ function page(open, heard) {
     get frame() { return state.isThere ? {} : null; },
     socket: { isOpen: true },
     ask: async (/** @type {string} */ kind, /** @type {{mark: string, words: string}} */ { mark: id, words }) => {
-      heard.push(`${kind} ${id} ${words}`);
+      received.push(`${kind} ${id} ${words}`);
       return { ok: true };
     },
   };
@@ -165,12 +165,12 @@ test('two pages deliver a mark once, as it was changed last, and nothing of a pa
   Object.defineProperty(globalThis, 'navigator', { value: { locks: locks() }, configurable: true });
   const shared = database();
   /** @type {string[]} */
-  const heard = [];
-  const one = page(shared.open, heard);
+  const received = [];
+  const one = page(shared.open, received);
   const { id } = one.marks.place();
   const taken = one.marks.place().id;
   await settled();
-  const other = page(shared.open, heard);
+  const other = page(shared.open, received);
   await other.marks.ready;
   assert.equal(other.marks.waiting.length, 2);
   await one.marks.edit(id, { words: 'late' });
@@ -178,7 +178,7 @@ test('two pages deliver a mark once, as it was changed last, and nothing of a pa
   one.state.isThere = other.state.isThere = true;
   await Promise.all([other.marks.delivery.hurry(), one.marks.delivery.hurry()]);
   await settled();
-  assert.deepEqual(heard, [`mark ${id} late`]);
+  assert.deepEqual(received, [`mark ${id} late`]);
   assert.deepEqual(other.marks.all.map((now) => [now.id, now.words, now.stored]), [[id, 'late', 2]]);
   one.state.isThere = false;
   const last = one.marks.place().id;
@@ -187,7 +187,7 @@ test('two pages deliver a mark once, as it was changed last, and nothing of a pa
   other.state.now_ms += 31_000;
   other.tick();
   await settled();
-  assert.equal(heard.at(-1)?.startsWith(`mark ${last}`), true);
+  assert.equal(received.at(-1)?.startsWith(`mark ${last}`), true);
 });
 
 test('a voice that is spoken in one page is not ended by another, before its page is closed', async () => {

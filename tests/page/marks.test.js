@@ -48,7 +48,7 @@ test('a phone that slept goes by its wall clock, for only that went on', () => {
   assert.equal(clock.at(1500, AT_MS + 840 + 60_500).at_ms, AT_MS + 60_500);
 });
 
-test('another visit remembers the difference of the clocks, and a first one says that it knows none', () => {
+test('another visit remembers the difference of the clocks, and a first one reports that it knows none', () => {
   const kept = storage();
   assert.equal(new MarkClock(kept).at(0, AT_MS).source, 'unknown');
   new MarkClock(kept).note(AT_MS, 10, AT_MS - 500);
@@ -96,7 +96,7 @@ test('what is to be delivered follows from what is stored', () => {
 });
 
 /**
- * A server that answers as told.
+ * A server that answers as set.
  * @param {(step: string, id: string) => import('../../static/js/drive/mark-delivery.js').Told | Promise<import('../../static/js/drive/mark-delivery.js').Told>} tells
  * @param {{vehicle?: () => string, onChange?: () => void}} [more]
  */
@@ -104,13 +104,13 @@ function delivery(tells, { vehicle = () => 'car', onChange = () => {} } = {}) {
   /** @type {Map<string, import('../../static/js/drive/mark-model.js').Mark>} */
   const kept = new Map();
   /** @type {string[]} */
-  const heard = [];
+  const received = [];
   /** @type {string[]} */
   const takenBack = [];
   /** @type {any[]} */
   const sent = [];
   const tell = (/** @type {string} */ step, /** @type {string} */ id) => {
-    heard.push(`${step} ${id}`);
+    received.push(`${step} ${id}`);
     return Promise.resolve(tells(step, id));
   };
   const marks = {
@@ -128,19 +128,19 @@ function delivery(tells, { vehicle = () => 'car', onChange = () => {} } = {}) {
   };
   const server = { isThere: () => true, vehicle, mark: (/** @type {{mark: string}} */ fields) => { sent.push(fields); return tell('mark', fields.mark); }, remove: (/** @type {string} */ id) => tell('remove', id), upload: (/** @type {string} */ id, /** @type {string} */ _, /** @type {string} */ step) => tell(step, id) };
   let now_ms = 0;
-  return { kept, heard, sent, takenBack, wait: (/** @type {number} */ ms) => { now_ms += ms; }, it: new Delivery(marks, server, () => now_ms) };
+  return { kept, received, sent, takenBack, wait: (/** @type {number} */ ms) => { now_ms += ms; }, it: new Delivery(marks, server, () => now_ms) };
 }
 
 const OK = { ok: true, isLost: false, reason: '' };
 const LOST = { ok: false, isLost: true, reason: '' };
 
 test('marks are delivered oldest first, then voices and photos, until nothing waits', async () => {
-  const { it, kept, heard } = delivery(() => OK);
+  const { it, kept, received } = delivery(() => OK);
   kept.set('new', mark('new', { wall_ms: AT_MS + 5000 }));
   kept.set('old', mark('old', { voice: part(), photo: part() }));
   kept.set('other', mark('other', { vehicle: 'another car' }));
   await it.look();
-  assert.deepEqual(heard, ['mark old', 'mark new', 'voice old', 'photo old']);
+  assert.deepEqual(received, ['mark old', 'mark new', 'voice old', 'photo old']);
   assert.equal(kept.get('old')?.voice?.blob, null, 'the server has it');
   assert.deepEqual(waitingOf(kept.values(), 'car'), []);
   assert.equal(stepOf(/** @type {any} */ (kept.get('other'))), 'mark', 'it waits for its own car');
@@ -148,92 +148,92 @@ test('marks are delivered oldest first, then voices and photos, until nothing wa
 
 test('without an answer it is tried again, seldom, with the same id', async () => {
   let isThere = false;
-  const { it, kept, heard, wait } = delivery(() => (isThere ? OK : LOST));
+  const { it, kept, received, wait } = delivery(() => (isThere ? OK : LOST));
   kept.set('a', mark('a'));
   await it.look();
   await it.look();
-  assert.deepEqual(heard, ['mark a'], 'not at once');
+  assert.deepEqual(received, ['mark a'], 'not at once');
   wait(500);
   await it.look();
   wait(500);
   await it.look();
-  assert.equal(heard.length, 2, 'ever more seldom');
+  assert.equal(received.length, 2, 'ever more seldom');
   isThere = true;
   await it.hurry();
-  assert.deepEqual(new Set(heard), new Set(['mark a']));
+  assert.deepEqual(new Set(received), new Set(['mark a']));
   assert.equal(stepOf(/** @type {any} */ (kept.get('a'))), null);
 });
 
-test('one that is refused says why and keeps no other waiting', async () => {
-  const { it, kept, heard, wait } = delivery((_, id) => (id === 'bad' ? { ok: false, isLost: false, reason: 'Too many marks.' } : OK));
+test('one that is refused shows why and keeps no other waiting', async () => {
+  const { it, kept, received, wait } = delivery((_, id) => (id === 'bad' ? { ok: false, isLost: false, reason: 'Too many marks.' } : OK));
   kept.set('bad', mark('bad'));
   kept.set('good', mark('good', { wall_ms: AT_MS + 1 }));
   await it.look();
-  assert.deepEqual(heard, ['mark bad', 'mark good']);
+  assert.deepEqual(received, ['mark bad', 'mark good']);
   assert.match(moreWords(/** @type {any} */ (kept.get('bad'))).join(), /not stored: Too many marks/);
   wait(30_001);
   await it.look();
-  assert.equal(heard.filter((said) => said === 'mark bad').length, 2);
+  assert.equal(received.filter((call) => call === 'mark bad').length, 2);
 });
 
 test('a photo that cannot be uploaded, or takes long, keeps no mark waiting', async () => {
-  /** @type {((told: import('../../static/js/drive/mark-delivery.js').Told) => void) | undefined} */
+  /** @type {((reply: import('../../static/js/drive/mark-delivery.js').Told) => void) | undefined} */
   let answer;
-  const { it, kept, heard, wait } = delivery((step) => (step === 'photo' ? new Promise((resolve) => { answer = resolve; }) : OK));
+  const { it, kept, received, wait } = delivery((step) => (step === 'photo' ? new Promise((resolve) => { answer = resolve; }) : OK));
   kept.set('a', mark('a', { stored: 1, photo: part() }));
   const look = it.look();
   await new Promise(setImmediate);
   kept.set('b', mark('b', { wall_ms: AT_MS + 1 }));
   void it.look();
   await new Promise(setImmediate);
-  assert.deepEqual(heard, ['photo a', 'mark b'], 'while it is under way');
+  assert.deepEqual(received, ['photo a', 'mark b'], 'while it is under way');
   answer?.(LOST);
   await look;
   kept.set('c', mark('c', { wall_ms: AT_MS + 2, voice: part() }));
   await it.look();
-  assert.deepEqual(heard, ['photo a', 'mark b', 'mark c'], 'it was lost: parts rest, marks do not');
+  assert.deepEqual(received, ['photo a', 'mark b', 'mark c'], 'it was lost: parts rest, marks do not');
   wait(500);
   void it.look();
   await new Promise(setImmediate);
-  assert.deepEqual(heard.slice(3), ['voice c', 'photo a'], 'what was never tried goes first');
+  assert.deepEqual(received.slice(3), ['voice c', 'photo a'], 'what was never tried goes first');
 });
 
 test('a server without room refuses a photo, which is offered again', async () => {
   assert.ok(isForNow(503) && isForNow(429) && !isForNow(507) && !isForNow(413));
   const full = { ok: false, isLost: false, reason: 'The disk is full.' };
-  const { it, kept, heard, wait } = delivery((step) => (step === 'photo' ? full : OK));
+  const { it, kept, received, wait } = delivery((step) => (step === 'photo' ? full : OK));
   kept.set('a', mark('a', { photo: part() }));
   await it.look();
   assert.match(moreWords(/** @type {any} */ (kept.get('a'))).join(), /not stored: The disk is full/);
   kept.set('a', { .../** @type {any} */ (kept.get('a')), words: 'late', version: 2, voice: part() });
   await it.look();
-  assert.deepEqual(heard, ['mark a', 'photo a', 'mark a', 'voice a'], 'what else there is of it goes on');
+  assert.deepEqual(received, ['mark a', 'photo a', 'mark a', 'voice a'], 'what else there is of it goes on');
   wait(30_001);
   await it.look();
-  assert.equal(heard.at(-1), 'photo a');
+  assert.equal(received.at(-1), 'photo a');
 });
 
 test('a photo that was replaced while it was uploaded is uploaded too', async () => {
   const second = part({ blob: new Blob(['second']), made: 'second' });
-  const { it, kept, heard } = delivery((step) => {
-    if (step === 'photo' && heard.length === 2) kept.set('a', { .../** @type {any} */ (kept.get('a')), photo: second });
+  const { it, kept, received } = delivery((step) => {
+    if (step === 'photo' && received.length === 2) kept.set('a', { .../** @type {any} */ (kept.get('a')), photo: second });
     return OK;
   });
   kept.set('a', mark('a', { photo: part() }));
   await it.look();
-  assert.deepEqual(heard, ['mark a', 'photo a', 'photo a']);
+  assert.deepEqual(received, ['mark a', 'photo a', 'photo a']);
   assert.equal(kept.get('a')?.photo?.isStored, true);
 });
 
 test('a mark goes to no other car, though another is shown while it is being kept', async () => {
   let vehicle = 'car';
-  const { it, kept, heard } = delivery(() => OK, { vehicle: () => vehicle, onChange: () => { vehicle = 'another car'; } });
+  const { it, kept, received } = delivery(() => OK, { vehicle: () => vehicle, onChange: () => { vehicle = 'another car'; } });
   kept.set('a', mark('a'));
   await it.look();
-  assert.deepEqual(heard, []);
+  assert.deepEqual(received, []);
 });
 
-test('a mark that the server does not take back stays, and says why', async () => {
+test('a mark that the server does not take back stays, and shows why', async () => {
   const { it, kept, takenBack } = delivery((_, id) => ({ ok: false, isLost: false, reason: id === 'gone' ? 'There is no such mark.' : 'Viewers cannot do this.' }));
   kept.set('a', mark('a', { stored: 1, isSent: true, isRemoved: true }));
   kept.set('gone', mark('gone', { isSent: true, isRemoved: true, wall_ms: AT_MS + 1 }));
@@ -244,7 +244,7 @@ test('a mark that the server does not take back stays, and says why', async () =
   assert.deepEqual(takenBack, ['Viewers cannot do this.', '']);
 });
 
-test('a mark says how long ago it was, for the server’s clock may have been set meanwhile', async () => {
+test('a mark states how long ago it was, for the server’s clock may have been set meanwhile', async () => {
   const { it, kept, sent } = delivery(() => OK);
   kept.set('a', mark('a', { wall_ms: Date.now() - 90_000, shift_s: -2 }));
   await it.look();
@@ -252,20 +252,20 @@ test('a mark says how long ago it was, for the server’s clock may have been se
 });
 
 test('what is changed while it is under way is sent again, and what is taken back is removed', async () => {
-  const { it, kept, heard } = delivery((step) => {
-    if (step === 'mark' && heard.length === 1) kept.set('a', { ...mark('a'), isSent: true, words: 'late', version: 2 });
+  const { it, kept, received } = delivery((step) => {
+    if (step === 'mark' && received.length === 1) kept.set('a', { ...mark('a'), isSent: true, words: 'late', version: 2 });
     return OK;
   });
   kept.set('a', mark('a'));
   await it.look();
-  assert.deepEqual(heard, ['mark a', 'mark a']);
+  assert.deepEqual(received, ['mark a', 'mark a']);
   kept.set('a', { .../** @type {any} */ (kept.get('a')), isRemoved: true });
   await it.hurry();
-  assert.deepEqual(heard.at(-1), 'remove a');
+  assert.deepEqual(received.at(-1), 'remove a');
   assert.equal(kept.size, 0);
 });
 
-test('a mark from before any server was heard is corrected later, and old ones are left to the server', () => {
+test('a mark from before any answer of a server is corrected later, and old ones are left to the server', () => {
   const late = corrected(mark('a', { wall_ms: AT_MS + HOUR_MS, tap_ms: AT_MS + HOUR_MS, clock: 'unknown' }), HOUR_MS);
   assert.equal(markedAt(late), AT_MS);
   assert.match(moreWords(late).join(), /\+3600\.00 s, corrected/);

@@ -4,13 +4,13 @@ import { chainOf } from '../../static/js/core/link.js';
 import { readMessage } from '../../static/js/core/protocol.js';
 
 for await (const line of createInterface({ input: process.stdin })) {
-  const said = { kind: null, threw: '' };
+  const result = { kind: null, threw: '' };
   try {
     const frame = readMessage(JSON.parse(line));
-    said.kind = frame?.kind ?? null;
-    if (frame?.kind === 'state') said.word = chainOf({ frame, isSilent: false, silence_s: 0.1, lag_s: 0.1, heard_ms: 0 }).word;
+    result.kind = frame?.kind ?? null;
+    if (frame?.kind === 'state') result.word = chainOf({ frame, isSilent: false, silence_s: 0.1, lag_s: 0.1, heard_ms: 0 }).word;
   } catch (error) {
-    said.threw = String(error);
+    result.threw = String(error);
   }
-  console.log(JSON.stringify(said));
+  console.log(JSON.stringify(result));
 }

@@ -9,7 +9,7 @@ const mode = (more = {}) => /** @type {any} */ ({ mode: 'autonomous', why: null,
 /** @param {object} [more] */
 const intervention = (more = {}) => /** @type {any} */ ({ kind_of: 'to_manual', initiated_by: 'driver', brake_percent: 45.9, acted_before_s: 0.18, active: [], last_alarm_ago_s: 64, ...more });
 
-test('the mode with its time and way; what is not known says why and never a mode', () => {
+test('the mode with its time and way; what is not known has a reason and never a mode', () => {
   assert.deepEqual(modeWords(mode(), 1_212_000, true), { mode: 'autonomous', title: 'Autonomous', text: '03:32 · 1.19 km', open: null });
   assert.equal(modeWords(mode({ mode: 'manual', way_m: 14.2 }), 1_006_000, true).text, '00:06 · 14 m');
   assert.equal(modeWords(mode({ since_ms: null, way_m: null }), 0, true).text, '');
@@ -19,7 +19,7 @@ test('the mode with its time and way; what is not known says why and never a mod
   assert.equal(modeWords(null, 0, true).text, 'no link to the car');
 });
 
-test('what waits for its description is asked for, the oldest first', () => {
+test('what waits for its description is shown, the oldest first', () => {
   const open = [{ id: 'i-1', at_ms: 1, kind_of: 'brake' }, { id: 'i-2', at_ms: 2, kind_of: 'to_manual' }];
   assert.deepEqual(modeWords(mode({ open: open.slice(0, 1) }), 0, true).text, 'Describe braking');
   const two = modeWords(mode({ open }), 0, true);
@@ -27,7 +27,7 @@ test('what waits for its description is asked for, the oldest first', () => {
   assert.equal(modeWords(mode({ open: [{ id: 'i-3', at_ms: 3, kind_of: 'of a newer server' }] }), 0, true).text, 'Describe');
 });
 
-test('who acted first, and the alarms then, in words', () => {
+test('who acted first, and the alarms then, as text', () => {
   assert.deepEqual(startedWords(intervention()), { title: 'By the driver', value: '46', unit: '% brake', text: '0.2 s before mode' });
   assert.equal(startedWords(intervention({ brake_percent: null, acted_before_s: null, initiated_by: 'unknown' })).value, 'not known');
   assert.deepEqual(alarmWords(intervention()), { value: '0', text: 'last 64 s ago' });

@@ -3,7 +3,7 @@ import { test } from 'node:test';
 import { Emitter } from '../../static/js/core/emitter.js';
 import { Painter } from '../../static/js/core/painter.js';
 
-/** A painter whose pictures come when the test says so. @param {(error: unknown) => void} [failed] */
+/** A painter whose frames come when the test sets them off. @param {(error: unknown) => void} [failed] */
 function studio(failed = (error) => { throw error; }) {
   /** @type {(() => void)[]} */
   const due = [];
@@ -53,7 +53,7 @@ test('what requests a turn in its own turn has it, and one picture is requested 
   assert.equal(due.length, 0);
 });
 
-test('what asks again before its turn waits once', () => {
+test('a second request before its turn waits once', () => {
   const { painter, picture } = studio();
   let times = 0;
   const draw = () => void (times += 1);
@@ -62,7 +62,7 @@ test('what asks again before its turn waits once', () => {
   assert.equal(times, 1);
 });
 
-test('what throws in its turn is told, and the next has its turn', () => {
+test('what throws in its turn is reported, and the next has its turn', () => {
   /** @type {unknown[]} */
   const errors = [];
   const { painter, picture } = studio((error) => errors.push(error));

@@ -1,4 +1,4 @@
-// The pairing screen and the list of devices in words; where a link may lead.
+// The texts of the pairing screen and the list of devices; where a link may lead.
 
 import assert from 'node:assert/strict';
 import { readdir, readFile } from 'node:fs/promises';
@@ -67,8 +67,8 @@ test('a connection that was dialled beside a quiet one and is not needed brings 
   const admission = new Admission(() => 'ws://car/ws', () => {});
   let now_ms = 0;
   t.mock.method(performance, 'now', () => now_ms);
-  const ear = { opened() {}, closed() {}, text() {}, bytes() {} };
-  const page = new PageSocket(ear, () => admission.dial(page.trip), () => now_ms, () => 0);
+  const listener = { opened() {}, closed() {}, text() {}, bytes() {} };
+  const page = new PageSocket(listener, () => admission.dial(page.trip), () => now_ms, () => 0);
   const look = async (/** @type {number} */ until_ms) => {
     for (; now_ms < until_ms; now_ms += 100) page.look(now_ms);
     await new Promise((resolve) => { setTimeout(resolve); });
@@ -128,7 +128,7 @@ test('a PIN is its digits, however it is typed', () => {
   }
 });
 
-test('why it was not let in stands there in words', () => {
+test('the reason of a refused admission is shown as text', () => {
   assert.equal(reasonWords({ code: 'unpaired', detail: 'x' }), '');
   assert.equal(reasonWords({}), '');
   assert.equal(reasonWords({ code: 'removed', detail: 'This device was removed by Ann.' }), 'This device was removed by Ann.');
@@ -154,7 +154,7 @@ test('a device is here now, or was', () => {
   assert.equal(ago(86_400 * 3), 'seen 3 days ago');
 });
 
-test('a removal says whose pages end, and that the last operator goes', () => {
+test('a removal names whose pages end, and that the last operator goes', () => {
   const device = (/** @type {string} */ id, /** @type {'viewer' | 'operator'} */ role) => ({ id, name: id, role, paired_ms: 0, seen_ms: 0, sockets: 0 });
   const [a, b] = [device('a', 'operator'), device('b', 'viewer')];
   assert.equal(removalWords(b, 'a', [a, b])[0], 'Remove b?');

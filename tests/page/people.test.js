@@ -1,4 +1,4 @@
-// Who is on duty, in words; a hand-over; who is called next, and who asks for control, in the attention queue.
+// The texts of who is on duty, of a hand-over, and of the attention queue: who is called next, and who requests control.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -19,7 +19,7 @@ test('initials of names', () => {
   assert.deepEqual(['A. K.', 'Anna Maria Keller', 'anna', 'Ö', '山田 太郎', '<b>x</b>', '---', '𝒜 b'].map(initialsOf), ['AK', 'AK', 'A', 'Ö', '山太', 'B', '?', '𝒜B']);
 });
 
-test('the chip says who is on duty and what they do', () => {
+test('the chip shows who is on duty and what they do', () => {
   assert.equal(chipOf(MINE, 'page-a', false, duty({ me })).text, 'AK controls');
   assert.equal(chipOf(MINE, 'page-a', false, duty()).text, 'You');
   assert.equal(chipOf(FREE, 'page-a', false, duty({ me })).text, 'AK on duty');
@@ -59,7 +59,7 @@ test('who signs on is shown what people who are off duty left acknowledged, and 
   assert.equal(lines[0]?.text, '12 m/s. Acknowledged by M. R. (Desk).');
 });
 
-test('the queue says whose alarms are left without an owner on duty', (t) => {
+test('the queue shows whose alarms are left without an owner on duty', (t) => {
   t.mock.timers.enable({ apis: ['Date'], now: AT });
   const of = (/** @type {any} */ unowned) => unownedWords(/** @type {any} */ ({ unowned }));
   assert.equal(of({ count: 1, by: 'A. K. (Pixel)', since_ms: AT }), 'acknowledged by A. K. (Pixel), off duty since 13:58');
@@ -68,7 +68,7 @@ test('the queue says whose alarms are left without an owner on duty', (t) => {
   assert.deepEqual([of(null), of(undefined)], ['', '']);
 });
 
-test('an item goes on to who is on duty, or says that nobody is', () => {
+test('an item goes on to who is on duty, or shows that nobody is', () => {
   const item = (/** @type {any} */ more) => /** @type {any} */ ({ since_ms: 0, assigned: null, offered: null, escalates_ms: null, escalated_ms: null, ...more });
   assert.equal(supervisorWords(item({ escalated_ms: 0, supervisors: ['J. D.'] }), 11_000), 'escalated to J. D. for 0:11');
   assert.equal(supervisorWords(item({ escalated_ms: 0, supervisors: [] }), 11_000), 'escalated: no supervisor is on duty, 0:11');
@@ -81,10 +81,10 @@ test('an item goes on to who is on duty, or says that nobody is', () => {
 test('a request for control that nobody answers is an item', () => {
   const summary = (/** @type {any} */ more) => /** @type {any} */ ({ holder: 'Ann', requests: [{ page: 'b', name: 'Ben', left_s: 7.2 }], ...more });
   const one = requestItem('ocelot', summary({}), 1.0);
-  assert.deepEqual([one?.key, one?.title, one?.detail], ['ocelot control', 'Ben asks for control', 'Granted in 7 s unless Ann keeps it']);
+  assert.deepEqual([one?.key, one?.title, one?.detail], ['ocelot control', 'Ben requests control', 'Granted in 7 s unless Ann keeps it']);
   assert.equal(requestItem('ocelot', summary({ requests: [] }), 0), null);
   assert.equal(requestItem('ocelot', summary({ requests: undefined }), 0), null, 'an older agent does not state it');
-  assert.match(requestItem('ocelot', summary({ requests: [{ page: 'b', name: 'Ben', left_s: 1 }, { page: 'c', name: 'Cem', left_s: 5 }] }), 9)?.detail ?? '', /Granted in 0 s .* 1 other asks too/);
+  assert.match(requestItem('ocelot', summary({ requests: [{ page: 'b', name: 'Ben', left_s: 1 }, { page: 'c', name: 'Cem', left_s: 5 }] }), 9)?.detail ?? '', /Granted in 0 s .* 1 other request/);
 });
 
 test('what others left is shown once in a duty, where it is known within 10 s of its beginning', () => {

@@ -19,14 +19,14 @@ function say(reporter, now_ms) {
   return report && ('why' in report ? report.why : report.fix);
 }
 
-test('the age of a fix by one clock is what its stamp says', () => {
+test('the age of a fix by one clock follows from its stamp', () => {
   const clock = new FixClock();
   assert.equal(clock.note(1000, 1400), 400);
   assert.deepEqual([5000, 6000, 7000].map((at) => clock.note(at, at + 700)), [700, 700, 700]);
   assert.equal(clock.note(8000, 11_000), 3000); // one that came late
 });
 
-test('a first fix from a cache is as old as it says', () => {
+test('a first fix from a cache is as old as its stamp', () => {
   assert.equal(new FixClock().note(0, 40_000), 40_000);
 });
 
@@ -43,13 +43,13 @@ test('a browser’s clock that is set while it runs is found out within ten fixe
   const clock = new FixClock();
   for (let i = 0; i < 20; i += 1) clock.note(i * 1000, i * 1000 + 200);
   const ages = Array.from({ length: 12 }, (_, i) => clock.note((20 + i) * 1000, (20 + i) * 1000 + 200 + HOUR_MS));
-  assert.equal(ages[0], HOUR_MS + 200); // too old to be used: nothing wrong is told
+  assert.equal(ages[0], HOUR_MS + 200); // too old to be used: nothing wrong is sent
   assert.deepEqual(ages.slice(9), [0, 0, 0]);
   const back = Array.from({ length: 3 }, (_, i) => clock.note((40 + i) * 1000, (40 + i) * 1000 + 200));
   assert.ok(back.every((age_ms) => age_ms <= 200));
 });
 
-test('a fix is told once, with its age at sending, and what is no number is null', () => {
+test('a fix is sent once, with its age at sending, and what is no number is null', () => {
   const reporter = asking();
   reporter.fix(coords, 1_700_000_000_000, 100, 1_700_000_000_300);
   assert.deepEqual(reporter.due(250), {
@@ -61,13 +61,13 @@ test('a fix is told once, with its age at sending, and what is no number is null
 
 test('at most one fix a second, the newest', () => {
   const reporter = asking();
-  const told = [];
+  const sent = [];
   for (let now_ms = 0; now_ms <= 5000; now_ms += 100) {
     reporter.fix({ ...coords, accuracy: now_ms }, now_ms, now_ms, now_ms);
     const fix = say(reporter, now_ms);
-    if (fix) told.push(fix.accuracy_m);
+    if (fix) sent.push(fix.accuracy_m);
   }
-  assert.deepEqual(told, [0, 1000, 2000, 3000, 4000, 5000]);
+  assert.deepEqual(sent, [0, 1000, 2000, 3000, 4000, 5000]);
 });
 
 test('one fix that the browser tells again and again grows old all the same', () => {
@@ -77,14 +77,14 @@ test('one fix that the browser tells again and again grows old all the same', ()
   assert.equal(reporter.why(4001), 'timeout');
 });
 
-test('until the first fix comes it is waited for, and that is told every three seconds', () => {
+test('until the first fix comes it is waited for, and that is sent every three seconds', () => {
   const reporter = asking();
-  const told = [];
-  for (let now_ms = 0; now_ms <= 7000; now_ms += 200) if (say(reporter, now_ms) === 'timeout') told.push(now_ms);
-  assert.deepEqual(told, [0, 3000, 6000]);
+  const sent = [];
+  for (let now_ms = 0; now_ms <= 7000; now_ms += 200) if (say(reporter, now_ms) === 'timeout') sent.push(now_ms);
+  assert.deepEqual(sent, [0, 3000, 6000]);
 });
 
-test('a single failure between fixes is none, a lasting one is told', () => {
+test('a single failure between fixes is none, a lasting one is sent', () => {
   const reporter = asking();
   reporter.fix(coords, 0, 0, 0);
   say(reporter, 0);
@@ -99,7 +99,7 @@ test('a single failure between fixes is none, a lasting one is told', () => {
   assert.ok(say(reporter, 6000).lat_deg, 'a fix after a reason waits for nothing');
 });
 
-test('a refusal is told at once, over everything, and forgotten when it is asked again', () => {
+test('a refusal is sent at once, over everything, and forgotten with the next request', () => {
   const reporter = asking();
   reporter.fix(coords, 0, 0, 0);
   say(reporter, 0);
@@ -122,7 +122,7 @@ test('in the background there is no position, whatever came before', () => {
   assert.ok(say(reporter, 200).lat_deg);
 });
 
-test('a new connection is told anew, and what did not go out is told later', () => {
+test('a new connection gets it anew, and what was not sent is sent later', () => {
   const reporter = asking();
   reporter.fail('denied');
   assert.equal(say(reporter, 0), 'denied');

@@ -15,7 +15,7 @@ const alarm = (more) => ({
   actions: [], shelved_until_ms: null, silenced_until_ms: null, sound: 'none', measured: null, limit: null, advice: 'Look.', planned_stop: true, ...more,
 });
 
-test('the line says why, since when and by whom, and that an unknown speed does not end it', () => {
+test('the line shows why, since when and by whom, and that an unknown speed does not end it', () => {
   assert.equal(titleOf('workshop'), 'Planned stop: in the workshop');
   assert.equal(titleOf(/** @type {any} */ ('of another version')), 'Planned stop');
   assert.equal(lineWords(STOP), `since ${timeOfDay(STOP.since_ms)} by A. K. (Pixel)`);
@@ -47,14 +47,14 @@ test('a critical alarm sounds in it; a warning that makes no sound sounds once i
   assert.equal(soundOf(/** @type {any} */ ({ session: { planned_stop: STOP }, decelerate: {}, alarms: [] }), { isServerLost: true, isLossAcknowledged: false }), 'high', 'of a server that is lost');
 });
 
-test('of one that is acknowledged the list says by whom, and for how long it has been active', () => {
+test('of one that is acknowledged the list shows by whom, and for how long it has been active', () => {
   const state = (/** @type {any} */ more) => rowsOf([alarm({ state: 'ACKED', acknowledged_by: 'Ann', planned_stop: false, ...more })], [], true)[0]?.state;
   assert.equal(state({}), 'acknowledged by Ann · active for 4.1 s');
   assert.equal(state({ for_s: 725 }), 'acknowledged by Ann · active for 12:05');
   assert.equal(state({ for_s: 3725, planned_stop: true }), 'acknowledged by Ann · active for 1:02:05 · planned stop');
 });
 
-test('the row of another car says that it stands on purpose', () => {
+test('the row of another car shows that it stands on purpose', () => {
   const summary = /** @type {any} */ ({
     phase: 'monitoring', paused: false, waiting: 0, worst: null, holder: null, page: null, recording: 'off', recording_for_s: null, slow_down: 'not_armed', planned_stop: 'parked',
     link: { cut: null, bridge_age_s: 0, car_age_s: 0, trying_for_s: 0, connected_for_s: 9 }, speed: { value_mps: 0, freshness: 'fresh', age_s: 0, horizon_s: 1 },

@@ -23,7 +23,7 @@ test('a priority that is not known is the most urgent, one that is known stays',
     ['critical', 'warning', 'advisory', ...Array(6).fill('critical')]);
 });
 
-test('an alarm of another version asks, sounds and is named, whatever it calls its place', () => {
+test('an alarm of another version has a dialog, sounds and is named, whatever it calls its place', () => {
   const frame = read(state({ alarms: [alarm(FOREIGN), alarm({ id: 'gps', title: 'GPS drift', priority: 'warning', place: 'snackbar', sound: 'medium' })] }));
   assert.deepEqual(picked(frame.alarms[0]), WORST);
   const seen = { isSilent: false, silence_s: 0, lag_s: 0, heard_ms: 0, unserved: '' };
@@ -49,7 +49,7 @@ test('the live car beside a replay, and a recording beside another one', () => {
   assert.deepEqual(picked(read({ kind: 'beside', replay: {}, state: state({ alarms: [alarm(FOREIGN)] }), notes: [] }).state.alarms[0]), WORST);
 });
 
-test('the card of a car shows the alarm with its words, as the most urgent', () => {
+test('the card of a car shows the alarm with its text, as the most urgent', () => {
   const { place: _, actions: __, ...worst } = alarm(FOREIGN);
   const summary = {
     phase: 'monitoring', paused: false, link: { cut: null, bridge_age_s: 0, car_age_s: 0, trying_for_s: 0, connected_for_s: 9 }, worst, waiting: 1,
@@ -74,5 +74,5 @@ test('the log: the mark of a critical alarm, found by that filter; what is of no
 test('the time line of a replay draws it, and Files counts it', () => {
   const { marks } = read({ kind: 'timeline', length_s: 9, bucket_s: 1, speed_mps: [], gaps: [], notes: [], marks: [{ at_s: 2, alarm: 'wheel_lost', title: 'Wheel lost', priority: 'extreme', text: '', duration_s: null }] });
   assert.equal(placedMarks(marks, [0, 9], 90)[0]?.priority, 'critical');
-  assert.deepEqual(countsOf({ critical: 1, extreme: 2, advisory: 1 }).map(({ words }) => words), ['3 critical alarms', '1 advisory']);
+  assert.deepEqual(countsOf({ critical: 1, extreme: 2, advisory: 1 }).map(({ text }) => text), ['3 critical alarms', '1 advisory']);
 });

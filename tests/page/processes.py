@@ -50,14 +50,14 @@ class Process:
         self._process: asyncio.subprocess.Process | None = None
         self._reader: asyncio.Task[None] | None = None
         self.address = ""
-        self.console = ""  # where a program beside the car asks: the agent's own address, where a server is parted
+        self.console = ""  # for a program beside the car: the agent's own address, where a server is parted
 
     @property
     def _module(self) -> str:
         return "tests.through_broker" if IS_PARTED and self._arguments[0] == "serve" else self._given
 
     async def start(self) -> Process:
-        """Starts it and waits until it says its address."""
+        """Starts it and waits until it prints its address."""
         self._process = await asyncio.create_subprocess_exec(
             *(*self._within, sys.executable, "-m", self._module, *self._arguments),
             stdin=asyncio.subprocess.PIPE,
@@ -71,7 +71,7 @@ class Process:
         async with asyncio.timeout(90 if IS_PARTED else 60):
             while True:
                 line = (await out.readline()).decode()
-                assert line, f"{self._arguments} ended before it said its address"
+                assert line, f"{self._arguments} ended before it printed its address"
                 if at_agent := re.match(r"console at (\S+)", line):
                     self.console = f"http://{at_agent[1]}"
                 elif found := re.search(r"(?:ws|https?)://[^\s/]+:\d+", line):

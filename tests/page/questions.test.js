@@ -16,7 +16,7 @@ const question = (more = {}) => ({ signal: 'scan', kind: 'source', words: 'Two l
 const brake = question({ signal: 'brake', kind: 'unit' });
 const none = { ink: /** @type {const} */ ('not_published'), age_s: null };
 
-test('a value that is missing because a question stands says so, and no other', () => {
+test('a value that is missing because a question stands is shown as that, and no other', () => {
   assert.equal(withQuestion(none, 'scan', [question()]).ink, 'not_chosen');
   assert.equal(withQuestion({ ink: 'no_value', age_s: null }, 'brake', [brake]).ink, 'not_in_unit');
   assert.equal(withQuestion(none, 'speed', [question(), brake]).ink, 'not_published');
@@ -32,14 +32,14 @@ test('who is in control answers, or the first to act where nobody is', () => {
   assert.equal(mayAnswer({ isViewer: false, page: 'q', control: control({ holder: null, page: null }) }), true);
   assert.equal(mayAnswer({ isViewer: true, page: 'q', control: control({ holder: null, page: null }) }), false);
   assert.equal(mayAnswer({ isViewer: false, page: '', control: control({ page: '' }) }), false);
-  assert.equal(mayAnswer({ isViewer: false, page: 'p', control: null }), false); // nobody has told who is in control
+  assert.equal(mayAnswer({ isViewer: false, page: 'p', control: null }), false); // who is in control is not received yet
 });
 
-test('what is put off waits, also with other options, and for another car it is asked', () => {
+test('what is put off waits, also with other options, and for another car it is shown', () => {
   const later = new Set([keyOf('car', question())]);
   const more = question({ options: [], options_count: 3 });
-  assert.deepEqual(dealt('car', [more, brake], later), { asked: [brake], waiting: [more] });
-  assert.deepEqual(dealt('van', [more, brake], later).asked, [more, brake]);
+  assert.deepEqual(dealt('car', [more, brake], later), { open: [brake], waiting: [more] });
+  assert.deepEqual(dealt('van', [more, brake], later).open, [more, brake]);
   assert.equal(waitingWords([question(), brake], (name) => name.toUpperCase()), 'Not chosen: SCAN, unit of BRAKE');
   assert.match(waitingWords([1, 2, 3, 4, 5].map((n) => question({ signal: `s${n}` })), (name) => name), /s1, s2, s3 and 2 more$/);
 });
@@ -79,7 +79,7 @@ test('a chosen unit is taken back as a topic is, and named as it is read', () =>
 
 test('what else could carry a signal stands without the one that does, and not endlessly', () => {
   const offers = [{ topic: '/a', type: 'T' }, { topic: '/b', type: 'T', frame: 'rear', why: 'no publisher' }];
-  assert.deepEqual(otherWords(offers, '/a'), [{ topic: '/b', says: 'T\nframe rear\nno publisher' }]);
+  assert.deepEqual(otherWords(offers, '/a'), [{ topic: '/b', detail: 'T\nframe rear\nno publisher' }]);
   assert.deepEqual(otherWords(null, '/a'), []);
   const many = otherWords(Array.from({ length: 500 }, (_, i) => ({ topic: `/t${i}`, type: 'T' })), '/t0');
   assert.deepEqual([many.length, many.at(-1)?.topic], [7, 'and 493 more']);
@@ -89,7 +89,7 @@ test('the list of signals and Settings say that a source is not chosen', () => {
   const signal = /** @type {any} */ ({ label: 'Laser', topic: null, type: null, value: null, freshness: 'not_published', note: null });
   assert.equal(kindWords(signal, 'not_chosen'), 'press to choose');
   assert.equal(kindWords(signal), 'no such topic');
-  assert.deepEqual([topicWords(signal, undefined, true, true).says, topicWords(signal, undefined, true, true).icon], ['not chosen: press to choose', 'warn']);
+  assert.deepEqual([topicWords(signal, undefined, true, true).detail, topicWords(signal, undefined, true, true).icon], ['not chosen: press to choose', 'warn']);
 });
 
 test('a note on the mounting leads to its settings', () => {

@@ -24,7 +24,7 @@ class Radio:
 
     @contextlib.asynccontextmanager
     async def on_air(self) -> AsyncIterator[str]:
-        """Gives the address under which the server is heard."""
+        """Gives the address under which the server is reached."""
         listening = await asyncio.start_server(self._heard, "127.0.0.1", 0)
         try:
             yield f"http://127.0.0.1:{listening.sockets[0].getsockname()[1]}"

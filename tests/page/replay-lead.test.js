@@ -110,11 +110,11 @@ test('messages of another second count no more', (t) => {
   page.look(0);
   socket.onopen();
   let ran = 0;
-  const asks = (/** @type {number} */ most) => page.inTurn(most, () => { ran += 1; });
+  const request = (/** @type {number} */ most) => page.inTurn(most, () => { ran += 1; });
   for (let i = 0; i < 3; i += 1) page.send({ kind: 'take', seq: i });
-  asks(4);
+  request(4);
   assert.equal(ran, 1);
-  asks(3);
+  request(3);
   now_ms = 999;
   t.mock.timers.tick(999);
   assert.equal(ran, 1);
@@ -125,67 +125,67 @@ test('messages of another second count no more', (t) => {
 
 /** A store whose connection the test breaks and mends. */
 function breakable() {
-  const asked = /** @type {any[]} */ ([]);
+  const orders = /** @type {any[]} */ ([]);
   const store = /** @type {any} */ ({
     socket: { isOpen: true, inTurn: (/** @type {number} */ _, /** @type {() => void} */ run) => run() },
-    ask: (/** @type {string} */ _, /** @type {any} */ order) => new Promise((resolve) => asked.push({ ...order, resolve })),
+    ask: (/** @type {string} */ _, /** @type {any} */ order) => new Promise((resolve) => orders.push({ ...order, resolve })),
   });
   const turn = () => new Promise((resolve) => setImmediate(resolve));
-  return { store, asked, turn, lead: new ReplayLead(store) };
+  return { store, orders, turn, lead: new ReplayLead(store) };
 }
 
 test('the next alarm that is pressed while the connection is opened again is gone to once the recording is shown again', async () => {
-  const { store, asked, turn, lead } = breakable();
+  const { store, orders, turn, lead } = breakable();
   store.socket.isOpen = false;
   const answer = lead.order({ do: 'seek', at_s: 60 });
   await turn();
-  assert.deepEqual(asked, [], 'no server to ask');
+  assert.deepEqual(orders, [], 'no server to send to');
   store.socket.isOpen = true;
   /** @type {(answer: {ok: boolean}) => void} */
   let open = () => {};
   const reopened = lead.reopen(() => new Promise((resolve) => { open = resolve; }));
   await turn();
-  assert.deepEqual(asked, [], 'it shows no replay yet');
+  assert.deepEqual(orders, [], 'it shows no replay yet');
   open({ ok: true });
   await reopened;
   await turn();
-  assert.equal(asked[0].at_s, 60);
-  asked[0].resolve({ ok: true });
+  assert.equal(orders[0].at_s, 60);
+  orders[0].resolve({ ok: true });
   assert.deepEqual(await answer, { ok: true });
 });
 
 test('an order that met a server that had just started is given again, and one that is refused is not', async () => {
-  const { asked, turn, lead } = breakable();
+  const { orders, turn, lead } = breakable();
   const answer = lead.order({ do: 'play' });
   await turn();
   /** @type {(answer: {ok: boolean}) => void} */
   let open = () => {};
   const reopened = lead.reopen(() => new Promise((resolve) => { open = resolve; }));
-  asked[0].resolve({ ok: false, reason: 'This page shows no replay.' });
+  orders[0].resolve({ ok: false, reason: 'This page shows no replay.' });
   await turn();
   open({ ok: true });
   await reopened;
   await turn();
-  assert.equal(asked.length, 2);
-  asked[1].resolve({ ok: false, reason: 'Too many commands at once from this page: wait a second.' });
+  assert.equal(orders.length, 2);
+  orders[1].resolve({ ok: false, reason: 'Too many commands at once from this page: wait a second.' });
   assert.equal((await answer).ok, false);
-  assert.equal(asked.length, 2);
+  assert.equal(orders.length, 2);
 });
 
 test('a connection that breaks while the recording is opened again keeps the order; a replay that is left drops it', async () => {
-  const { store, asked, turn, lead } = breakable();
+  const { store, orders, turn, lead } = breakable();
   store.socket.isOpen = false;
   const answer = lead.order({ do: 'seek', at_s: 9 });
   await lead.reopen(async () => ({ ok: false, isBroken: true }));
   await turn();
-  assert.deepEqual(asked, []);
+  assert.deepEqual(orders, []);
   lead.end();
   assert.deepEqual(await answer, { ok: true });
-  assert.deepEqual(asked, []);
+  assert.deepEqual(orders, []);
 });
 
 test('another connection that takes the place of the one over which the recording is opened again keeps the order', async () => {
-  const { asked, turn, lead } = breakable();
+  const { orders, turn, lead } = breakable();
   /** @type {((answer: {ok: boolean, isBroken?: boolean}) => void)[]} */
   const opens = [];
   const reopen = () => lead.reopen(() => new Promise((resolve) => opens.push(resolve)));
@@ -194,11 +194,11 @@ test('another connection that takes the place of the one over which the recordin
   opens[0]?.({ ok: false, isBroken: true });
   void reopen(); // the other one is open at once
   await turn();
-  assert.deepEqual(asked, []);
+  assert.deepEqual(orders, []);
   opens[1]?.({ ok: true });
   await turn();
-  assert.equal(asked[0].at_s, 9);
-  asked[0].resolve({ ok: true });
+  assert.equal(orders[0].at_s, 9);
+  orders[0].resolve({ ok: true });
   assert.deepEqual(await answer, { ok: true });
 });
 
@@ -229,7 +229,7 @@ test('the log beside a replay is that of the recording up to the moment that is 
   assert.deepEqual(first, { at_ms: 1_020_000, icon: 'crit', kind: 'c-crit', title: 'Speed above limit', text: '12.4 m/s', priority: 'critical' });
 });
 
-test('what of a recording is not read or not listed is said in its log', () => {
+test('what of a recording is not read or not listed is stated in its log', () => {
   assert.deepEqual(titles(null, 24), ['The recording is being read']);
   assert.deepEqual(titles(line({ is_done: false, done_s: 30 }), 24), ['Speed above limit']);
   assert.deepEqual(titles(line({ is_done: false, done_s: 22 }), 24), ['Not read yet', 'Speed above limit']);

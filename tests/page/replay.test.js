@@ -73,7 +73,7 @@ test('arrows go by steps, pages by six, ends to the ends, other keys nowhere', (
   assert.equal(atByKey('x', 10, 512), null);
 });
 
-test('times as a person reads and hears them', () => {
+test('times as text and for a screen reader', () => {
   assert.equal(clockOf(246.9), '04:06');
   assert.equal(clockOf(3846), '1:04:06');
   assert.equal(spoken(246, 512), '4 minutes 6 seconds of 8 minutes 32 seconds');
@@ -82,22 +82,22 @@ test('times as a person reads and hears them', () => {
   assert.deepEqual([0.25, 0.5, 1, 16, 8.74].map(rateWords), ['×0.25', '×0.5', '×1', '×16', '×8.74']);
 });
 
-test('the line says first what is wrong with the replay, then what was not recorded, then the alarms', () => {
+test('the line shows first what is wrong with the replay, then what was not recorded, then the alarms', () => {
   const fast = alarm({ title: 'Speed above limit' });
-  const told = (more, rest = {}) => momentOf(playing({ replay: replay(more), ...rest }));
-  assert.deepEqual(told({}, { alarms: [fast] }), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: 're-evaluated' });
-  assert.equal(told({ alarms_from: 'recording' }, { alarms: [fast] }).end, 'original alarms');
-  assert.equal(told({}, { alarms: [fast, alarm({ id: 'b', priority: 'warning' })] }).end, '2 alarms, re-evaluated');
-  assert.equal(told({}, { alarms: [alarm({ active: false, state: 'RTN_UNACKED' })] }).text, 'No alarms', 'what was over then is no alarm of this moment');
-  assert.equal(told({ silent_s: 3.42 }, { alarms: [fast] }).text, 'Nothing recorded for 3.4 s');
-  assert.equal(told({ silent_s: null }).text, 'No message from the car yet');
-  assert.equal(told({ is_seeking: true, silent_s: 9 }).text, 'Seeking to 04:06');
-  assert.equal(told({ hangs_s: 3.2, is_seeking: true }).text, 'The replay has not answered for 3 s');
-  assert.equal(told({ is_settled: false }).text, 'Checks still warming up');
+  const moment = (more, rest = {}) => momentOf(playing({ replay: replay(more), ...rest }));
+  assert.deepEqual(moment({}, { alarms: [fast] }), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: 're-evaluated' });
+  assert.equal(moment({ alarms_from: 'recording' }, { alarms: [fast] }).end, 'original alarms');
+  assert.equal(moment({}, { alarms: [fast, alarm({ id: 'b', priority: 'warning' })] }).end, '2 alarms, re-evaluated');
+  assert.equal(moment({}, { alarms: [alarm({ active: false, state: 'RTN_UNACKED' })] }).text, 'No alarms', 'what was over then is no alarm of this moment');
+  assert.equal(moment({ silent_s: 3.42 }, { alarms: [fast] }).text, 'Nothing recorded for 3.4 s');
+  assert.equal(moment({ silent_s: null }).text, 'No message from the car yet');
+  assert.equal(moment({ is_seeking: true, silent_s: 9 }).text, 'Seeking to 04:06');
+  assert.equal(moment({ hangs_s: 3.2, is_seeking: true }).text, 'The replay has not answered for 3 s');
+  assert.equal(moment({ is_settled: false }).text, 'Checks still warming up');
   assert.equal(momentOf(playing({ session: { paused: true } })).text, 'Monitoring was paused');
 });
 
-test('what is live is told beside a recording: alarms, a lost link, a pause, and that it is not known', () => {
+test('what is live is shown beside a recording: alarms, a lost link, a pause, and that it is not known', () => {
   assert.equal(asideOf(live()), null);
   assert.equal(asideOf(null)?.text, 'Live: unknown');
   assert.equal(asideOf(live({ phase: 'idle' })), null);
@@ -127,9 +127,9 @@ test('the list of jumps has alarms of every priority and gaps, in the order of t
   assert.equal(nearestJump([], 9), -1);
 });
 
-test('marks and interventions stand among the jumps, with what was said of them', () => {
-  const said = { mark: 'm', marked_ms: 0, voice: false, photo: false, source: /** @type {const} */ ('page') };
-  const flags = [{ ...said, at_s: 5, category: 'object', words: '<b>crate', by: 'A. K.' }, { ...said, at_s: 9, category: null, words: '', by: null }];
+test('marks and interventions stand among the jumps, with their texts', () => {
+  const flag = { mark: 'm', marked_ms: 0, voice: false, photo: false, source: /** @type {const} */ ('page') };
+  const flags = [{ ...flag, at_s: 5, category: 'object', words: '<b>crate', by: 'A. K.' }, { ...flag, at_s: 9, category: null, words: '', by: null }];
   const interventions = [{ at_s: 7, kind_of: 'to_manual', category: 'object_late', what: 'A box.' }, { at_s: 8, kind_of: 'of a newer server', category: null, what: '' }];
   const line = { marks: [mark(6)], gaps: [], flags, interventions };
   assert.deepEqual(jumpsOf(line).map(({ at_s, kind, title, text }) => [at_s, kind, title, text]), [
@@ -162,7 +162,7 @@ test('the catalog\'s sketch is a time line that nobody has read yet', () => {
   assert.equal(speedPath(sketchOf({ ...row, speed_mps: undefined }) ?? assert.fail(), 100), '');
 });
 
-test('what is live is said in a line: the recording, and alarms that are not urgent are not called none', () => {
+test('what is live is shown in a line: the recording, and alarms that are not urgent are not called none', () => {
   const recorded = { recording: { state: 'recording', for_s: 252, reason: null } };
   assert.deepEqual(liveWords(live(recorded)), { recording: 'recording 04:12', text: 'no alarms' });
   assert.equal(liveWords(live({ alarms_in_all: 1 })).text, 'no urgent alarm, 1 other');
@@ -193,7 +193,7 @@ test('what is no time line is not taken for one', () => {
   assert.equal(new Track().lacks('a', 3), 0);
 });
 
-test('while a recording is shown, whether the car is recorded is said of the car now', () => {
+test('while a recording is shown, whether the car is recorded is stated of the car now', () => {
   const store = new Store(() => /** @type {any} */ ({}));
   store.frame = /** @type {any} */ ({ replay: {}, recording: { state: 'off', for_s: null }, alarms: [], session: {}, live: { recording: { state: 'recording', for_s: 9 }, alarms: [], phase: 'monitoring', paused: false } });
   assert.equal(store.heeded?.recording.state, 'recording');

@@ -1,4 +1,4 @@
-"""A car on a bridge of our own, placed by the test: it stands or drives where it is told to, and says what it must."""
+"""A car on a bridge of our own, placed by the test: it stands or drives as set, and publishes what it must."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class Roamer:
         self.address = ""
         self.lat_deg, self.lon_deg = lat_deg, lon_deg
         self.speed_mps = 0.0
-        self.heading_deg: float | None = 90.0  # it drives where it looks; None: says nothing of it
+        self.heading_deg: float | None = 90.0  # it drives where it points; None: it does not publish it
         self.status = 0
         self.covariance_m2: tuple[float, float, float] | None = (4.0, 9.0, 0.0)
         self.tells_position = True
 
     def place(self, east_m: float, north_m: float) -> dict[str, float]:
-        """A place beside the car, as a browser is told it."""
+        """A place beside the car, as a browser gets it."""
         meridian_m, parallel_m = radii_m(self.lat_deg)
         return {
             "latitude": self.lat_deg + math.degrees(north_m / meridian_m),

@@ -91,7 +91,7 @@ test('a beam stands at angle_min + i·increment, also where the increment is neg
   assert.ok(Math.abs((x ?? 0) - 10) < 1e-5 && Math.abs(y ?? 1) < 1e-5);
 });
 
-test('neighbours that tell nothing make a sector by what they say; nothing in range is told, not hatched', () => {
+test('neighbours without a usable range make a sector by their code; nothing in range is a reading, not hatched', () => {
   const sectors = sectorsOf(scan([100, 0, 0, TOO_CLOSE, NOTHING_IN_RANGE, INVALID]));
   assert.deepEqual(sectors.map(({ code, beams }) => [code, beams]), [[NO_RETURN, 2], [TOO_CLOSE, 1], [INVALID, 1]]);
   const wide = sectors[0];
@@ -131,24 +131,24 @@ test('zoom halts at the ranges of the keys and ends where the plot ends', () => 
 });
 
 test('what no beam looks at is not in view, whichever way the laser counts', () => {
-  const words = (/** @type {any} */ one) => unseenOf(one).map(({ from_rad, to_rad, code }) => [Math.round((10 * from_rad) / DEGREE) / 10, Math.round((10 * to_rad) / DEGREE) / 10, code]);
-  assert.deepEqual(words(scan(Array(181).fill(500))), []); // ±90°
-  assert.deepEqual(words(scan(Array(180).fill(500), { angle_min_rad: -89.5 * DEGREE })), []); // its other half
-  assert.deepEqual(words(scan(Array(360).fill(500), { angle_min_rad: 0 })), []); // all round from the front
-  assert.deepEqual(words(scan(Array(61).fill(500), { angle_min_rad: -30 * DEGREE })), [[-90, -30.5, NOT_IN_VIEW], [30.5, 90, NOT_IN_VIEW]]);
-  assert.deepEqual(words(scan([])), [[-90, 90, NOT_IN_VIEW]]);
-  assert.deepEqual(words(scan(Array(91).fill(500), { angle_min_rad: 135 * DEGREE })), [[-90, 90, NOT_IN_VIEW]]); // it looks back
+  const sectors = (/** @type {any} */ one) => unseenOf(one).map(({ from_rad, to_rad, code }) => [Math.round((10 * from_rad) / DEGREE) / 10, Math.round((10 * to_rad) / DEGREE) / 10, code]);
+  assert.deepEqual(sectors(scan(Array(181).fill(500))), []); // ±90°
+  assert.deepEqual(sectors(scan(Array(180).fill(500), { angle_min_rad: -89.5 * DEGREE })), []); // its other half
+  assert.deepEqual(sectors(scan(Array(360).fill(500), { angle_min_rad: 0 })), []); // all round from the front
+  assert.deepEqual(sectors(scan(Array(61).fill(500), { angle_min_rad: -30 * DEGREE })), [[-90, -30.5, NOT_IN_VIEW], [30.5, 90, NOT_IN_VIEW]]);
+  assert.deepEqual(sectors(scan([])), [[-90, 90, NOT_IN_VIEW]]);
+  assert.deepEqual(sectors(scan(Array(91).fill(500), { angle_min_rad: 135 * DEGREE })), [[-90, 90, NOT_IN_VIEW]]); // it looks back
   assert.equal(unseenOf(scan([500], { angle_min_rad: 0, angle_increment_rad: 0 })).length, 2); // one beam without a width
-  assert.deepEqual(words(scan(Array(61).fill(500), { angle_min_rad: 30 * DEGREE, angle_increment_rad: -DEGREE })), words(scan(Array(61).fill(500), { angle_min_rad: -30 * DEGREE })));
+  assert.deepEqual(sectors(scan(Array(61).fill(500), { angle_min_rad: 30 * DEGREE, angle_increment_rad: -DEGREE })), sectors(scan(Array(61).fill(500), { angle_min_rad: -30 * DEGREE })));
 });
 
-test('a laser that looks back says how much of it is not drawn', () => {
+test('a laser that looks back shows how much of it is not drawn', () => {
   const back = scan(Array(91).fill(500), { angle_min_rad: 135 * DEGREE });
   assert.equal(behind(back), 91);
   assert.equal(beamWords(back), '91 of 91 beams usable · 91 behind, not drawn');
 });
 
-test('the sectors in words, widest first', () => {
+test('the sectors as text, widest first', () => {
   const codes = Array.from({ length: 91 }, (_, i) => (i >= 5 && i < 10 ? TOO_CLOSE : i >= 40 && i < 50 ? NO_RETURN : i === 70 ? INVALID : 500));
   assert.deepEqual(sectorSentences(sectorsOf(scan(codes, { angle_increment_rad: 2 * DEGREE })), 4), ['no return from 9° left to 11° right', 'too close from 71° right to 81° right']);
 });
@@ -221,23 +221,23 @@ test('the arrow keys begin at the nearest and step from return to return', () =>
 test('a mark stays through a gap of a second, then it is let go; touched again it is taken away', () => {
   const mark = new ScanMark();
   mark.touch(ROOM, 8.3, 0, 1, 0);
-  assert.equal(mark.words, '8.3 m, straight ahead');
+  assert.equal(mark.text, '8.3 m, straight ahead');
   assert.equal(mark.hear(scan([]), 900), true);
   assert.equal(mark.isSeen, false);
   assert.equal(mark.hear(ROOM, 950), true);
   assert.equal(mark.isSeen, true);
   assert.equal(mark.hear(scan([]), 1960), false);
-  assert.equal(mark.words, '');
+  assert.equal(mark.text, '');
   mark.touch(ROOM, 8.3, 0, 1, 0);
   mark.touch(ROOM, 8.3, 0, 1, 0);
   assert.equal(mark.at, null);
   mark.step(ROOM, -1, 20, 0);
-  assert.equal(mark.at === null ? null : mark.words, '8.3 m, straight ahead');
+  assert.equal(mark.at === null ? null : mark.text, '8.3 m, straight ahead');
   mark.step(ROOM, -1, 20, 0);
-  assert.equal(mark.words, '12.4 m, 14° right');
+  assert.equal(mark.text, '12.4 m, 14° right');
 });
 
-test('words give way to words: half a line, a line, or they are left out', () => {
+test('labels give way to labels: half a line, a line, or they are left out', () => {
   const box = { left: 0, top: 100, width: 40, height: 20 };
   assert.deepEqual(clearOf([], box), box);
   assert.equal(clearOf([{ left: 30, top: 110, width: 40, height: 20 }], box)?.top, 90);
@@ -254,7 +254,7 @@ test('a plot too low for its foot still has a scale: what lies ahead is above, a
   }
 });
 
-test('words that would cover a return are found', () => {
+test('labels that would cover a return are found', () => {
   const scale = { cx: 200, cy: 300, k: 10 };
   const box = { left: 100, top: 190, width: 60, height: 20 };
   assert.ok(coversAny(box, [10, 7], scale)); // 10 m ahead and 7 m left is at 130, 200

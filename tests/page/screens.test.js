@@ -23,7 +23,7 @@ test('which screen is in front', () => {
   assert.equal(screenOf({ frame: state(), isMonitoring: true }, true), 'connect');
 });
 
-test('what the phone refused is said, with what it costs', () => {
+test('what the phone refused is shown, with what it costs', () => {
   assert.deepEqual(armWords('position', 'refused'), { tag: 'Refused', kind: 'warn', cost: 'Refused: phone and car are not compared' });
   assert.equal(armWords('screen', 'missing').cost, 'Needs HTTPS: the screen may turn off and hide alarms');
   assert.equal(armWords('sound', 'ready').tag, 'Ready');
@@ -107,7 +107,7 @@ test('recording and last values', () => {
   const saved = { name: 'car_1', until_ms: new Date(2026, 0, 2, 9, 41, 7).getTime() };
   assert.equal(savedWords({ state: 'held', for_s: 9, saved }), ' Recording saved up to 09:41:07.');
   assert.equal(savedWords({ state: 'saving', for_s: 9, saved: null }), ' The recording is being saved.');
-  assert.equal(savedWords({ state: 'recording', for_s: 9, saved }), '', 'what is not saved is not said to be');
+  assert.equal(savedWords({ state: 'recording', for_s: 9, saved }), '', 'what is not saved is not stated to be');
   assert.equal(savedWords({ state: 'off', for_s: null, saved }), '');
   assert.equal(thenWords(state({ signals: { speed: { value: { speed_mps: 4.2 } }, distance: { value: { distance_m: 12.4 } } } })), '4.2 m/s, object at 12.4 m');
   assert.equal(thenWords(null), '');

@@ -84,7 +84,7 @@ WATCH: dict[str, tuple[str, int, int, str]] = {
 }
 Scene = Callable[[Canned, Page], Awaitable[None]]
 SCENES: dict[str, Scene] = {}
-# Roboto as on a phone: words take the room they take there.
+# Roboto as on a phone: text takes the room it takes there.
 FONTS = """<?xml version="1.0"?><!DOCTYPE fontconfig SYSTEM "fonts.dtd"><fontconfig><dir>/usr/share/fonts</dir>
 <match target="pattern"><edit name="family" mode="prepend" binding="strong"><string>Roboto</string></edit></match>
 <cachedir>{cache}</cachedir></fontconfig>"""
@@ -116,11 +116,11 @@ async def home(server: Canned, page: Page) -> None:
 @scene("home-people")
 async def home_people(server: Canned, page: Page) -> None:
     state = live()
-    told = (("a", "Desk 1", True, None), ("b", "Desk 2", True, None), ("c", "Field 2", False, "its sound is off"))
+    rows = (("a", "Desk 1", True, None), ("b", "Desk 2", True, None), ("c", "Field 2", False, "its sound is off"))
     people = [
         {"page": name, "name": label, "can": can, "why": None if can else "sound", "why_text": why, "here": True,
          "awake": "ready", "vibrates": False, "battery": None, "charging": None, "heard_s": 0.1 + 0.1 * n}
-        for n, (name, label, can, why) in enumerate(told)
+        for n, (name, label, can, why) in enumerate(rows)
     ]  # fmt: skip
     state["reach"] = {"can": 2, "of": 3, "why": "Field 2: its sound is off", "pages": people, "left_out": 0}
     state["control"] |= {"page": "a", "holder": "Desk 1"}
@@ -150,7 +150,7 @@ async def home_fault(server: Canned, page: Page) -> None:
 
 
 def too_fast(state: dict[str, Any]) -> dict[str, Any]:
-    """A state with its critical alarm that asks."""
+    """A state with its critical alarm in a dialog."""
     state["signals"]["speed"]["value"]["speed_mps"] = 12.6
     state["signals"]["acceleration"]["value"]["acceleration_mps2"] = 1.1
     state["signals"]["accelerator"]["value"]["percent"] = 38
@@ -427,7 +427,7 @@ async def alarm_log(server: Canned, page: Page) -> None:
     state = live()
     state["alarms"] = [alarm("GPS drift", "GPS drift", state="ACKED", text="6.3 m of 2.0 m")]
     server.state = state
-    told = (
+    rows = (
         ("14:07:38", "cleared", "critical", "Speed above limit", "back under 10.5 m/s for 2 s", None),
         ("14:07:33", "acknowledged", "critical", "Speed above limit", "", "Pixel 7"),
         ("14:07:31", "raised", "critical", "Speed above limit", "12.6 m/s, limit 11.0 m/s", None),
@@ -442,7 +442,7 @@ async def alarm_log(server: Canned, page: Page) -> None:
     server.log = [
         {"n": 117 - i, "at_ms": at(clock), "change": change, "priority": priority, "alarm": title, "title": title,
          "text": text, "by": by, "occurrence": 1}
-        for i, (clock, change, priority, title, text, by) in enumerate(told)
+        for i, (clock, change, priority, title, text, by) in enumerate(rows)
     ]  # fmt: skip
     await page.tap("#monitor [data-f=menu]")
     await page.tap("[data-screen=log]")
@@ -638,7 +638,7 @@ async def fleet_map(server: Canned, page: Page) -> None:
 async def fleet_asked(server: Canned, page: Page) -> None:
     """One item is offered to this page, another is its own."""
     await _fleet(server, page, canned_fleet.three())
-    me = next(one["page"] for one in server.heard if one.get("kind") == "hello" and one["page"] != "")
+    me = next(one["page"] for one in server.received if one.get("kind") == "hello" and one["page"] != "")
     mine = canned_fleet.holder({"page": me, "name": "Me"})
     offered = {"by": "Desk 2", "name": "Me", "page": me, "since_ms": canned_fleet.now_ms() - 12_000}
     server.cars[1]["summary"]["attention"] = canned_fleet.attention(ago_s=7, assigned=mine)
@@ -693,7 +693,7 @@ async def unknown_check(server: Canned, page: Page) -> None:
 async def tablet(server: Canned, page: Page) -> None:
     server.state = live()
     await page.set_viewport_size({"width": 1280, "height": 800})
-    await page.wait_for_timeout(1500)  # the track is asked for once a second
+    await page.wait_for_timeout(1500)  # the track is requested once a second
 
 
 @scene("connect")
@@ -745,7 +745,7 @@ async def stop(server: Canned, page: Page) -> None:
 async def map_(server: Canned, page: Page) -> None:
     server.state = live()
     await page.tap("[data-tab=map]")
-    await page.wait_for_timeout(1500)  # the track is asked for once a second
+    await page.wait_for_timeout(1500)  # the track is requested once a second
 
 
 @scene("map-heading-up")
@@ -884,23 +884,23 @@ async def mail(server: Canned, page: Page) -> None:
 
 @scene("outbox")
 async def outbox(server: Canned, page: Page) -> None:
-    def part(state: str, said: str, refused: str | None = None) -> dict[str, Any]:
-        told = {"address": "ann@example.org", "state": "refused" if refused else "accepted", "said": refused or ""}
+    def part(state: str, reply: str, refused: str | None = None) -> dict[str, Any]:
+        recipient = {"address": "ann@example.org", "state": "refused" if refused else "accepted", "said": refused or ""}
         return {
-            "part": 1, "parts": 1, "state": state, "said": said, "attempts": 1,
-            "next_ms": at("14:21:00") if state == "queued" else None, "recipients": [told],
+            "part": 1, "parts": 1, "state": state, "said": reply, "attempts": 1,
+            "next_ms": at("14:21:00") if state == "queued" else None, "recipients": [recipient],
         }  # fmt: skip
 
-    told = (
+    rows = (
         ("queued", "The mail server does not answer; tried again by itself.", "14:07:02", "Lap 3", 57.1, None),
         ("sent", "Taken by the mail server.", "13:40:10", "Rehearsal lot", 99.4, None),
         ("failed", "Every recipient was refused.", "11:12:44", "Lap 1", 16.2, "550 no such user"),
     )
     server.mails = [
         {"n": 3 - i, "ordered_ms": at(clock), "recordings": ["car_0"], "format": "mcap", "to": ["ann@example.org"],
-         "subject": subject, "state": state, "said": said, "is_ready": True, "share": None, "way": "attached",
-         "size_bytes": round(size * 1e6), "parts": [part(state, said, refused)]}
-        for i, (state, said, clock, subject, size, refused) in enumerate(told)
+         "subject": subject, "state": state, "said": reply, "is_ready": True, "share": None, "way": "attached",
+         "size_bytes": round(size * 1e6), "parts": [part(state, reply, refused)]}
+        for i, (state, reply, clock, subject, size, refused) in enumerate(rows)
     ]  # fmt: skip
     await mail(server, page)
     await page.tap("[data-f=mail-outbox]")

@@ -115,7 +115,7 @@ test('a number in a field has the mark of the language', () => {
   assert.ok(['1.100', '', 'x', '1,2,3'].every((typed) => Number.isNaN(decimalOf(typed, ','))));
 });
 
-test('what cannot be set is refused in words', () => {
+test('what cannot be set is refused with a text', () => {
   const why = (/** @type {string} */ typed) => /** @type {any} */ (readNumber(typed, speed)).refused;
   assert.equal(why(''), 'Speed limit: a number is required.');
   assert.equal(why('  '), 'Speed limit: a number is required.');
@@ -131,7 +131,7 @@ test('headings in the order of the server, each once', () => {
   assert.deepEqual(groupsOf(settings().schema).map(({ heading, names }) => [heading, names.length]), [['Speed', 1], ['Vehicle', 1], ['Expected rates', 1]]);
 });
 
-test('a search finds every word, in any order, whatever the case or accent', () => {
+test('a search finds every term, in any order, whatever the case or accent', () => {
   const texts = [rate.title, rate.description, rate.heading, rate.unit];
   assert.ok(found('', texts) && found('  RATE speed ', texts) && found("car's hz", texts) && found('éxpected', texts));
   assert.ok(!found('rate laser', texts) && !found('<script>', texts) && !found('.*', texts));
@@ -146,7 +146,7 @@ test('a change back is what differs, and null where the default was in force', (
   assert.deepEqual(changeTo(after, DEFAULTS), changeTo(after, before));
 });
 
-test('a change in words', () => {
+test('a change as text', () => {
   const now = settings({ topics: { speed: '/other' } });
   assert.deepEqual(changeLines(now, { values: { 'speed_limit.max_mps': null }, topics: { speed: null }, profile: 'catvehicle' }, () => 'Speed'), [
     'Speed limit: 9.0 → 11.0 m/s', 'Topic of Speed: /other → chosen automatically', 'Kind of car: as recognised → CATVehicle',
@@ -160,29 +160,29 @@ const signal = (more = {}) => ({
   count: 9, rejected: 0, rejected_why: null, value: { speed_mps: 1 }, lowest: null, highest: null, ...more,
 });
 
-test('a topic says what it carries, how fast, and what is wrong with it', () => {
-  assert.deepEqual(topicWords(signal(), undefined, true), { topic: '/vel', says: 'speed · Twist', icon: 'ok', rate: '20.0' });
-  assert.deepEqual(topicWords(signal(), '/vel', true).says, 'speed · Twist · chosen by you');
-  assert.deepEqual(topicWords(signal({ note: 'Float64, expected Float32' }), undefined, true), { topic: '/vel', says: 'speed · Twist\nFloat64, expected Float32', icon: 'warn', rate: '20.0' });
-  assert.match(topicWords(signal({ rejected: 3, rejected_why: 'x is NaN' }), undefined, true).says, /3 rejected: x is NaN/);
-  assert.match(topicWords(signal({ freshness: 'stale', age_s: 7.4 }), undefined, true).says, /silent for 7.4 s/);
-  assert.match(topicWords(signal({ freshness: 'never' }), undefined, true).says, /no message yet/);
+test('a topic shows what it carries, how fast, and what is wrong with it', () => {
+  assert.deepEqual(topicWords(signal(), undefined, true), { topic: '/vel', detail: 'speed · Twist', icon: 'ok', rate: '20.0' });
+  assert.deepEqual(topicWords(signal(), '/vel', true).detail, 'speed · Twist · chosen by you');
+  assert.deepEqual(topicWords(signal({ note: 'Float64, expected Float32' }), undefined, true), { topic: '/vel', detail: 'speed · Twist\nFloat64, expected Float32', icon: 'warn', rate: '20.0' });
+  assert.match(topicWords(signal({ rejected: 3, rejected_why: 'x is NaN' }), undefined, true).detail, /3 rejected: x is NaN/);
+  assert.match(topicWords(signal({ freshness: 'stale', age_s: 7.4 }), undefined, true).detail, /silent for 7.4 s/);
+  assert.match(topicWords(signal({ freshness: 'never' }), undefined, true).detail, /no message yet/);
   const empty = topicWords(signal({ freshness: 'not_measured', value: null, note: 'not measured (present is false)' }), undefined, true);
-  assert.deepEqual([empty.says, empty.icon], ['speed · Twist\nnot measured (present is false)', 'unknown']);
+  assert.deepEqual([empty.detail, empty.icon], ['speed · Twist\nnot measured (present is false)', 'unknown']);
   const ghost = { freshness: /** @type {const} */ ('not_published'), note: 'no node publishes it', value: null };
-  assert.deepEqual(topicWords(signal(ghost), undefined, true), { topic: '/vel', says: 'speed · no node publishes it', icon: 'unknown', rate: '–' });
-  assert.deepEqual(topicWords(signal(ghost), '/vel', true), { topic: '/vel', says: 'speed · chosen by you, no node publishes it', icon: 'warn', rate: '–' });
-  assert.deepEqual(topicWords(signal({ topic: null, type: null, value: null, freshness: 'not_published' }), undefined, true), { topic: 'Speed', says: 'not published', icon: 'unknown', rate: '–' });
-  assert.deepEqual(topicWords(signal({ topic: null, type: null, value: null }), '/gone', true), { topic: '/gone', says: 'speed · chosen by you, but not published', icon: 'warn', rate: '–' });
+  assert.deepEqual(topicWords(signal(ghost), undefined, true), { topic: '/vel', detail: 'speed · no node publishes it', icon: 'unknown', rate: '–' });
+  assert.deepEqual(topicWords(signal(ghost), '/vel', true), { topic: '/vel', detail: 'speed · chosen by you, no node publishes it', icon: 'warn', rate: '–' });
+  assert.deepEqual(topicWords(signal({ topic: null, type: null, value: null, freshness: 'not_published' }), undefined, true), { topic: 'Speed', detail: 'not published', icon: 'unknown', rate: '–' });
+  assert.deepEqual(topicWords(signal({ topic: null, type: null, value: null }), '/gone', true), { topic: '/gone', detail: 'speed · chosen by you, but not published', icon: 'warn', rate: '–' });
   assert.deepEqual([topicWords(signal(), undefined, false).icon, topicWords(signal(), undefined, false).rate], ['unknown', '–']);
 });
 
 test('what can be picked: the own choice of the server, what is gone, what fits', () => {
   const fits = [{ topic: '/vel', type: 'T' }, { topic: '/odom', type: 'O' }];
-  assert.deepEqual(optionsOf(fits, '/vel', undefined).map(({ topic, says, isChosen }) => [topic, says, isChosen]), [[null, 'now /vel', true], ['/vel', 'T · now', false], ['/odom', 'O', false]]);
+  assert.deepEqual(optionsOf(fits, '/vel', undefined).map(({ topic, detail, isChosen }) => [topic, detail, isChosen]), [[null, 'now /vel', true], ['/vel', 'T · now', false], ['/odom', 'O', false]]);
   assert.deepEqual(optionsOf(fits, null, '/gone').map(({ topic, isChosen }) => [topic, isChosen]), [[null, false], ['/gone', true], ['/vel', false], ['/odom', false]]);
-  assert.deepEqual(optionsOf(null, null, '/x').map(({ topic, says }) => [topic, says]), [[null, 'by type, publisher, namespace, frame and name'], ['/x', 'picked']]);
-  assert.deepEqual(optionsOf([], null, undefined).map(({ says }) => says), ['no match now']);
+  assert.deepEqual(optionsOf(null, null, '/x').map(({ topic, detail }) => [topic, detail]), [[null, 'by type, publisher, namespace, frame and name'], ['/x', 'picked']]);
+  assert.deepEqual(optionsOf([], null, undefined).map(({ detail }) => detail), ['no match now']);
 });
 
 test('a file that cannot hold settings is not sent', () => {
@@ -191,7 +191,7 @@ test('a file that cannot hold settings is not sent', () => {
   assert.match(fileProblem({ size: 65537, name: 'x'.repeat(900) }) ?? '', /^“x{60}” is too large: .* 64 kB\.$/);
 });
 
-test('a trial of a sound says plainly where this phone cannot sound', () => {
+test('a trial of a sound names where this phone cannot sound', () => {
   assert.match(trialWords('missing', 'high'), /has no sound: this device sounds no alarms/);
   assert.match(trialWords('blocked', 'high'), /no alarm can be heard/);
   assert.match(trialWords('busy', 'low'), /An alarm sounds now/);

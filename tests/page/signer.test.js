@@ -2,14 +2,14 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Signer } from '../../static/js/core/signer.js';
 
-const WORDS = { vehicle: 'ocelot', challenge: 'c', by: 'Ännchen', page: '0123abcd' };
+const CONTEXT = { vehicle: 'ocelot', challenge: 'c', by: 'Ännchen', page: '0123abcd' };
 
 test('an order is signed by a key that cannot be taken out, and the signature is of the very text', async () => {
   const signer = new Signer(); // where nothing can be kept, by a key of this page
-  const { id, kind, vehicle, signed } = /** @type {any} */ (await signer.sealed({ kind: 'pause', id: 'p1', fence: 3 }, WORDS));
+  const { id, kind, vehicle, signed } = /** @type {any} */ (await signer.sealed({ kind: 'pause', id: 'p1', fence: 3 }, CONTEXT));
   assert.deepEqual([id, kind, vehicle], ['p1', 'pause', 'ocelot']);
   const { command, nonce, ...rest } = JSON.parse(signed.text);
-  assert.deepEqual([command, rest], [{ kind: 'pause', fence: 3 }, WORDS]);
+  assert.deepEqual([command, rest], [{ kind: 'pause', fence: 3 }, CONTEXT]);
   assert.ok(nonce.length >= 16);
   const key = await crypto.subtle.importKey('raw', Buffer.from(signed.key, 'base64'), { name: 'ECDSA', namedCurve: 'P-256' }, true, ['verify']);
   const verify = (/** @type {string} */ text) => crypto.subtle.verify({ name: 'ECDSA', hash: 'SHA-256' }, key, Buffer.from(signed.signature, 'base64'), new TextEncoder().encode(text));
@@ -20,13 +20,13 @@ test('an order is signed by a key that cannot be taken out, and the signature is
 
 test('what is of the page alone is not signed, and a page without TLS signs nothing', async (t) => {
   const signer = new Signer();
-  assert.equal(signer.sealed({ kind: 'replay', id: 'p1' }, WORDS), null);
+  assert.equal(signer.sealed({ kind: 'replay', id: 'p1' }, CONTEXT), null);
   t.mock.getter(globalThis, 'crypto', () => ({}));
   const plain = new Signer();
-  assert.deepEqual(await plain.sealed({ kind: 'pause', id: 'p1', fence: 3 }, WORDS), { kind: 'pause', id: 'p1', fence: 3 });
+  assert.deepEqual(await plain.sealed({ kind: 'pause', id: 'p1', fence: 3 }, CONTEXT), { kind: 'pause', id: 'p1', fence: 3 });
   assert.equal(plain.isSettled, true);
-  assert.equal(plain.sealed({ kind: 'pause', id: 'p1' }, WORDS), null);
-  assert.deepEqual(await plain.header({ kind: 'import' }, WORDS, { toml: '' }), {});
+  assert.equal(plain.sealed({ kind: 'pause', id: 'p1' }, CONTEXT), null);
+  assert.deepEqual(await plain.header({ kind: 'import' }, CONTEXT, { toml: '' }), {});
 });
 
 test('a storage that never answers holds no order back for longer than 2 s', async (t) => {
@@ -35,7 +35,7 @@ test('a storage that never answers holds no order back for longer than 2 s', asy
   global.indexedDB = { open: () => ({}) };
   t.after(() => { delete global.indexedDB; });
   const signer = new Signer();
-  const sealed = signer.sealed({ kind: 'pause', id: 'p1', fence: 3 }, WORDS);
+  const sealed = signer.sealed({ kind: 'pause', id: 'p1', fence: 3 }, CONTEXT);
   t.mock.timers.tick(1999);
   await new Promise((resolve) => { setImmediate(resolve); });
   assert.equal(signer.isSettled, false);
@@ -45,9 +45,9 @@ test('a storage that never answers holds no order back for longer than 2 s', asy
 
 test('it takes no time that an operator would notice', async () => {
   const signer = new Signer();
-  await signer.sign({ kind: 'pause' }, WORDS);
+  await signer.sign({ kind: 'pause' }, CONTEXT);
   const began_ms = performance.now();
-  for (let i = 0; i < 50; i += 1) await signer.sign({ kind: 'slow_down' }, WORDS);
+  for (let i = 0; i < 50; i += 1) await signer.sign({ kind: 'slow_down' }, CONTEXT);
   const each_ms = (performance.now() - began_ms) / 50;
   assert.ok(each_ms < 5, `${each_ms} ms`);
 });

@@ -17,8 +17,8 @@ function drag(share, meanwhile = () => {}) {
 
 for (const [share, outcome] of /** @type {const} */ ([[0, 'tap'], [0.05, 'tap'], [0.3, 'short'], [0.79, 'short'], [0.81, 'order'], [1, 'order'], [9, 'order'], [-3, 'tap']])) {
   test(`slid ${share} of the way: ${outcome}`, () => {
-    const { outcome: told, slide } = drag(share);
-    assert.equal(told, outcome);
+    const { outcome: found, slide } = drag(share);
+    assert.equal(found, outcome);
     assert.equal(slide.share, 0, 'it springs back, or the order’s own frame fills it');
     assert.equal(slide.phase, 'rest');
   });

@@ -23,41 +23,41 @@ const ordered = (more = {}, name = 'ordered') => slow(name, { order: order(more)
 const seen = (/** @type {any} */ now, more = {}) => ({ now, isSilent: false, isViewer: false, isReplay: false, mayControl: true, holder: null, ...more });
 
 test('the slide: off with the reason, armed, or filled; silent or looked at only, it is off', () => {
-  const words = (/** @type {any} */ now, more = {}) => {
+  const label = (/** @type {any} */ now, more = {}) => {
     const { kind, title, why } = slideOf(seen(now, more));
     return `${kind}: ${title} ${why}`;
   };
-  assert.equal(words(slow('not_available', { why: 'No link to the car.' })), 'off: Slow-down off No link to the car');
-  assert.equal(words(slow('not_available', { why: 'The steering of this kind of car is not known, and a command would turn its wheels.' })), 'off: Slow-down off press for the reason');
-  assert.equal(words(slow('not_armed')), 'off: Slow-down not armed press to arm');
-  assert.equal(words(slow('not_armed'), { isViewer: true }), 'off: Slow-down not armed not for viewers');
-  assert.equal(words(slow('armed'), { car: 'Ocelot', vehicle: 'Ocelot' }), 'armed: Slide to slow Ocelot');
-  assert.equal(words(slow('armed')), 'armed: Slide to slow the car');
-  assert.equal(words(slow('armed'), { isViewer: true }), 'off: Slow-down armed not for viewers');
-  assert.equal(words(slow('armed'), { mayControl: false, holder: 'Ben' }), 'armed: Slide to slow the car', 'any operator stops the car');
-  assert.equal(words(slow('armed'), { isSilent: true }), 'off: State unknown no answer');
-  const asked = (/** @type {any} */ now, more = {}) => slideOf(seen(now, more), true);
-  assert.equal(asked(slow('not_armed')).label, 'Acknowledge first: then arm it', 'nothing is armed from the sheet of an alarm');
-  assert.equal(asked(slow('not_armed'), { isViewer: true }).why, 'not for viewers');
-  assert.deepEqual(asked(slow('armed')), slideOf(seen(slow('armed'))), 'but a slide slows from it');
-  assert.equal(words(null), 'off: State unknown no answer');
-  assert.equal(words(ordered()), 'go: Slowing to 0.0 m/s');
-  assert.equal(words(ordered({ confirmed: null })), 'go: Ordered to 0.0 m/s', 'not told yet is not "slowing"');
-  assert.equal(words(ordered({ confirmed: false })), 'go: Not confirmed physical stop!');
-  assert.equal(words(ordered({ sending: false })), 'go: Not sending to the car now');
-  assert.equal(words(ordered({}, 'holding')), 'go: Holding at 0.0 m/s');
-  assert.equal(words(slow('something new', { why: null })), 'off: Slow-down off not available');
+  assert.equal(label(slow('not_available', { why: 'No link to the car.' })), 'off: Slow-down off No link to the car');
+  assert.equal(label(slow('not_available', { why: 'The steering of this kind of car is not known, and a command would turn its wheels.' })), 'off: Slow-down off press for the reason');
+  assert.equal(label(slow('not_armed')), 'off: Slow-down not armed press to arm');
+  assert.equal(label(slow('not_armed'), { isViewer: true }), 'off: Slow-down not armed not for viewers');
+  assert.equal(label(slow('armed'), { car: 'Ocelot', vehicle: 'Ocelot' }), 'armed: Slide to slow Ocelot');
+  assert.equal(label(slow('armed')), 'armed: Slide to slow the car');
+  assert.equal(label(slow('armed'), { isViewer: true }), 'off: Slow-down armed not for viewers');
+  assert.equal(label(slow('armed'), { mayControl: false, holder: 'Ben' }), 'armed: Slide to slow the car', 'any operator stops the car');
+  assert.equal(label(slow('armed'), { isSilent: true }), 'off: State unknown no answer');
+  const inAlarm = (/** @type {any} */ now, more = {}) => slideOf(seen(now, more), true);
+  assert.equal(inAlarm(slow('not_armed')).label, 'Acknowledge first: then arm it', 'nothing is armed from the sheet of an alarm');
+  assert.equal(inAlarm(slow('not_armed'), { isViewer: true }).why, 'not for viewers');
+  assert.deepEqual(inAlarm(slow('armed')), slideOf(seen(slow('armed'))), 'but a slide slows from it');
+  assert.equal(label(null), 'off: State unknown no answer');
+  assert.equal(label(ordered()), 'go: Slowing to 0.0 m/s');
+  assert.equal(label(ordered({ confirmed: null })), 'go: Ordered to 0.0 m/s', 'not confirmed yet is not "slowing"');
+  assert.equal(label(ordered({ confirmed: false })), 'go: Not confirmed physical stop!');
+  assert.equal(label(ordered({ sending: false })), 'go: Not sending to the car now');
+  assert.equal(label(ordered({}, 'holding')), 'go: Holding at 0.0 m/s');
+  assert.equal(label(slow('something new', { why: null })), 'off: Slow-down off not available');
 });
 
-test('one word of its state, never a comfortable one', () => {
-  const word = (/** @type {any} */ now, more = {}) => stateWord(seen(now, more));
-  assert.deepEqual(['not_available', 'not_armed', 'armed', 'else'].map((name) => word(slow(name))), ['NOT AVAILABLE', 'NOT ARMED', 'ARMED', 'NOT AVAILABLE']);
-  assert.equal(word(slow('armed'), { isSilent: true }), 'NOT KNOWN');
-  assert.deepEqual([true, null, false].map((confirmed) => word(ordered({ confirmed }))), ['SLOWING', 'ORDERED', 'NOT CONFIRMED']);
-  assert.equal(word(ordered({ sending: false })), 'NOT SENDING');
-  assert.equal(word(ordered({}, 'holding')), 'HOLDING');
-  assert.equal(word(ordered({ confirmed: null }, 'holding')), 'ORDERED', 'zeros are sent: that is not yet a car that is held');
-  assert.deepEqual(['before', 'unproven'].map((stands) => word(ordered({ confirmed: null, stands }, 'holding'))), ['STANDING', 'STANDING']);
+test('one term of its state, never a comfortable one', () => {
+  const state = (/** @type {any} */ now, more = {}) => stateWord(seen(now, more));
+  assert.deepEqual(['not_available', 'not_armed', 'armed', 'else'].map((name) => state(slow(name))), ['NOT AVAILABLE', 'NOT ARMED', 'ARMED', 'NOT AVAILABLE']);
+  assert.equal(state(slow('armed'), { isSilent: true }), 'NOT KNOWN');
+  assert.deepEqual([true, null, false].map((confirmed) => state(ordered({ confirmed }))), ['SLOWING', 'ORDERED', 'NOT CONFIRMED']);
+  assert.equal(state(ordered({ sending: false })), 'NOT SENDING');
+  assert.equal(state(ordered({}, 'holding')), 'HOLDING');
+  assert.equal(state(ordered({ confirmed: null }, 'holding')), 'ORDERED', 'zeros are sent: that is not yet a car that is held');
+  assert.deepEqual(['before', 'unproven'].map((stands) => state(ordered({ confirmed: null, stands }, 'holding'))), ['STANDING', 'STANDING']);
 });
 
 test('the strip: armed where nothing else stands, the order above warnings, a critical alarm above the order', () => {
@@ -82,17 +82,17 @@ test('the strip: armed where nothing else stands, the order above warnings, a cr
 });
 
 test('four steps, each with how much later it was; what is not there is not a number', () => {
-  const told = (more = {}) => stepsOf(order(more)).map(({ label, value, mark }) => `${label} ${value} ${mark}`);
-  assert.deepEqual(told().slice(1), ['At the server +0.02 s ok', 'On the bridge +0.03 s ok', 'Car slows +0.42 s ok']);
-  assert.match(told()[0] ?? '', /^Pressed \d\d:\d\d:\d\d ok$/);
-  assert.deepEqual(told({ confirmed: null, steps: { ...STEPS, bridge_ms: null, slows_ms: null } }).slice(2), ['On the bridge – wait', 'Car slows – wait']);
-  assert.equal(told({ confirmed: false })[3], 'Car slows NOT SEEN crit', 'also where it had slowed before');
-  assert.equal(told({ sending: false, steps: { ...STEPS, bridge_ms: null, slows_ms: null }, confirmed: null })[2], 'On the bridge no link crit');
-  assert.equal(told({ confirmed: null, stands: 'before' })[3], 'Car stands already wait', 'nothing was shown to slow');
-  assert.equal(told({ confirmed: null, stands: 'unproven' })[3], 'Car stands not proven wait');
-  assert.match(told({ why: 'Speed above limit', steps: { ...STEPS, pressed_ms: null } })[0] ?? '', /^By itself /);
-  assert.equal(told({ why: 'Speed above limit', steps: { ...STEPS, pressed_ms: null } })[2], 'On the bridge +0.01 s ok');
-  assert.equal(told({ steps: { pressed_ms: null, server_ms: null, bridge_ms: null, slows_ms: null }, confirmed: null })[0], 'Pressed – wait');
+  const steps = (more = {}) => stepsOf(order(more)).map(({ label, value, mark }) => `${label} ${value} ${mark}`);
+  assert.deepEqual(steps().slice(1), ['At the server +0.02 s ok', 'On the bridge +0.03 s ok', 'Car slows +0.42 s ok']);
+  assert.match(steps()[0] ?? '', /^Pressed \d\d:\d\d:\d\d ok$/);
+  assert.deepEqual(steps({ confirmed: null, steps: { ...STEPS, bridge_ms: null, slows_ms: null } }).slice(2), ['On the bridge – wait', 'Car slows – wait']);
+  assert.equal(steps({ confirmed: false })[3], 'Car slows NOT SEEN crit', 'also where it had slowed before');
+  assert.equal(steps({ sending: false, steps: { ...STEPS, bridge_ms: null, slows_ms: null }, confirmed: null })[2], 'On the bridge no link crit');
+  assert.equal(steps({ confirmed: null, stands: 'before' })[3], 'Car stands already wait', 'nothing was shown to slow');
+  assert.equal(steps({ confirmed: null, stands: 'unproven' })[3], 'Car stands not proven wait');
+  assert.match(steps({ why: 'Speed above limit', steps: { ...STEPS, pressed_ms: null } })[0] ?? '', /^By itself /);
+  assert.equal(steps({ why: 'Speed above limit', steps: { ...STEPS, pressed_ms: null } })[2], 'On the bridge +0.01 s ok');
+  assert.equal(steps({ steps: { pressed_ms: null, server_ms: null, bridge_ms: null, slows_ms: null }, confirmed: null })[0], 'Pressed – wait');
 });
 
 test('the line beneath the steps: who, why and since when; or what is wrong', () => {
@@ -114,17 +114,17 @@ test('the count-down ends at 0 and is none once the order stands; its sound is o
   assert.equal(soundOf(state({ decelerate: slow('armed') }), page), null);
 });
 
-test('the guard: only one that is heard and guards is said to', () => {
-  const says = (/** @type {any} */ guard, lag_s = 0) => guardWords(guard && { why: '', hold: 0, age_s: 0.2, ...guard }, lag_s);
-  assert.match(says(null).text, /link loss will NOT slow the car$/);
+test('the guard: only one that sends and guards is shown as guarding', () => {
+  const guardOf = (/** @type {any} */ guard, lag_s = 0) => guardWords(guard && { why: '', hold: 0, age_s: 0.2, ...guard }, lag_s);
+  assert.match(guardOf(null).text, /link loss will NOT slow the car$/);
   for (const [name, isGuarded] of /** @type {const} */ ([['guarded', true], ['operator', true], ['slowing', true], ['holding', true], ['unguarded', false], ['new', false]])) {
-    const { text, isGuarded: told } = says({ state: name });
-    assert.equal(told, isGuarded, name);
+    const { text, isGuarded: found } = guardOf({ state: name });
+    assert.equal(found, isGuarded, name);
     assert.match(text, isGuarded ? /^GUARDED/ : /^UNGUARDED.*will NOT slow the car$/);
   }
-  assert.match(says({ state: 'guarded', age_s: 3.2 }).text, /^No message from the guard for 3\.2 s: link loss may NOT slow the car$/);
-  assert.equal(says({ state: 'guarded' }, 2).isGuarded, false, 'the page’s own silence counts');
-  assert.equal(says({ state: 'guarded', age_s: null }).isGuarded, false);
+  assert.match(guardOf({ state: 'guarded', age_s: 3.2 }).text, /^No message from the guard for 3\.2 s: link loss may NOT slow the car$/);
+  assert.equal(guardOf({ state: 'guarded' }, 2).isGuarded, false, 'the page’s own silence counts');
+  assert.equal(guardOf({ state: 'guarded', age_s: null }).isGuarded, false);
 });
 
 test('a release ends the order, or what the guard holds by itself, by its number', () => {
@@ -155,7 +155,7 @@ test('the sheet: what would be commanded, who competes, and the one thing this p
   assert.equal(sheet(slow('not_armed', { rivals: null })).facts[3]?.[2], true, 'not known is no "none"');
   assert.equal(sheet(slow('not_armed')).facts[3]?.[1], 'none');
   const other = sheet(slow('not_armed'), { mayControl: false, holder: 'Ben' });
-  assert.deepEqual([other.act, other.says], ['ask', 'Ben is in control and can arm it.']);
+  assert.deepEqual([other.act, other.message], ['ask', 'Ben is in control and can arm it.']);
   assert.equal(sheet(slow('armed')).act, 'disarm');
   assert.match(sheet(slow('armed')).text, /^Armed by Ann\./);
   assert.deepEqual([sheet(slow('armed'), { isViewer: true }).act, sheet(slow('not_armed'), { isReplay: true }).act, sheet(slow('not_armed'), { isSilent: true }).act, sheet(ordered()).act], [null, null, null, null]);
@@ -175,7 +175,7 @@ test('in the log: each step by its mark, one that was not confirmed as what it i
   assert.deepEqual([row({ step: 'not_confirmed' }).icon, row({ change: 'armed' }).icon, row({ change: 'paused' }).icon], ['crit', 'slow', 'info']);
 });
 
-test('the gauge: an arc from the ordered to the measured speed, its words away from the limit’s', () => {
+test('the gauge: an arc from the ordered to the measured speed, its label away from the limit’s', () => {
   assert.match(orderMark(2.2, 2.9, 15, 11).d, /^M14\.\d .*A196 196 0 0 1 29\./);
   assert.equal(orderMark(2.2, null, 15, 11).d, '');
   assert.equal(orderMark(2.2, 2.2, 15, 11).d, '');

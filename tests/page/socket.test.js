@@ -33,9 +33,9 @@ function set() {
   /** @type {Socket[]} */
   const sockets = [];
   /** @type {string[]} */
-  const heard = [];
+  const received = [];
   const pageSocket = new PageSocket(
-    { opened: () => heard.push('open'), closed: () => heard.push('closed'), text: (text) => heard.push(text), bytes: () => heard.push('bytes') },
+    { opened: () => received.push('open'), closed: () => received.push('closed'), text: (text) => received.push(text), bytes: () => received.push('bytes') },
     () => /** @type {any} */ (sockets[sockets.push(new Socket()) - 1]),
     () => now_ms,
     () => chance.now,
@@ -45,11 +45,11 @@ function set() {
   const look = (from_ms, to_ms) => {
     for (now_ms = from_ms; now_ms <= to_ms; now_ms += 100) pageSocket.look(now_ms);
   };
-  return { pageSocket, sockets, heard, at, look, chance };
+  return { pageSocket, sockets, received, at, look, chance };
 }
 
-test('a quiet connection is given up though the browser reports nothing, and what it still brings is not heard', () => {
-  const { pageSocket, sockets, heard } = set();
+test('a quiet connection is given up though the browser reports nothing, and what it still brings is not delivered', () => {
+  const { pageSocket, sockets, received } = set();
   pageSocket.look(0);
   const first = sockets[0];
   first?.onopen();
@@ -59,7 +59,7 @@ test('a quiet connection is given up though the browser reports nothing, and wha
   assert.equal(first?.isClosed, false);
   pageSocket.look(3501);
   assert.equal(first?.isClosed, true);
-  assert.deepEqual(heard, ['open', 'closed']);
+  assert.deepEqual(received, ['open', 'closed']);
   assert.equal(first?.onmessage, null);
   assert.equal(typeof late, 'function');
   assert.equal(sockets.length, 2);
@@ -85,7 +85,7 @@ test('a connection of a weak radio gets more time, and what was measured holds f
     at(Number(took_ms));
     pageSocket.send({ kind: 'take', seq: 1 });
     pageSocket.answered(Number(came_ms), 'state');
-    pageSocket.answered(Number(came_ms) + 500, 'state'); // a frame that nobody requested says nothing of the round trip
+    pageSocket.answered(Number(came_ms) + 500, 'state'); // a frame that nobody requested has no information about the round trip
     pageSocket.proof(Number(came_ms));
   }
   look(5700, 8700);
@@ -96,7 +96,7 @@ test('a connection of a weak radio gets more time, and what was measured holds f
   assert.equal(sockets.length, 3);
 });
 
-test('what was asked for proves the connection, whatever is known of the clocks yet', () => {
+test('a requested message proves the connection, whatever is known of the clocks yet', () => {
   const { pageSocket, sockets, at, look } = set();
   pageSocket.look(0);
   at(40);
@@ -171,7 +171,7 @@ function slow() {
 }
 
 test('over a slow radio another connection is dialled beside a quiet one, and takes its place once the server greets it', () => {
-  const { sockets, heard, at, look, pageSocket } = slow();
+  const { sockets, received, at, look, pageSocket } = slow();
   look(400, 1300);
   assert.equal(sockets.length, 1);
   look(1400, 1500);
@@ -189,23 +189,23 @@ test('over a slow radio another connection is dialled beside a quiet one, and ta
   assert.equal(sockets[0]?.isClosed, true);
   pageSocket.send({ kind: 'pause' });
   assert.deepEqual([sockets[0]?.sent.length, sockets[1]?.sent.length], [2, 1], 'over one connection, never over both');
-  assert.deepEqual(heard, ['open', 'closed', 'open', 'duty', HELLO]);
+  assert.deepEqual(received, ['open', 'closed', 'open', 'duty', HELLO]);
   assert.equal(sockets[0]?.onmessage, null);
 });
 
 test('what the other connection brought before its greeting is read where the first one is given up meanwhile', () => {
-  const { sockets, heard, look } = slow();
+  const { sockets, received, look } = slow();
   look(400, 1500);
   sockets[1]?.onopen();
   sockets[1]?.onmessage({ data: 'duty' });
   look(1600, 3000);
   assert.equal(sockets[0]?.isClosed, true);
   sockets[1]?.onmessage({ data: 'unserved' });
-  assert.deepEqual(heard, ['open', 'closed', 'open', 'duty', 'unserved']);
+  assert.deepEqual(received, ['open', 'closed', 'open', 'duty', 'unserved']);
 });
 
 test('a quiet connection that answers before the other one does stays, and one that the server refuses takes no place', () => {
-  const { sockets, heard, at, look, pageSocket } = slow();
+  const { sockets, received, at, look, pageSocket } = slow();
   look(400, 1500);
   sockets[1]?.onopen();
   sockets[1]?.onclose(); // as of a device with too many pages
@@ -220,7 +220,7 @@ test('a quiet connection that answers before the other one does stays, and one t
   sockets[2]?.onopen();
   sockets[2]?.onmessage({ data: HELLO });
   assert.deepEqual([sockets[0]?.isClosed, sockets[2]?.isClosed, sockets[2]?.onmessage], [false, true, null]);
-  assert.deepEqual([sockets.length, heard], [3, ['open']]);
+  assert.deepEqual([sockets.length, received], [3, ['open']]);
 });
 
 test('connections that are not needed become seldom: after 1, 2, 4, 8 and 10 s', () => {
@@ -265,14 +265,14 @@ test('connections that take each other\'s place within half a minute wait too, u
 });
 
 test('nothing is sent on a connection that was quiet for too long, though the other one is not open yet', () => {
-  const { sockets, heard, look, pageSocket } = slow();
+  const { sockets, received, look, pageSocket } = slow();
   look(400, 2800);
   assert.equal(pageSocket.isOpen, true);
   look(2900, 3000);
   assert.deepEqual([pageSocket.isOpen, pageSocket.send({ kind: 'pause' }), sockets[0]?.isClosed], [false, false, true]);
   assert.equal(sockets[1]?.isClosed, false, 'its dial is not over');
   sockets[1]?.onopen();
-  assert.deepEqual(heard, ['open', 'closed', 'open']);
+  assert.deepEqual(received, ['open', 'closed', 'open']);
 });
 
 test('a connection over which anything comes is not doubled: the server has nothing fresh', () => {

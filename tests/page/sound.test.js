@@ -7,7 +7,7 @@ const PULSES = { high: 10, medium: 3, low: 2 };
 for (const [name, count] of Object.entries(PULSES)) {
   const sound = /** @type {'high' | 'medium' | 'low'} */ (name);
 
-  test(`${name}: ${count} pulses, heard as such in its samples`, () => {
+  test(`${name}: ${count} pulses, found as such in its samples`, () => {
     assert.equal(burstOf(sound).pulses.length, count);
     const rate = 8000;
     const samples = samplesOf(sound, rate);

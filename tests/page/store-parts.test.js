@@ -12,19 +12,19 @@ import { state } from './frames.js';
 test('a listener that throws is a failure, and stops none of the others', () => {
   /** @type {unknown[]} */
   const failed = [];
-  const heard = /** @type {string[]} */ ([]);
+  const received = /** @type {string[]} */ ([]);
   const emitter = new Emitter((error) => failed.push(error));
   emitter.on('draw', () => { throw new Error('a broken panel'); });
-  const off = emitter.on('draw', (detail) => heard.push(detail));
+  const off = emitter.on('draw', (detail) => received.push(detail));
   emitter.emit('draw', 'one');
   off();
   emitter.emit('draw', 'two');
-  assert.deepEqual([heard, failed.length], [['one'], 2]);
+  assert.deepEqual([received, failed.length], [['one'], 2]);
 });
 
 const NOT_SENT = { ok: false, outcome: 'not_delivered', reason: 'Not sent: the server does not answer.', isBroken: true };
 
-test('what is asked is answered once, not sent where it cannot be, and not known when no answer comes', async (t) => {
+test('a request is answered once, not sent where it cannot be, and not known when no answer comes', async (t) => {
   t.mock.timers.enable({ apis: ['setTimeout'] });
   const sent = /** @type {any[]} */ ([]);
   const refused = /** @type {(string | undefined)[]} */ ([]);
@@ -49,7 +49,7 @@ test('what is asked is answered once, not sent where it cannot be, and not known
   assert.deepEqual(refused, ['Not now.', broken, late]);
 });
 
-test('what became of it is asked since the moment it was asked for, not since it was given up', async (t) => {
+test('its outcome is queried since the moment of the request, not since it was given up', async (t) => {
   t.mock.timers.enable({ apis: ['setTimeout'] });
   let now_ms = 50_000;
   t.mock.method(performance, 'now', () => now_ms);
@@ -63,7 +63,7 @@ test('what became of it is asked since the moment it was asked for, not since it
   assert.equal(sent[1].ago_s, 5);
 });
 
-test('what became of a command that was not answered is asked until it is known, and told once', async () => {
+test('what became of a command that was not answered is queried until it is known, and reported once', async () => {
   const sent = /** @type {any[]} */ ([]);
   const found = /** @type {any[]} */ ([]);
   const requests = new Requests((message) => Boolean(sent.push(message)), () => {}, () => null, (one) => found.push(one));
@@ -99,7 +99,7 @@ test('what became of a command that was not answered is asked until it is known,
   assert.deepEqual(sent, []);
 });
 
-test('an answer that says that it is not known is looked up as well', async () => {
+test('an answer of an unknown outcome is looked up as well', async () => {
   const sent = /** @type {any[]} */ ([]);
   const requests = new Requests((message) => Boolean(sent.push(message)), () => {});
   const answer = requests.ask('pause', {});
@@ -116,25 +116,25 @@ const LOST = /** @type {const} */ ([
   ['unknown', 'server-broker', 'The link is cut between server and broker. Not known yet in which direction.'],
   ['unknown', 'broker-agent', 'The link is cut between server and agent. Not known yet in which direction.'],
 ]);
-for (const [outcome, cut, words] of LOST) {
-  test(`every command that is ${outcome} says that the link ${cut} is cut`, async () => {
+for (const [outcome, cut, text] of LOST) {
+  test(`every command that is ${outcome} names that the link ${cut} is cut`, async () => {
     for (const kind of /** @type {const} */ (['pause', 'arm', 'release', 'take_item'])) {
       const sent = /** @type {any[]} */ ([]);
       const requests = new Requests((message) => Boolean(sent.push(message)), () => {});
       const answer = requests.ask(kind, /** @type {any} */ ({}));
       requests.answered(/** @type {any} */ ({ kind: 'reply', id: sent[0].id, ok: false, outcome, cut, reason: 'Lost.' }));
-      assert.equal((await answer).reason, `Lost. ${words}`);
+      assert.equal((await answer).reason, `Lost. ${text}`);
     }
   });
 }
 
-test('a refusal names no cut, and the later word names the direction', async () => {
+test('a refusal names no cut, and the later message names the direction', async () => {
   const sent = /** @type {any[]} */ ([]);
   const found = /** @type {any[]} */ ([]);
   const requests = new Requests((message) => Boolean(sent.push(message)), () => {}, () => null, (one) => found.push(one));
-  const asked = requests.ask('pause', {});
+  const reply = requests.ask('pause', {});
   requests.answered(/** @type {any} */ ({ kind: 'reply', id: sent[0].id, ok: false, outcome: 'not_delivered', cut: null, reason: 'Too late.' }));
-  assert.equal((await asked).reason, 'Too late.');
+  assert.equal((await reply).reason, 'Too late.');
   const lost = (/** @type {string} */ became) => {
     void requests.ask('release', /** @type {any} */ ({}));
     const { id } = sent.at(-1);
@@ -147,7 +147,7 @@ test('a refusal names no cut, and the later word names the direction', async () 
   assert.equal(lost('never'), '“Release” was lost on its way. It is not carried out any more. The link was cut in the direction to the car, between server and agent.');
 });
 
-test('an answer that is merely late says so, and names the part that it names itself', async (t) => {
+test('an answer that is merely late is shown as late, and names the part that it names itself', async (t) => {
   t.mock.timers.enable({ apis: ['setTimeout'] });
   const sent = /** @type {any[]} */ ([]);
   const texts = /** @type {string[]} */ ([]);
@@ -201,7 +201,7 @@ test('what must be signed is sent once it is, in its order, and never late', asy
   assert.equal(sent.length, 1);
 });
 
-test('a scan is asked for while anybody wants it, and again of a server that begins anew', () => {
+test('a scan is requested while anybody needs it, and again from a server that begins anew', () => {
   const sent = /** @type {any[]} */ ([]);
   const scans = new ScanFeed((message) => Boolean(sent.push(message)));
   scans.opened();

@@ -45,13 +45,13 @@ def seven() -> list[dict[str, Any]]:
 
 
 def acknowledged(served: Canned) -> list[tuple[Any, Any]]:
-    return [(one["alarm"], one["occurrence"]) for one in served.heard if one["kind"] == "acknowledge"]
+    return [(one["alarm"], one["occurrence"]) for one in served.received if one["kind"] == "acknowledge"]
 
 
-async def heard(served: Canned, count: int, kind: str = "acknowledge") -> list[str]:
+async def received(served: Canned, count: int, kind: str = "acknowledge") -> list[str]:
     """The alarms that were answered, once there are so many."""
     async with asyncio.timeout(20):
-        while len(found := [one["alarm"] for one in served.heard if one["kind"] == kind]) < count:
+        while len(found := [one["alarm"] for one in served.received if one["kind"] == kind]) < count:
             await asyncio.sleep(0.05)
     return found
 
@@ -77,14 +77,14 @@ async def test_seven_alarms_are_acknowledged_with_four_taps(phone: Phone, canned
         critical = phone.page.locator("[data-f=alarms] li", has_text="Speed above limit")
         await expect(critical.locator("[data-do=silence]")).to_be_visible()
         await phone.page.locator("[data-f=alarms-ended]").tap()  # 2
-        answer(canned, await heard(canned, 3))
+        answer(canned, await received(canned, 3))
         await critical.locator("[data-do=acknowledge]").tap()  # 3
-        answer(canned, await heard(canned, 4))
+        answer(canned, await received(canned, 4))
         these = phone.page.locator("[data-f=alarms-these]")
         await expect(these).to_have_text("Acknowledge these 3")
         await expect(these).to_be_enabled()
         await these.tap()  # 4
-        names = await heard(canned, 7)
+        names = await received(canned, 7)
         assert sorted(names) == sorted(one["id"] for one in seven()), "each once"
         answer(canned, names)
         await expect(phone.f("alarms-count")).to_have_text("all acknowledged")
@@ -148,8 +148,8 @@ async def test_silence_takes_the_sound_of_one_alarm_and_says_by_whom(phone: Phon
     await phone.f("strip").tap()
     row = phone.page.locator("[data-f=alarms] li")
     await row.locator("[data-do=silence]").press("Enter")
-    assert await heard(canned, 1, "silence") == ["warn"]
-    assert [one["occurrence"] for one in canned.heard if one["kind"] == "silence"] == [3]
+    assert await received(canned, 1, "silence") == ["warn"]
+    assert [one["occurrence"] for one in canned.received if one["kind"] == "silence"] == [3]
     canned.state["alarms"][0] |= {"silenced_until_ms": 45_000, "silenced_by": "Desk 1"}
     await expect(row.locator(".quiet")).to_contain_text("by Desk 1")
     await expect(row).to_contain_text("unacknowledged")
@@ -175,7 +175,7 @@ async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(p
     await expect(rows.nth(2)).to_contain_text("acknowledged by Ann")
     await expect(rows.nth(3)).to_contain_text("cause: Most signals are slow")
     await rows.nth(1).locator("[data-do=acknowledge]").tap()
-    await heard(returned, 1)
+    await received(returned, 1)
     assert acknowledged(returned) == [("gps_jump", 4)]
     returned.state["alarms"] = returned.state["alarms"][:1]
     await expect(rows).to_have_count(2)
@@ -184,7 +184,7 @@ async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(p
     ended = phone.page.locator("[data-f=alarms-ended]")
     await expect(ended).to_have_text("Acknowledge all that ended 1")
     await ended.tap()
-    await heard(returned, 2)
+    await received(returned, 2)
     assert acknowledged(returned)[1:] == [("link_lost", 1)]
     returned.state["alarms"] = []
     await expect(strip).to_contain_text("No alarms")
@@ -279,7 +279,7 @@ async def test_an_alarm_of_another_version_is_a_dialog_with_its_words(phone: Pho
     await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "asking")
     await expect(phone.f("strip")).to_contain_text("Wheel lost")
     await phone.f("acknowledge", "#sheet-alarm").tap()
-    assert await heard(canned, 1) == ["wheel_lost"]
+    assert await received(canned, 1) == ["wheel_lost"]
     canned.state["alarms"][0] |= {"state": "ACKED", "place": "list"}
     await expect(sheet).to_be_hidden()
     await phone.f("strip").tap()

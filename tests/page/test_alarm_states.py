@@ -116,8 +116,8 @@ async def test_under_a_dialog_no_dead_key_looks_live_and_its_slide_says_what_com
       const isSeen = one.checkVisibility({ visibilityProperty: true }) && !one.closest('.view');
       return isSeen && one.offsetWidth > 0 && opacity > 0.5;
     }).map((one) => one.dataset.f)"""
-    told = {"who", "link", "strip"}  # they name the car, the link and the alarm: only what marks them as keys goes
-    assert set(await page.evaluate(live_keys)) <= told
+    named = {"who", "link", "strip"}  # they name the car, the link and the alarm: only what marks them as keys goes
+    assert set(await page.evaluate(live_keys)) <= named
     await expect(page.locator("#monitor .chip .more")).to_have_css("visibility", "hidden")
     await slide.tap()
     await expect(page.locator("#sheet-alarm")).to_contain_text("acknowledge the alarm, then arm it")
@@ -125,7 +125,7 @@ async def test_under_a_dialog_no_dead_key_looks_live_and_its_slide_says_what_com
     canned.state["alarms"] = [speeding(**ACKED)]
     await expect(phone.f("slow")).to_contain_text("press to arm")
     await expect(page.locator("body")).not_to_have_attribute("data-held", "")
-    assert set(await page.evaluate(live_keys)) > told
+    assert set(await page.evaluate(live_keys)) > named
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)

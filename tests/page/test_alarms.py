@@ -142,7 +142,7 @@ async def test_the_slow_down_says_why_it_is_off(phone: Phone, calm: Process) -> 
 
 
 async def test_texts_that_mean_harm_are_only_text(phone: Phone, tmp_path: Path) -> None:
-    """Whatever a car says of itself stands on the page letter by letter, and breaks nothing."""
+    """Every text of a car stands on the page letter by letter, and breaks nothing."""
     drive = write(
         tmp_path / "hostile.bag",
         {

@@ -204,7 +204,7 @@ async def test_back_answers_no_alarm(phone: Phone, canned: Canned) -> None:
         await page.wait_for_function(GUARDED)
         await phone.drawn()
         await expect(sheet).to_be_visible()
-    assert "acknowledge" not in [one["kind"] for one in canned.heard]
+    assert "acknowledge" not in [one["kind"] for one in canned.received]
     assert await page.evaluate("window.pushes") == []
 
 

@@ -46,7 +46,7 @@ async def test_the_first_picture_of_the_car_is_whole_and_what_lies_under_the_fol
     assert re.fullmatch(r"−?[0-9]+\.[0-9]", first["speed"]), first
     assert first["strip"]
     assert first["checks"] == 0
-    assert first["plate"], "what is said once values end is made after the values"
+    assert first["plate"], "the text for the end of values is made after the values"
     await expect(phone.page.locator(".plate:not([hidden])")).to_have_count(1)
 
 
@@ -125,5 +125,5 @@ async def test_a_page_that_cannot_begin_in_whole_shows_nothing_of_the_car(
         await expect(phone.page.locator("dialog[open], .snack:not([hidden])")).to_have_count(0)
         await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "none")
         await phone.page.wait_for_timeout(300)
-    assert any("a browser unlike others" in said for said in phone.complaints)
+    assert any("a browser unlike others" in line for line in phone.complaints)
     phone.complaints.clear()

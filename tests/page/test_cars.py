@@ -50,16 +50,16 @@ async def fleet(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Fleet
     """Five cars."""
     async with contextlib.AsyncExitStack() as stack:
         cars = {name: await stack.enter_async_context(roaming(speed_mps=3.0)) for name in NAMES}
-        told = watching(tmp_path_factory.mktemp("data"), {name: car.address for name, car in cars.items()})
-        yield Fleet(await stack.enter_async_context(running(*told)), cars)
+        arguments = watching(tmp_path_factory.mktemp("data"), {name: car.address for name, car in cars.items()})
+        yield Fleet(await stack.enter_async_context(running(*arguments)), cars)
 
 
 @contextlib.asynccontextmanager
 async def two_cars(data: Path) -> AsyncIterator[Fleet]:
     """Two simulated cars that can be slowed, both armed."""
     async with running(*simulate()) as caracal, running(*simulate("--seed", "2")) as margay:
-        told = watching(data, {"Caracal": caracal.address, "Margay": margay.address})
-        async with running(*told) as watch:
+        arguments = watching(data, {"Caracal": caracal.address, "Margay": margay.address})
+        async with running(*arguments) as watch:
             one = Fleet(watch, {})
             async with asyncio.timeout(30):
                 for car in ("Caracal", "Margay"):
@@ -101,13 +101,13 @@ async def test_a_car_that_speeds_is_named_within_a_second_on_a_phone_that_shows_
         machine = asyncio.create_task(phone.watch_machine())
         await phone.f("sound-off").tap()
         await expect(phone.f("sound-off")).to_be_hidden()
-        # In the page's own clock: when it first names Serval, what it says aloud, and whether it sounds over and over.
+        # In the page's own clock: when it first names Serval, what it speaks, and whether it sounds over and over.
         await page.evaluate(
-            """() => { window.said = []; window.sounded = [];
+            """() => { window.spoken = []; window.sounded = [];
               const { start } = AudioBufferSourceNode.prototype;
               AudioBufferSourceNode.prototype.start = function () { window.sounded.push(this.loop); start.call(this); };
               speechSynthesis.getVoices = () => [{}];
-              speechSynthesis.speak = (one) => window.said.push(one.text);
+              speechSynthesis.speak = (one) => window.spoken.push(one.text);
               const look = () => { if (!window.named && document.querySelector('.snack.other')?.textContent
                 .includes('Serval: Speed above limit')) window.named = Date.now(); else requestAnimationFrame(look); };
               look(); }"""
@@ -122,7 +122,7 @@ async def test_a_car_that_speeds_is_named_within_a_second_on_a_phone_that_shows_
         machine.cancel()
         await expect(phone.f("strip-text")).to_contain_text("Serval: Speed above limit")
         await expect(phone.f("car-badge")).to_have_attribute("data-kind", "crit")
-        assert "Serval: Speed above limit" in await page.evaluate("window.said")
+        assert "Serval: Speed above limit" in await page.evaluate("window.spoken")
         assert await page.evaluate("window.sounded") == [True]
         await expect(phone.f("slow")).to_be_in_viewport()  # the card is in no way of this car's slide
         await no_barrier(page, "another car's alarm")
@@ -177,15 +177,15 @@ async def test_another_car_is_shown_without_a_reload_and_nothing_of_the_first(br
         await expect(page.locator("#panel-settings .group").first).to_be_visible()
         async with page.expect_request(
             lambda request: "/api/trends" in request.url or "/api/track" in request.url
-        ) as asked:
+        ) as track:
             await page.evaluate("location.hash = '#map'")
-        assert "vehicle=Kodkod_2" in (await asked.value).url
+        assert "vehicle=Kodkod_2" in (await track.value).url
 
         await page.goto(fleet.watch.address)  # without a name: the one that this phone had last
         await shows(phone, "Kodkod_2")
         answer = await page.goto(f"{fleet.watch.address}/?vehicle=Jaguar")
         assert answer is not None
-        if IS_PARTED:  # its agent may come: until then the page says that it was not heard
+        if IS_PARTED:  # its agent may come: until then the page shows that it was not received
             assert answer.status == 200
             await expect(page.locator("#monitor")).to_contain_text("The agent of Jaguar has sent nothing")
             return
@@ -255,7 +255,7 @@ async def test_a_slow_down_reaches_no_car_but_the_one_whose_name_stands_on_the_s
         await one.page.wait_for_timeout(300)
         assert {await fleet.slow(car) for car in ("Caracal", "Margay")} <= NOT_ORDERED
 
-        # A page that still names the car of before: its order is refused by the one it reaches, and says so.
+        # A page that still names the car of before: the one it reaches refuses its order, and the refusal is shown.
         await one.page.evaluate(
             """() => { const { stringify } = JSON;
               const stale = (it) => (it?.vehicle === 'Margay' ? { ...it, vehicle: 'Caracal' } : it);

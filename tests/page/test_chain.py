@@ -1,4 +1,4 @@
-"""Each part of the chain falls silent in turn: the page says which, covers the values, and comes back by itself."""
+"""Each part of the chain falls silent in turn: the page shows which, covers the values, and comes back by itself."""
 
 from __future__ import annotations
 
@@ -247,7 +247,7 @@ async def hatched(phone: Phone, picture: str) -> float:
 
 @pytest.mark.gate
 async def test_a_page_that_slept_shows_the_veil_first(phone: Phone, drive: Drive) -> None:
-    """Hidden and seen again: covered before anything is drawn. A browser under test never hides, so it is told to."""
+    """Hidden and seen again: covered before anything is drawn. A browser under test never hides, so it is set to."""
     seen = await phone.page.evaluate(
         """() => {
           const veil = document.querySelector('#monitor .veil');
@@ -297,7 +297,7 @@ async def test_a_page_that_is_stopped_wakes_under_the_veil(phone: Phone, drive: 
 
 
 async def test_a_radio_gap_hides_old_values_and_its_events_come_exactly_once(phone: Phone, tmp_path: Path) -> None:
-    """The car begins to speed while the phone hears nothing; the alarm is there when it hears again, once."""
+    """The car begins to speed while the phone receives nothing; the alarm is there when it receives again, once."""
     drive = write(
         tmp_path / "late.bag",
         {
@@ -309,8 +309,8 @@ async def test_a_radio_gap_hides_old_values_and_its_events_come_exactly_once(pho
     )
     async with running(*replay(drive, "--wait")) as car, running(*server(tmp_path / "data", car.address)) as watch:
         radio = Radio(int(watch.address.rsplit(":", 1)[1]))
-        async with radio.on_air() as heard:
-            await phone.open(heard)
+        async with radio.on_air() as address:
+            await phone.open(address)
             await phone.live()
             radio.cut()
             began_s = time.monotonic()
@@ -331,13 +331,13 @@ async def test_a_radio_gap_hides_old_values_and_its_events_come_exactly_once(pho
 
 @pytest.mark.gate
 async def test_case_03_connected_but_no_message(phone: Phone, tmp_path: Path) -> None:
-    """Topics are there, nothing is said on them: what a bridge looks like after a restart of roscore."""
+    """Topics are there, nothing is published on them: what a bridge looks like after a restart of roscore."""
     drive = steady(tmp_path / "steady.bag", 4.2)
     async with (
         running("replay", str(drive), "--port", "0", "--stay", "--rate", "100") as car,
         running(*server(tmp_path / "data")) as watch,
     ):
-        await asyncio.sleep(1)  # it has all been said before anyone listened
+        await asyncio.sleep(1)  # all was published before anyone subscribed
         await phone.open(watch.address)
         await phone.page.fill("#address", car.shown)
         await phone.f("go", "#connect").tap()

@@ -98,10 +98,10 @@ async def test_an_alarm_opens_with_its_numbers_its_history_and_a_threshold_to_ch
     await number.fill("13")
     await number.press("Enter")
     async with asyncio.timeout(20):
-        while not any(one["kind"] == "set" for one in checked.heard):
+        while not any(one["kind"] == "set" for one in checked.received):
             await asyncio.sleep(0.05)
-    assert [one["values"] for one in checked.heard if one["kind"] == "set"] == [{"speed_limit.max_mps": 13.0}]
-    assert [one["alarm"] for one in checked.heard if one["kind"] == "acknowledge"] == ["Speed"]
+    assert [one["values"] for one in checked.received if one["kind"] == "set"] == [{"speed_limit.max_mps": 13.0}]
+    assert [one["alarm"] for one in checked.received if one["kind"] == "acknowledge"] == ["Speed"]
     await phone.f("check-trends").tap()
     await expect(phone.f("title")).to_have_text("Trends")
     await phone.page.keyboard.press("Escape")

@@ -1,4 +1,4 @@
-"""Text can be read in every state and theme, on every tab: words with a contrast of 4.5:1, what is measured of 7:1."""
+"""Text can be read in every state and theme, on every tab: text with a contrast of 4.5:1, what is measured of 7:1."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.page.screenshots import silent_car
 from tests.page.test_alarm_states import ACKED, ENDED, opened, speeding
 
 CONTRAST = Path(__file__).with_name("contrast.js").read_text(encoding="utf-8").split("\n", 1)[1].rstrip().rstrip(";")
-WORDS, DIGITS = 4.5, 7.0
+TEXT, DIGITS = 4.5, 7.0
 THEMES = ("dark", "light")
 
 
@@ -102,7 +102,7 @@ async def all_is_read(phone: Phone, canned: Canned, place: str, states: tuple[st
         await phone.drawn(2)
         found = await page.evaluate(CONTRAST)
         assert len(found) > 15, (state, theme)
-        if bad := [one for one in found if one["ratio"] < WORDS]:
+        if bad := [one for one in found if one["ratio"] < TEXT]:
             wrong[f"{state}, {theme}"] = bad
     assert wrong == {}
 

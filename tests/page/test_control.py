@@ -1,4 +1,4 @@
-"""Three browsers at one server: control taken, asked for, handed over, taken over, lost by sleep; who hears alarms."""
+"""Three browsers at one server: control taken, requested, handed over, taken over, lost by sleep; who hears alarms."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NAMES = ("Ann", "Ben", "Cem")
 
 
 class Crew:
-    """Three phones of three people, and what the server says of them."""
+    """Three phones of three people, and the server's state of them."""
 
     def __init__(self, phones: dict[str, Phone], watch: Process) -> None:
         self.phones = phones
@@ -119,7 +119,7 @@ async def crew(browser: Browser, data: Path, car: Process) -> AsyncIterator[Crew
         finally:
             for context in contexts:
                 await context.close()
-    assert [said for phone in phones.values() for said in phone.complaints] == []
+    assert [line for phone in phones.values() for line in phone.complaints] == []
 
 
 async def holds(one: Crew, name: str) -> None:
@@ -144,9 +144,9 @@ async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(
         await expect(refused).to_contain_text("Not resumed")
         await expect(refused).to_contain_text("Ann is in control.")
         await refused.get_by_role("button", name="Request control").tap()
-        asks = one["Ann"].page.locator(".snack.asks")
-        await expect(asks).to_contain_text(re.compile(r"Ben gets it in (\d+) s unless you keep it\."))
-        await asks.get_by_role("button", name="Keep").tap()
+        prompt = one["Ann"].page.locator(".snack.asks")
+        await expect(prompt).to_contain_text(re.compile(r"Ben gets it in (\d+) s unless you keep it\."))
+        await prompt.get_by_role("button", name="Keep").tap()
         await expect(one["Ben"].page.locator(".snack.note")).to_contain_text(
             "Ann keeps control; the request of Ben was declined."
         )
@@ -154,7 +154,7 @@ async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(
 
         await one.press("Cem", "Request control")
         await expect(one["Cem"].page.locator("#sheet-control")).to_contain_text("It is granted in")
-        await asks.get_by_role("button", name="Hand over").tap()
+        await prompt.get_by_role("button", name="Hand over").tap()
         await holds(one, "Cem")
         await one["Cem"].page.locator("#sheet-control").get_by_role("button", name="Close").tap()
 
@@ -288,7 +288,7 @@ async def test_nobody_who_hears_while_the_car_moves_is_a_warning_on_every_page(
 async def test_each_phone_has_its_marker_and_the_one_in_the_car_is_compared(
     browser: Browser, car: Process, tmp_path: Path
 ) -> None:
-    """Ann tells a position, Ben was not allowed to; Ann, in control, says that Ben's is in the car."""
+    """Ann shares a position, Ben was not allowed to; Ann, in control, chooses that Ben's is in the car."""
     async with running(*server(tmp_path, car.address)) as watch:
         one = Crew({}, watch)
         contexts = []

@@ -79,7 +79,7 @@ def prepared(data: Path) -> Path:
     return data
 
 
-async def asked(client: httpx.AsyncClient) -> dict[str, Any]:
+async def check_of(client: httpx.AsyncClient) -> dict[str, Any]:
     found: dict[str, Any] = (await client.get("/api/departure")).json()
     return found
 
@@ -102,18 +102,18 @@ PRESS_WHAT_MOVES = """() => new MutationObserver((_, all) => {
   all.disconnect();
   document.querySelector('.departure [data-item="coupling"] .tick').click();
 }).observe(document.querySelector('.dep-list'), { attributes: true, attributeFilter: ['data-moved'] })"""
-ASKED = re.compile(r"/api/departure(\?|$)")
-SAID = ("ERR_CONNECTION", "WebSocket")  # by a browser whose requests fail
+CHECK_URL = re.compile(r"/api/departure(\?|$)")
+OFFLINE = ("ERR_CONNECTION", "WebSocket")  # by a browser whose requests fail
 
 
 async def is_old_without_answers(walk: Walk) -> None:
-    """What is not answered is said, and no value stands as if it were measured now."""
+    """A missing answer is shown, and no value stands as if it were measured now."""
     value, state = walk.item("brake").locator(".v"), walk.screen.locator(".state")
     await expect(value).not_to_have_text("–")
-    await walk.page.route(ASKED, lambda route: route.abort("connectionrefused"))
+    await walk.page.route(CHECK_URL, lambda route: route.abort("connectionrefused"))
     await expect(state).to_contain_text("What is shown here is old.")
     await expect(value).to_have_text("–")
-    await walk.page.unroute(ASKED)
+    await walk.page.unroute(CHECK_URL)
     await expect(state).to_be_hidden()
     await expect(value).not_to_have_text("–")
 
@@ -167,7 +167,7 @@ async def test_ten_items_are_walked_fixed_and_signed_within_15_taps(
             await no_barrier(phone.page, "signed departure check", ".departure")
             assert walk.taps <= 15
 
-            signed = await asked(client)
+            signed = await check_of(client)
             signature = signed["signature"]
             assert hashlib.sha256(signature["document"].encode()).hexdigest() == signature["hash"]
             assert (signature["done"], signature["not_applicable"]) == (9, 1)
@@ -189,8 +189,8 @@ async def test_ten_items_are_walked_fixed_and_signed_within_15_taps(
         running(*server(tmp_path, car.address, port)) as watch,
         httpx.AsyncClient(base_url=watch.address) as client,
     ):
-        again = await asked(client)
-        assert again["signature"] == signature, "what was signed is known word for word"
+        again = await check_of(client)
+        assert again["signature"] == signature, "what was signed is kept letter by letter"
         assert [(row["id"], row["result"], row["note"]) for row in again["items"]] == [
             (row["id"], row["result"], row["note"]) for row in signed["items"]
         ]
@@ -198,7 +198,7 @@ async def test_ten_items_are_walked_fixed_and_signed_within_15_taps(
         await phone.live()
         await phone.page.locator('[data-f="departure-reopen"]').tap()
         await expect(walk.screen.locator('[data-f="departure-sign"]')).to_be_visible()
-    assert [one for one in phone.complaints if not any(said in one for said in SAID)] == []
+    assert [one for one in phone.complaints if not any(line in one for line in OFFLINE)] == []
     await context.close()
 
 
@@ -219,13 +219,13 @@ async def test_the_list_is_edited_in_settings(browser: Browser, car: Process, tm
         await no_barrier(phone.page, "list of the departure check", '[data-part="departure"]')
 
         async def listed() -> list[str]:
-            return [f"{one['id']} {one['kind']} {one['need']}" for one in (await asked(client))["items"]]
+            return [f"{one['id']} {one['kind']} {one['need']}" for one in (await check_of(client))["items"]]
 
         await group.get_by_label("Title of one more item").fill("Örtliche Lage")
-        await phone.page.route(ASKED, lambda route: route.abort("connectionrefused"))
+        await phone.page.route(CHECK_URL, lambda route: route.abort("connectionrefused"))
         await group.locator('[data-f="departure-add"]').tap()
         await expect(group.locator(".bad")).to_contain_text("Nothing was changed.")
-        await phone.page.unroute(ASKED)
+        await phone.page.unroute(CHECK_URL)
         assert len(await listed()) == 10
         await group.locator('[data-f="departure-add"]').tap()
         await expect(rows).to_have_count(11)
@@ -241,7 +241,7 @@ async def test_the_list_is_edited_in_settings(browser: Browser, car: Process, tm
             await rows.nth(9).get_by_label(f"{label}: how often").fill(value)
             await rows.nth(9).get_by_label(f"{label}: how often").blur()
         async with asyncio.timeout(8):  # the second was typed while the first was sent
-            while [(one["every_days"], one["every_km"]) for one in (await asked(client))["items"]][9] != (30, 500):
+            while [(one["every_days"], one["every_km"]) for one in (await check_of(client))["items"]][9] != (30, 500):
                 await asyncio.sleep(0.1)
         await rows.first.get_by_role("button", name="Remove").tap()
         await expect(rows).to_have_count(10)
@@ -253,6 +253,6 @@ async def test_the_list_is_edited_in_settings(browser: Browser, car: Process, tm
         assert (await client.get("/api/departure.toml")).text == kept
         await group.locator('[data-f="departure-default"]').tap()
         await expect(rows).to_have_count(11)
-        assert (await asked(client))["is_default"]
-    assert [one for one in phone.complaints if not any(said in one for said in SAID)] == []
+        assert (await check_of(client))["is_default"]
+    assert [one for one in phone.complaints if not any(line in one for line in OFFLINE)] == []
     await context.close()

@@ -28,7 +28,7 @@ BEYOND = """(width) => [...document.querySelectorAll('article.drive *')]
   .filter((one) => one.getBoundingClientRect().right > width + 1
     || one.clientWidth > 0 && one.scrollWidth > one.clientWidth + 1)
   .map((one) => `${one.tagName} ${one.className} ${one.textContent.trim().slice(0, 40)}`)"""
-ASKED = re.compile(r"/api/logbook\?")
+LOGBOOK_URL = re.compile(r"/api/logbook\?")
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="module")
@@ -102,12 +102,12 @@ async def test_the_logbook_and_two_drives_along_the_way(saved: Phone) -> None:
     await board.get_by_label("Time").select_option("0")
     await expect(board.locator(".titlebar")).to_contain_text("2 drives")
     await expect(board.locator(".lb-figures")).to_contain_text("2.4")
-    await page.route(ASKED, lambda route: route.abort("connectionrefused"))
+    await page.route(LOGBOOK_URL, lambda route: route.abort("connectionrefused"))
     await board.get_by_label("Time").select_option("12")
     await expect(board.locator(".state")).to_contain_text("The server does not answer.")
     for part in (".lb-figures", ".lb-plots", ".lb-side", ".titlebar .end"):  # of what was chosen before
         await expect(board.locator(part)).to_be_empty()
-    await page.unroute(ASKED)
+    await page.unroute(LOGBOOK_URL)
     await board.get_by_label("Time").select_option("0")
     await expect(board.locator(".lb-figures")).to_contain_text("2.4")
     await expect(board.locator(".lb-drives li")).to_have_count(2)

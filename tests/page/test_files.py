@@ -100,8 +100,8 @@ async def test_case_7_6_2_pressing_a_file_opens_its_context_menu(opened: Phone) 
             "Cut out an incident", "Verify", "Rename", "Note and tags", "Delete",
         ]  # fmt: skip
         about = sheet(opened).locator(".bd")
-        for words in ("00:30 min", "2 critical alarms, 1 warning", "Recovered", "wet"):
-            await expect(about).to_contain_text(words)
+        for text in ("00:30 min", "2 critical alarms, 1 warning", "Recovered", "wet"):
+            await expect(about).to_contain_text(text)
         await opened.page.keyboard.press("Escape")
         await expect(sheet(opened)).to_be_hidden()
     await expect(more).to_be_focused()
@@ -162,7 +162,7 @@ async def test_a_name_a_note_and_tags_are_kept_and_found(opened: Phone) -> None:
     await expect(sheet(opened).get_by_role("alert")).to_have_text(
         "Not saved. A tag has at most 40 letters; this has 41."
     )
-    assert [said for said in opened.complaints if "422" not in said] == []
+    assert [line for line in opened.complaints if "422" not in line] == []
     opened.complaints.clear()
     await opened.page.locator("#file-tags").fill("fog, night")
     await sheet(opened).get_by_role("button", name="Save").tap()
@@ -170,7 +170,7 @@ async def test_a_name_a_note_and_tags_are_kept_and_found(opened: Phone) -> None:
     rows = opened.page.locator("#panel-files [data-f=recordings] .file")
     await opened.page.get_by_label("Search recordings").fill("LIGHTS on")
     await expect(rows).to_have_count(1)
-    await opened.page.get_by_label("Search recordings").fill("no such words")
+    await opened.page.get_by_label("Search recordings").fill("no such text")
     await expect(opened.page.locator("#panel-files .empty")).to_contain_text("Nothing found")
     await opened.page.get_by_label("Search recordings").fill("")
     await opened.page.get_by_label("Which recordings").select_option(label="fog")
@@ -298,9 +298,9 @@ async def test_what_is_recorded_now_stands_on_top_counts_and_is_ended_by_hand(op
     first = await live.inner_text()
     await expect(live).not_to_have_text(first)
     await live.get_by_role("button", name="End the recording").tap()
-    asked = opened.page.locator("#sheet-record")
-    await expect(asked).to_contain_text("The car moves at")
-    await asked.get_by_role("button", name="End the recording").tap()
+    sheet = opened.page.locator("#sheet-record")
+    await expect(sheet).to_contain_text("The car moves at")
+    await sheet.get_by_role("button", name="End the recording").tap()
     await expect(live).to_contain_text("Not recording", timeout=15_000)
     newest = opened.page.locator("#panel-files [data-f=recordings] .file").first
     await expect(newest).to_contain_text("Today", timeout=15_000)

@@ -73,11 +73,11 @@ async def test_a_node_answers_for_the_cars_of_agents(tmp_path: Path) -> None:
         for log in ("/api/log", "/api/log.csv", "/api/log.json"):
             assert (await room.get(log, params={"vehicle": "margay"})).status_code == 503, log
         for kept in ("/api/recordings", "/api/mail/settings"):
-            assert (await room.get(kept)).status_code == 422, "whose is not said"
+            assert (await room.get(kept)).status_code == 422, "the car is not named"
             assert (await room.get(f"/agents/ocelot{kept}")).status_code == 200, kept
             lost = await room.get(f"/agents/margay{kept}")
             assert (lost.status_code, "margay has sent nothing" in lost.json()["detail"]) == (503, True), kept
-        assert (await room.post("/api/slow-down/arm")).status_code == 422, "the car is named, however many were heard"
+        assert (await room.post("/api/slow-down/arm")).status_code == 422, "the car is named, however many sent data"
 
         # An order goes through, and what it causes is in the log of the agent and of the node alike.
         state = (await room.get("/api/state", params={"vehicle": "ocelot"})).json()
@@ -107,8 +107,8 @@ async def test_a_node_answers_for_the_cars_of_agents(tmp_path: Path) -> None:
             assert (await car.get("/api/state")).json()["session"]["phase"] == "monitoring"
             health = (await car.get("/api/health")).json()
             assert any("is not connected" in what for what in health["problems"])
-            asked = {"params": {"vehicle": "ocelot"}}
-            assert (await room.post("/api/resume", **asked)).status_code == 503  # type: ignore[arg-type]
+            query = {"params": {"vehicle": "ocelot"}}
+            assert (await room.post("/api/resume", **query)).status_code == 503  # type: ignore[arg-type]
             await one.broker.start()
             await until(phase)
             assert (await car.get("/api/state")).json()["session"]["paused"] is True, "no late command"
@@ -152,9 +152,9 @@ async def test_the_page_of_a_node_names_what_is_lost(phone: Phone, tmp_path: Pat
         await one.broker.start()
         await expect(lost).to_have_count(0, timeout=SOON_S * 1000)
         await phone.live()
-        phone.complaints[:] = [said for said in phone.complaints if "503" not in said]  # what it asked of a lost agent
+        phone.complaints[:] = [line for line in phone.complaints if "503" not in line]  # its request to a lost agent
 
-        # A car that was never heard is no blank page, and another one can be chosen on it.
+        # A car without data is no blank page, and another one can be chosen on it.
         await phone.open(f"{one.node.address}/?vehicle=margay")
         start = page.locator("#start")
         await expect(start).to_contain_text("The agent of margay has sent nothing", timeout=SOON_S * 1000)

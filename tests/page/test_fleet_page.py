@@ -17,7 +17,7 @@ from tests.page.canned import Canned
 from tests.page.conftest import Phone
 from tests.page.processes import running, simulate
 
-DESK = {"width": 1440, "height": 900}
+DESKTOP = {"width": 1440, "height": 900}
 # What hangs over an edge, or is too small for a finger.
 UNFIT = """() => [...document.querySelectorAll('#fleet :is(button, a, p, h1, h2, h3, li)')]
   .filter((one) => one.getClientRects().length && !one.closest('svg'))
@@ -44,7 +44,7 @@ async def press(page: Page, name: str, act: str) -> None:
 
 
 def sent(canned: Canned, *kinds: str) -> list[dict[str, Any]]:
-    return [{k: v for k, v in one.items() if k != "id"} for one in canned.heard if one.get("kind") in kinds]
+    return [{k: v for k, v in one.items() if k != "id"} for one in canned.received if one.get("kind") in kinds]
 
 
 COVERED = "getComputedStyle(document.querySelector('.floor > .veil')).opacity"
@@ -73,11 +73,11 @@ async def test_what_needs_a_person_stands_first_in_words(phone: Phone, canned: C
     await page.locator("[data-f=show-map]").click()
     await expect(phone.f("where-head", "#fleet")).to_contain_text("5 cars, 1 last seen 0:4")
     await expect(page.locator("[data-f=map] .car[data-old]")).to_have_count(1)
-    await page.set_viewport_size(DESK)
+    await page.set_viewport_size(DESKTOP)
     await expect(page.locator("tbody tr:visible")).to_have_count(5)
     await expect(page.locator('tr[data-car="Margay"]')).to_contain_text("unknown")
     await expect(page.locator("[data-f=events] li")).to_have_count(3)
-    await no_barrier(page, "the fleet on a desk")
+    await no_barrier(page, "the fleet on a desktop")
     assert await page.evaluate("window.most") == 0, "nothing was covered while lists came"
 
 
@@ -93,9 +93,9 @@ async def test_taking_it_is_sent_and_opens_the_cars_own_page(phone: Phone, canne
     await page.wait_for_url("**/?vehicle=Serval*")
     take = {"kind": "take_item", "vehicle": "Serval"}
     assert sent(canned, "take_item", "arm") == [take, take]
-    greeting = next(one for one in canned.heard if one.get("kind") == "hello")
+    greeting = next(one for one in canned.received if one.get("kind") == "hello")
     assert re.fullmatch("[0-9a-f]{16}", greeting["page"])
-    announced = next(one for one in canned.heard if one.get("kind") == "present" and one["announces"])
+    announced = next(one for one in canned.received if one.get("kind") == "present" and one["announces"])
     assert announced["announces"] == ["Margay", "Serval", "Caracal", "Kodkod", "Ocelot"]
 
 
@@ -113,12 +113,12 @@ async def test_an_item_is_handed_over_answered_and_taken_over(phone: Phone, cann
         {"kind": "take_item", "vehicle": "Serval"},
         {"kind": "offer_item", "vehicle": "Serval", "to": "field2"},
     ]
-    me = next(one["page"] for one in canned.heard if one.get("kind") == "hello")
+    me = next(one["page"] for one in canned.received if one.get("kind") == "hello")
     offered = {"by": "Desk 2", "name": "Me", "page": me, "since_ms": fleet.now_ms()}
     canned.cars[1]["summary"]["attention"] = fleet.attention(
         ago_s=9, assigned=fleet.holder(fleet.DESK_2), offered=offered
     )
-    await expect(item(page, "Serval")).to_contain_text("Desk 2 asks you")
+    await expect(item(page, "Serval")).to_contain_text("offered to you by Desk 2")
     await press(page, "Serval", "decline")
     canned.cars[1]["summary"]["attention"] = fleet.attention(ago_s=9, assigned=fleet.holder({"page": me, "name": "Me"}))
     await expect(item(page, "Serval").locator(".key:visible")).to_have_text(["Open", "Hand over", "Release"])
@@ -133,10 +133,10 @@ async def test_an_item_is_handed_over_answered_and_taken_over(phone: Phone, cann
 
 
 async def test_a_flood_is_one_item_and_a_hundred_cars_have_their_places(phone: Phone, canned: Canned) -> None:
-    await phone.page.set_viewport_size(DESK)
+    await phone.page.set_viewport_size(DESKTOP)
     page = await opened(phone, canned, fleet.hundred(31))
     await expect(page.locator(".item h3")).to_have_text(["31 cars", "C07", "C29"])
-    await page.mouse.click(4, 60)  # the line that asks for a touch, so that alarms sound, has gone
+    await page.mouse.click(4, 60)  # the line that requests a touch, so that alarms sound, has gone
     await expect(phone.f("sound-off", "#fleet")).to_be_hidden()
     group = page.locator(".item").first
     await expect(group).to_contain_text("C34 to C64")
@@ -173,7 +173,7 @@ async def test_a_server_that_falls_silent_is_said_within_2_s(phone: Phone, canne
     await expect(page.locator("tbody .sp .n[data-ink=stale]")).to_have_count(5)
     await expect(page.locator("tbody .mo").first).to_have_text("unknown")
     await expect(page.locator("tbody .al").first).to_have_text("not known now")
-    await page.set_viewport_size(DESK)
+    await page.set_viewport_size(DESKTOP)
     await expect(phone.f("over", "#fleet")).to_be_visible()
     await expect(phone.f("where-head", "#fleet")).to_contain_text("then, not now")
     await no_barrier(page, "a lost server")
@@ -252,7 +252,7 @@ async def test_a_viewer_sees_all_of_it_and_sends_nothing(phone: Phone, canned: C
     key = item(page, "Serval").locator("[data-act=take]")
     await expect(key).to_have_attribute("aria-disabled", "true")
     await expect(item(page, "Serval")).not_to_have_attribute("data-moved", "")
-    await key.click(force=True)  # it says that it is disabled
+    await key.click(force=True)  # it is disabled by its own attribute
     await expect(page.locator(".snack.note")).to_contain_text("paired as a viewer")
     assert sent(canned, "take_item") == []
 
@@ -307,7 +307,7 @@ async def test_what_is_taken_stays_mine_on_the_cars_own_page_and_back(phone: Pho
             await expect(item(page, "Ocelot")).to_contain_text("assigned to you")
             await press(page, "Ocelot", "release")
             await expect(item(page, "Ocelot")).to_contain_text("unassigned")
-            await page.set_viewport_size(DESK)
+            await page.set_viewport_size(DESKTOP)
             await expect(page.locator("[data-f=events] li")).to_have_count(2)
 
 
@@ -349,7 +349,7 @@ async def test_a_planned_stop_is_ended_in_the_row_of_its_car(phone: Phone, canne
     page = await opened(phone, canned, cars)
     row = page.locator('tr[data-car="Caracal"]')
     keys = page.locator("[data-act=end-stop]:visible")
-    for size in (DESK, {"width": 820, "height": 1180}, {"width": 360, "height": 740}):
+    for size in (DESKTOP, {"width": 820, "height": 1180}, {"width": 360, "height": 740}):
         await page.set_viewport_size(size)  # type: ignore[arg-type]
         await expect(keys).to_have_count(1)
         await expect(row).to_contain_text("planned stop")

@@ -20,8 +20,8 @@ LOST = """bar => {
   const parts = [...bar.children].filter((part) => part.checkVisibility());
   const boxes = parts.map((part) => part.getBoundingClientRect());
   const bottom = bar.getBoundingClientRect().bottom;
-  const words = parts.filter((part) => !part.matches('.head-speed'));  // whose cover is larger on purpose
-  const cut = words.map((part) => part.scrollWidth - part.clientWidth);
+  const texts = parts.filter((part) => !part.matches('.head-speed'));  // whose cover is larger on purpose
+  const cut = texts.map((part) => part.scrollWidth - part.clientWidth);
   const over = boxes.map((box, n) => box.right - (boxes[n + 1]?.left ?? innerWidth));
   const low = boxes.map((box) => box.bottom - bottom - 1);
   return [...cut, ...over, ...low].filter((px) => px > 1);

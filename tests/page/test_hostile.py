@@ -41,7 +41,7 @@ ID = "car_20160601T120000Z"
 
 
 def components() -> dict[str, Any]:
-    """What /diagnostics says, in every field that is text."""
+    """A /diagnostics message with hostile text in every field that is text."""
     return {
         "header": {"seq": 1, "stamp": {"secs": 1, "nsecs": 0}, "frame_id": SCRIPT},
         "status": [
@@ -137,8 +137,8 @@ async def test_a_recording_that_means_harm_is_only_listed(phone: Phone, tmp_path
         await row.locator(".t").tap()
         await expect(phone.page.locator("#sheet-file h2")).to_contain_text("<img src=x onerror=")
         await harmless(phone)
-        told = (await client.get(f"/api/recordings/{ID}")).json()
-        assert "<img" in told["title"], "kept as it was written"
+        listed = (await client.get(f"/api/recordings/{ID}")).json()
+        assert "<img" in listed["title"], "kept as it was written"
         svg = await client.get(f"/api/recordings/{ID}/track.svg")
         assert "<img" not in svg.text
         assert "sandbox" in svg.headers["content-security-policy"]

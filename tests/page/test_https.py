@@ -1,4 +1,4 @@
-"""HTTPS as a phone meets it: a Chromium that was told to trust the server's authority, and one that was not.
+"""HTTPS as a phone meets it: a Chromium that is set to trust the server's authority, and one that was not.
 
 The server listens as in the field; its name leads to this machine by a rule of the browser, as multicast DNS would.
 """
@@ -71,7 +71,7 @@ async def served(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Fiel
         yield Field(port=port, setup_port=setup_port, ca=folder / "ca.crt")
 
 
-def told(*command: str) -> str:
+def output_of(*command: str) -> str:
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
@@ -83,9 +83,9 @@ async def phone(chromium: str, home: Path, trusted: Path | None) -> AsyncIterato
         pytest.skip("no certutil to install an authority with: it is in libnss3-tools")
     store = home / ".pki" / "nssdb"
     store.mkdir(parents=True)
-    told(certutil, "-d", f"sql:{store}", "-N", "--empty-password")
+    output_of(certutil, "-d", f"sql:{store}", "-N", "--empty-password")
     if trusted is not None:
-        told(certutil, "-d", f"sql:{store}", "-A", "-t", "C,,", "-n", "catgraph", "-i", str(trusted))
+        output_of(certutil, "-d", f"sql:{store}", "-A", "-t", "C,,", "-n", "catgraph", "-i", str(trusted))
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(
             executable_path=chromium,
@@ -188,7 +188,7 @@ async def test_the_explaining_page_can_be_read_by_everybody(stranger: BrowserCon
       const [inner, outer] = [text.getBoundingClientRect(), text.ownerSVGElement.getBoundingClientRect()];
       return inner.right > outer.right - 4 || inner.bottom > outer.bottom;
     }).map((text) => text.textContent)"""
-    assert await page.evaluate(beyond) == [], "the drawn screens hold their words"
+    assert await page.evaluate(beyond) == [], "the drawn screens hold their text"
     await page.close()
 
 
@@ -199,7 +199,7 @@ async def test_the_code_on_the_page_is_its_own_address(stranger: BrowserContext,
     page = await stranger.new_page()
     await page.goto(served.setup)
     await page.locator(".share img").screenshot(path=tmp_path / "code.png")
-    assert told(zbarimg, "-q", "--raw", str(tmp_path / "code.png")).strip() == served.setup
+    assert output_of(zbarimg, "-q", "--raw", str(tmp_path / "code.png")).strip() == served.setup
     await page.close()
 
 
@@ -214,6 +214,6 @@ async def test_without_https_the_page_says_what_is_lacking_and_what_to_do(
         page = await stranger.new_page()
         await page.goto(f"http://{HOST}:{port[1]}/")
         assert await page.evaluate("isSecureContext") is False
-        words = page.locator('#connect [data-f="insecure"]:not([hidden])')
-        await expect(words).to_contain_text("start the server without --tls off")
+        text = page.locator('#connect [data-f="insecure"]:not([hidden])')
+        await expect(text).to_contain_text("start the server without --tls off")
         await page.close()

@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.gate, pytest.mark.timeout(120)]
 
 
 async def test_an_acknowledgement_reaches_a_second_phone(phone: Phone, browser: Browser, tmp_path: Path) -> None:
-    """Both are asked; one answers, and the other sees by whom. What both have heard is in the log once."""
+    """Both get the dialog; one answers, and the other sees by whom. What both have received is in the log once."""
     fast = steady(tmp_path / "fast.bag", 12.6)
     data = tmp_path / "data"
     async with running(*replay(fast)) as car, running(*server(data, car.address)) as watch:

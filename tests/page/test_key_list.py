@@ -1,4 +1,4 @@
-"""Every key that `?` lists does what it says: the cases are made of the list itself, so a new key needs a try here."""
+"""Every key that `?` lists does what it names: the cases are made of the list itself, so a new key needs a try here."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DISPATCH = "key => document.body.dispatchEvent(new KeyboardEvent('keydown', {key
 Try = Callable[[Phone, Canned, str], Awaitable[None]]
 
 
-async def desk(phone: Phone, canned: Canned) -> None:
+async def desktop(phone: Phone, canned: Canned) -> None:
     await phone.page.set_viewport_size({"width": 1440, "height": 900})
     await phone.open(f"{canned.address}/#home")
     await phone.live()
@@ -36,14 +36,14 @@ async def desk(phone: Phone, canned: Canned) -> None:
 async def until_sent(phone: Phone, canned: Canned, kind: str, key: str | None = None, **fields: str) -> None:
     """Until the page sent such a message; a `key` is pressed until then."""
     async with asyncio.timeout(20):
-        while not any({"kind": kind, **fields}.items() <= one.items() for one in canned.heard):
+        while not any({"kind": kind, **fields}.items() <= one.items() for one in canned.received):
             if key is not None:
                 await phone.page.keyboard.press(key)
             await phone.drawn()
 
 
 async def answers(phone: Phone, canned: Canned, key: str) -> None:
-    await desk(phone, canned)
+    await desktop(phone, canned)
     canned.state = critical()
     await expect(phone.page.locator("#monitor [data-slot=alarm]")).to_contain_text("Speed above limit")
     await until_sent(phone, canned, {"a": "acknowledge", "s": "silence"}[key], key)  # not before it can have been read
@@ -74,7 +74,7 @@ async def chooses_a_tab(phone: Phone, canned: Canned, key: str) -> None:
 
 
 async def leads_home(phone: Phone, canned: Canned, key: str) -> None:
-    await desk(phone, canned)
+    await desktop(phone, canned)
     await phone.page.keyboard.press("2")
     await expect(phone.page.locator("#tab-files")).to_have_attribute("aria-selected", "true")
     await phone.page.keyboard.press(key)
@@ -91,16 +91,16 @@ async def plays(phone: Phone, canned: Canned, key: str) -> None:
 async def moves(phone: Phone, canned: Canned, key: str) -> None:
     page = await replaying(phone, canned)
     at_s = canned.state["replay"]["at_s"]
-    begun = len(canned.heard)
+    begun = len(canned.received)
     await page.keyboard.press(key)
     async with asyncio.timeout(20):
-        while not (sought := [one["at_s"] for one in canned.heard[begun:] if one.get("do") == "seek"]):
+        while not (sought := [one["at_s"] for one in canned.received[begun:] if one.get("do") == "seek"]):
             await phone.drawn()
     assert (sought[0] > at_s) == (key == "ArrowRight")
 
 
 async def shows_the_list(phone: Phone, canned: Canned, key: str) -> None:
-    await desk(phone, canned)
+    await desktop(phone, canned)
     await phone.page.keyboard.press(key)
     await expect(phone.page.locator("#sheet-keys kbd")).to_have_text([shown for _, shown, _ in ROWS])
 

@@ -1,4 +1,4 @@
-"""The desk by keyboard alone: what matters comes first, and the journey of an operator needs no pointer."""
+"""The desktop page by keyboard alone: what matters comes first, and the journey of an operator needs no pointer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FOCUSED = "document.activeElement?.dataset.f ?? document.activeElement?.id ?? ''
 MOST_PRESSES = 10
 
 
-async def desk(phone: Phone, canned: Canned, width: int = 1440) -> Page:
+async def desktop(phone: Phone, canned: Canned, width: int = 1440) -> Page:
     await phone.page.set_viewport_size({"width": width, "height": 900})
     await phone.open(f"{canned.address}/#home")
     await phone.live()
@@ -31,9 +31,9 @@ async def tab_to(page: Page, matches: str, most: int = 60) -> int:
     raise AssertionError(f"{matches} has no focus after {most} presses")
 
 
-async def until_heard(served: Canned, kind: str) -> None:
+async def until_received(served: Canned, kind: str) -> None:
     async with asyncio.timeout(20):
-        while not [one for one in served.heard if one["kind"] == kind]:
+        while not [one for one in served.received if one["kind"] == kind]:
             await asyncio.sleep(0.05)
 
 
@@ -41,7 +41,7 @@ async def until_heard(served: Canned, kind: str) -> None:
 @pytest.mark.parametrize("width", [412, 1440])
 async def test_the_tab_key_begins_at_what_matters(phone: Phone, canned: Canned, width: int) -> None:
     canned.state = live() | {"decelerate": slow("armed"), "alarms": [alarm("laser", "Laser silent", place="list")]}
-    page = await desk(phone, canned, width)
+    page = await desktop(phone, canned, width)
     await page.keyboard.press("Tab")
     assert await page.evaluate(FOCUSED) == "strip", "the alarm"
     to_stop = await tab_to(page, "[data-f=stop]", MOST_PRESSES)
@@ -55,10 +55,10 @@ async def test_a_journey_by_keyboard_alone(phone: Phone, canned: Canned) -> None
     """Acknowledge, arm, slow, open a replay."""
     waits = alarm("laser", "Laser silent", place="list", actions=["acknowledge"])
     canned.state = live() | {"decelerate": slow("not_armed"), "alarms": [waits]}
-    page = await desk(phone, canned)
+    page = await desktop(phone, canned)
     await tab_to(page, "[data-pane=alarms] [data-do=acknowledge]")
     await page.keyboard.press("Enter")
-    await until_heard(canned, "acknowledge")
+    await until_received(canned, "acknowledge")
     canned.state = live() | {"decelerate": slow("not_armed")}
     await expect(page.locator("#monitor [data-f=strip]")).to_contain_text("No alarms")
     await page.locator("body").press("Shift+Tab")
@@ -67,14 +67,14 @@ async def test_a_journey_by_keyboard_alone(phone: Phone, canned: Canned) -> None
     await expect(page.locator("#sheet-slow")).to_be_visible()
     await expect(page.locator("#sheet-slow .main")).to_be_focused()
     await page.keyboard.press("Enter")
-    await until_heard(canned, "arm")
+    await until_received(canned, "arm")
     canned.state = live() | {"decelerate": slow("armed")}
     await expect(page.locator("#sheet-slow")).to_be_hidden()
     slide = page.locator("#monitor > .rail [data-f=slow]")
     await expect(slide).to_have_attribute("data-kind", "armed")
     await tab_to(page, ".rail [data-f=slow]")
     await page.keyboard.down("Enter")  # held for a second
-    await until_heard(canned, "slow_down")
+    await until_received(canned, "slow_down")
     await page.keyboard.up("Enter")
     canned.state = live()
     await page.keyboard.press("Escape")
@@ -90,12 +90,12 @@ async def test_a_journey_by_keyboard_alone(phone: Phone, canned: Canned) -> None
             break
         await page.keyboard.press("Tab")
     await page.keyboard.press("Enter")
-    await until_heard(canned, "replay")
+    await until_received(canned, "replay")
 
 
 @pytest.mark.gate
 @pytest.mark.parametrize(
-    ("speed_mps", "freshness", "says"),
+    ("speed_mps", "freshness", "reason"),
     [
         (4.2, "fresh", "The car moves at 4.2 m/s."),
         (0.0, "stale", "not known whether the car moves"),
@@ -103,7 +103,7 @@ async def test_a_journey_by_keyboard_alone(phone: Phone, canned: Canned) -> None
     ],
 )
 async def test_ending_the_recording_asks_once_unless_the_car_stands(
-    phone: Phone, canned: Canned, speed_mps: float, freshness: str, says: str
+    phone: Phone, canned: Canned, speed_mps: float, freshness: str, reason: str
 ) -> None:
     speed = signal("Speed", "Twist", {"speed_mps": speed_mps, "yaw_rate_radps": 0.0})
     canned.state["signals"]["speed"] |= {"value": speed["value"], "freshness": freshness}
@@ -112,23 +112,23 @@ async def test_ending_the_recording_asks_once_unless_the_car_stands(
     await phone.f("menu").tap()
     await phone.f("record", "#sheet-menu").tap()
     sheet = phone.page.locator("#sheet-record")
-    if says:
-        await expect(sheet).to_contain_text(says)
+    if reason:
+        await expect(sheet).to_contain_text(reason)
         await sheet.get_by_role("button", name="Keep recording").tap()
         await expect(sheet).to_have_count(0)
-        assert not [one for one in canned.heard if one["kind"] == "record"]
+        assert not [one for one in canned.received if one["kind"] == "record"]
         await phone.f("menu").tap()
         await phone.f("record", "#sheet-menu").tap()
         await sheet.get_by_role("button", name="End the recording").tap()
-    await until_heard(canned, "record")
-    (asked,) = [one for one in canned.heard if one["kind"] == "record"]
-    assert asked["on"] is False
+    await until_received(canned, "record")
+    (command,) = [one for one in canned.received if one["kind"] == "record"]
+    assert command["on"] is False
 
 
 @pytest.mark.gate
 async def test_what_cannot_be_pressed_says_so_to_readers_and_looks_so(phone: Phone, canned: Canned) -> None:
     canned.state = live() | {"alarms": [alarm("laser", "Laser silent", place="list")]}
-    page = await desk(phone, canned)
+    page = await desktop(phone, canned)
     ends = page.locator("[data-pane=alarms] .turn .key")
     await expect(ends.first).to_have_attribute("aria-label", "Previous page")
     for end in await ends.all():  # one page: both ends

@@ -29,10 +29,10 @@ PAINTED_US = 50_000  # the picture with the first values is complete by then
 # Live values stand on Home: the time of the page's own clock when they first did.
 WATCH = """() => {
   const look = () => {
-    const word = document.querySelector('#monitor [data-f=word]')?.textContent;
+    const state = document.querySelector('#monitor [data-f=word]')?.textContent;
     const digits = document.querySelector('.gauge .speed')?.textContent ?? '';
     const isCovered = document.querySelector('.veil')?.dataset.on;
-    if (['Live', 'Weak'].includes(word) && /[0-9]/.test(digits) && !isCovered) window.thereAt = performance.now();
+    if (['Live', 'Weak'].includes(state) && /[0-9]/.test(digits) && !isCovered) window.thereAt = performance.now();
     else requestAnimationFrame(look);
   };
   requestAnimationFrame(look);
@@ -52,11 +52,11 @@ async def load(page: Page, address: str, slower: float) -> tuple[float, int, int
     data: set[str] = set()  # answers that are the car's, not the page's
     cdp.on(
         "Network.responseReceived",
-        lambda told: data.add(told["requestId"]) if "/api/" in told["response"]["url"] else None,
+        lambda event: data.add(event["requestId"]) if "/api/" in event["response"]["url"] else None,
     )
     cdp.on(
         "Network.loadingFinished",
-        lambda told: sizes.append(told["encodedDataLength"]) if told["requestId"] not in data else None,
+        lambda event: sizes.append(event["encodedDataLength"]) if event["requestId"] not in data else None,
     )
     await cdp.send("Network.enable")
     await cdp.send("Network.emulateNetworkConditions", ACCESS_POINT)

@@ -95,7 +95,7 @@ async def test_a_filter_holds_here_on_the_server_and_in_what_is_saved(
     await phone.page.locator("[data-f=older]").tap()
     await expect(rows.filter(has_text="m at once")).to_have_count(46)
     await phone.page.locator("#log-find").fill("  115 M ")
-    await expect(rows).to_have_text("Nothing found here")  # among what this page has heard
+    await expect(rows).to_have_text("Nothing found here")  # among what this page has received
     await phone.page.locator("[data-f=older]").tap()
     await expect(rows).to_have_count(1)
     await expect(rows).to_contain_text("115 m at once")
@@ -105,7 +105,7 @@ async def test_a_filter_holds_here_on_the_server_and_in_what_is_saved(
     await (await coming.value).save_as(saved)
     with saved.open(newline="") as file:
         assert [row["text"] for row in csv.DictReader(file)] == ["115 m at once"]
-    await phone.page.locator("#log-find").fill("no such words")
+    await phone.page.locator("#log-find").fill("no such text")
     await expect(rows).to_have_text("Nothing found here")
 
 

@@ -106,7 +106,7 @@ async def test_mail_is_set_up_and_tried_in_settings(
     await group(phone).get_by_label("Send a test e-mail to").fill(GONE)
     await group(phone).get_by_role("button", name="Test").tap()
     await expect(group(phone).get_by_role("alert")).to_contain_text("550 5.1.1")
-    phone.complaints[:] = [said for said in phone.complaints if not re.search("status of (422|502)", said)]
+    phone.complaints[:] = [line for line in phone.complaints if not re.search("status of (422|502)", line)]
     await phone.page.locator("#panel-settings .find input").fill("smtp")
     await expect(phone.page.locator("#panel-settings .nothing")).to_be_hidden()
     await expect(group(phone)).to_be_visible()
@@ -165,17 +165,17 @@ async def test_the_phones_own_mail_program_gets_links_where_it_takes_no_files(
 ) -> None:
     sheet = await mail_sheet(phone, watch)
     await phone.page.evaluate(
-        """() => { HTMLAnchorElement.prototype.click = function () { window.asked = this.href; };
+        """() => { HTMLAnchorElement.prototype.click = function () { window.opened = this.href; };
                    Object.defineProperty(navigator, 'canShare', {value: () => false, configurable: true}); }"""
     )
     await sheet.get_by_label("To").fill("ann@example.org")
     await sheet.get_by_label("Message").fill("Hello & <b>Ann</b>")
     await sheet.get_by_role("button", name="Open in my mail app").tap()
     await expect(sheet.get_by_role("status")).to_contain_text("gets links, because this device cannot share files")
-    asked = await phone.page.evaluate("window.asked")
-    assert asked.startswith("mailto:ann@example.org?subject=")
+    link_url = await phone.page.evaluate("window.opened")
+    assert link_url.startswith("mailto:ann@example.org?subject=")
     link = f"{watch.address}{AT_AGENT}/api/recordings/{DRIVE}/file.mcap"
-    assert f"Hello & <b>Ann</b>\r\n\r\n{link}" in unquote(asked)
+    assert f"Hello & <b>Ann</b>\r\n\r\n{link}" in unquote(link_url)
 
 
 async def test_the_phones_own_mail_program_is_handed_the_file_where_it_takes_it(

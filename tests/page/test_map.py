@@ -1,4 +1,4 @@
-"""The Map tab with a car on our own bridge and a phone: true metres, honest ages, and the hands on it."""
+"""The Map tab with a car on our own bridge and a phone: true metres, honest ages, and its gestures."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ async def test_the_map_follows_a_car_that_drives_and_leaves_its_track(phone: Pho
         box = await it.svg(".tr").bounding_box()
         middle = await it.page.evaluate("() => document.querySelector('.mapbox').getBoundingClientRect().x + 206")
         assert box["width"] > 20 / FIRST  # behind it, to the west
-        assert middle - 15 / FIRST < box["x"] + box["width"] < middle  # told once a second, smoothed
+        assert middle - 15 / FIRST < box["x"] + box["width"] < middle  # sent once a second, smoothed
         assert box["height"] < 8
         tail = await it.numbers(".tail", "d")  # and from there to the car
         across, down = await it.page.evaluate(MIDDLE)
@@ -169,8 +169,8 @@ async def test_a_page_that_comes_late_and_one_after_a_radio_gap_have_the_whole_t
     async with roaming(speed_mps=8.0, covariance_m2=(0.04, 0.04, 0.0)) as car:
         async with serving(Config(vehicles=(Vehicle(name="car", address=car.address),))) as address:
             radio = Radio(int(address.rpartition(":")[2]))
-            async with radio.on_air() as heard:
-                await phone.open(f"{heard}/#home")
+            async with radio.on_air() as radio_address:
+                await phone.open(f"{radio_address}/#home")
                 await phone.live()
                 await asyncio.sleep(3.0)
                 await phone.page.evaluate("location.hash = '#map'")  # whatever alarm a busy machine raises
@@ -209,7 +209,7 @@ async def test_a_stale_car_loses_its_ink_and_its_line(phone: Phone) -> None:
         spoken = await it.f("spoken").text_content()
         assert spoken.startswith("The car’s position is ")
         await asyncio.sleep(1.5)
-        assert await it.f("spoken").text_content() == spoken  # said once, not with every second
+        assert await it.f("spoken").text_content() == spoken  # announced once, not with every second
         await expect(it.f("car-lat")).to_have_attribute("data-ink", "stale")
         for gone in (".dl", ".acc"):
             await expect(it.svg(gone)).to_be_hidden()
@@ -301,7 +301,7 @@ async def test_no_place_on_earth_is_special(phone: Phone) -> None:
                     await phone.open("about:blank")
 
 
-# -- hands -------------------------------------------------------------------------------------------------------------
+# -- gestures ----------------------------------------------------------------------------------------------------------
 
 
 async def drag(it: Map, dx: int, dy: int, fingers: int = 1, spread: int = 0) -> None:
@@ -463,15 +463,15 @@ async def test_car_phone_and_their_names_stand_clear_of_keys_and_each_other(
 
 @pytest.mark.own_phone
 async def test_the_map_is_fetched_when_it_comes_near_and_leaflet_only_for_tiles(phone: Phone) -> None:
-    asked: list[str] = []
-    phone.page.on("request", lambda request: asked.append(request.url))
+    requests: list[str] = []
+    phone.page.on("request", lambda request: requests.append(request.url))
     async with roaming() as car, looking(phone, car, tab="home") as it:
         map_script = re.compile(r"/js/map/map\.js|/built/map-[\w-]+\.js")  # as it is written, or joined
-        assert [url for url in asked if map_script.search(url) or re.search(r"leaflet|/api/map|track", url)] == []
+        assert [url for url in requests if map_script.search(url) or re.search(r"leaflet|/api/map|track", url)] == []
         await phone.page.locator("[data-tab=map]").tap()
         await expect(it.svg(".car-mark")).to_be_visible()
-        assert [url for url in asked if map_script.search(url)] != []
-        assert [url for url in asked if "leaflet" in url] == []
+        assert [url for url in requests if map_script.search(url)] != []
+        assert [url for url in requests if "leaflet" in url] == []
         assert await it.f("by").text_content() == ""
 
 
@@ -485,14 +485,14 @@ def plan(path: Path, lat_deg: float, lon_deg: float) -> Path:
         for i in range(-4, 5)
         for j in range(-4, 5)
     ]
-    said = '<a href="https://example.org">© Plan</a><script>alert(1)</script>'
-    return maps.write(path / "plan.mbtiles", tiles, format="png", attribution=said, minzoom="19", maxzoom="19")
+    attribution = '<a href="https://example.org">© Plan</a><script>alert(1)</script>'
+    return maps.write(path / "plan.mbtiles", tiles, format="png", attribution=attribution, minzoom="19", maxzoom="19")
 
 
 @pytest.mark.own_phone
 async def test_tiles_and_the_site_s_picture_lie_where_they_should(phone: Phone, tmp_path: Path) -> None:
-    asked: list[str] = []
-    phone.page.on("request", lambda request: asked.append(request.url))
+    requests: list[str] = []
+    phone.page.on("request", lambda request: requests.append(request.url))
     async with roaming() as car:
         site = tmp_path / "site.png"
         site.write_bytes(png(0, 200, 0, 64))
@@ -505,7 +505,7 @@ async def test_tiles_and_the_site_s_picture_lie_where_they_should(phone: Phone, 
         async with looking(phone, car, **ground) as it:
             await it.until("() => document.querySelectorAll('.leaflet-tile-loaded').length >= 6")
             await expect(it.f("by")).to_have_text("© Plan · Survey")
-            assert await it.page.locator("#panel-map .map-by *").count() == 0  # words, not markup
+            assert await it.page.locator("#panel-map .map-by *").count() == 0  # text, not markup
             # The tile under the car, laid where the car stands: drawn larger than it is, for there is no deeper level.
             box = await it.f("box").bounding_box()
             middle = {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}
@@ -529,7 +529,9 @@ async def test_tiles_and_the_site_s_picture_lie_where_they_should(phone: Phone, 
                 (5 / FIRST, -15 / FIRST), abs=1
             )
             assert (image["width"], image["height"]) == pytest.approx((10 / FIRST, 10 / FIRST), abs=1)
-            assert {re.match(r"\w+://[^/]+", url)[0] for url in asked} == {re.match(r"\w+://[^/]+", phone.page.url)[0]}
+            assert {re.match(r"\w+://[^/]+", url)[0] for url in requests} == {
+                re.match(r"\w+://[^/]+", phone.page.url)[0]
+            }
             # Turned, the tile under the car is still the same.
             await it.f("north").tap()
             await expect(it.f("needle")).to_have_attribute("transform", "rotate(-90.0 12 12)")

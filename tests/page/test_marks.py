@@ -1,4 +1,4 @@
-"""Marks placed on a phone: by a tap, by voice, with a photo and words, while the server is away; each stored once."""
+"""Marks placed on a phone: by a tap, by voice, with a photo and text, while the server is away; each stored once."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ async def car() -> AsyncIterator[Process]:
 
 @pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def hearing(chromium: str) -> AsyncIterator[Browser]:
-    """A browser with a microphone that beeps; each context says whether it may be used."""
+    """A browser with a microphone that beeps; each context sets whether it may be used."""
     async with async_playwright() as playwright:
         flags = [*FLAGS, "--use-fake-device-for-media-stream"]
         browser = await playwright.chromium.launch(executable_path=chromium, args=flags)
@@ -139,9 +139,9 @@ async def test_a_mark_with_voice_photo_and_words(hearing: Browser, car: Process,
 
         await one.hold(1.6)
         *_, mark = await one.stored(2, voice=True)
-        heard = await one.get(f"/api/marks/{mark['mark']}/voice?vehicle=car")
-        assert heard.content.startswith(b"\x1a\x45\xdf\xa3")
-        assert len(heard.content) > 2000
+        voice = await one.get(f"/api/marks/{mark['mark']}/voice?vehicle=car")
+        assert voice.content.startswith(b"\x1a\x45\xdf\xa3")
+        assert len(voice.content) > 2000
 
         async with page.expect_file_chooser() as chosen:
             await page.locator('[data-f="mark-photo"]').tap()
@@ -193,12 +193,12 @@ PRESSES = """async (key) => {
 
 # How many marks the phone keeps.
 KEPT = """() => new Promise((resolve, reject) => {
-  const asked = indexedDB.open('catgraph-marks');
-  asked.onerror = () => resolve(0);
-  asked.onupgradeneeded = () => asked.transaction.abort(); // the page makes it
-  asked.onsuccess = () => {
-    const count = asked.result.transaction('marks').objectStore('marks').count();
-    count.onsuccess = () => { asked.result.close(); resolve(count.result); };
+  const request = indexedDB.open('catgraph-marks');
+  request.onerror = () => resolve(0);
+  request.onupgradeneeded = () => request.transaction.abort(); // the page makes it
+  request.onsuccess = () => {
+    const count = request.result.transaction('marks').objectStore('marks').count();
+    count.onsuccess = () => { request.result.close(); resolve(count.result); };
     count.onerror = () => reject(count.error);
   };
 })"""
@@ -226,7 +226,7 @@ async def test_two_taps_on_a_busy_page_are_two_marks(hearing: Browser, car: Proc
             for after_s in (0.0, 0.2)
             for kind, where in (("touchStart", points), ("touchEnd", []))
         ]
-        await asyncio.gather(*sent)  # the page hears of all of them when it is free again
+        await asyncio.gather(*sent)  # the page receives all of them when it is free again
         await one.stored(2)
 
 

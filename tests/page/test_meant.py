@@ -39,7 +39,7 @@ def dialog(name: str, title: str, **more: Any) -> dict[str, Any]:
 
 
 def answered(served: Canned) -> list[str]:
-    return [one["alarm"] for one in served.heard if one["kind"] == "acknowledge"]
+    return [one["alarm"] for one in served.received if one["kind"] == "acknowledge"]
 
 
 async def until_answered(served: Canned, *names: str) -> None:
@@ -50,9 +50,9 @@ async def until_answered(served: Canned, *names: str) -> None:
 
 async def said_more(served: Canned) -> None:
     """Waits for a later message of the page: what it sent before is here by then."""
-    before = len(served.heard)
+    before = len(served.received)
     async with asyncio.timeout(20):
-        while len(served.heard) <= before + 1:
+        while len(served.received) <= before + 1:
             await asyncio.sleep(0.05)
 
 
@@ -134,7 +134,7 @@ async def test_a_finger_that_came_before_the_dialog_does_not_answer_it_on_a_busy
     await expect(sheet).to_be_hidden()
     await phone.page.evaluate(BUSY)
     cdp = await phone.page.context.new_cdp_session(phone.page)
-    async with phone.page.expect_console_message(lambda said: said.text == "busy"):
+    async with phone.page.expect_console_message(lambda message: message.text == "busy"):
         canned.state["alarms"] = [dialog("speed", "Speed above limit", occurrence=2)]
     points = [{"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}]
     before_s = time.time() - 0.4

@@ -25,7 +25,7 @@ from tests.page.screenshots import replayed, replayed_timeline
 from tests.server.recording import made
 
 A_SECOND = 25
-DESK = {"width": 1440, "height": 900}
+DESKTOP = {"width": 1440, "height": 900}
 OPENS_MS = 40_000
 LIVE_EVENT = {
     "n": 117, "at_ms": 1_790_000_000_000, "alarm": "phone_missing", "occurrence": 1, "change": "raised",
@@ -62,7 +62,7 @@ async def states(page: Page) -> int:
 async def replaying(phone: Phone, canned: Canned) -> Page:
     """The canned recording of four minutes on a desktop."""
     canned.state, canned.timeline = replayed(live()), replayed_timeline()
-    await phone.page.set_viewport_size(DESK)  # type: ignore[arg-type]
+    await phone.page.set_viewport_size(DESKTOP)  # type: ignore[arg-type]
     await phone.open(f"{canned.address}/?replay=car_0&t=246#home")
     await phone.page.wait_for_selector('html[data-replay="on"]', state="attached", timeout=OPENS_MS)
     await expect(phone.page.locator(".scrub .time-line:not([inert])")).to_be_visible()
@@ -76,9 +76,9 @@ async def test_a_page_that_is_flooded_with_offers_sends_a_bounded_number_of_mess
     page = await replaying(phone, canned)
     canned.floods = True
     await phone.drawn(3)
-    begun, drawn = len(canned.heard), await states(page)
+    begun, drawn = len(canned.received), await states(page)
     await phone.drawn(8)
-    assert len(canned.heard) - begun <= A_SECOND * (await states(page) - drawn)
+    assert len(canned.received) - begun <= A_SECOND * (await states(page) - drawn)
     canned.floods = False
 
 
@@ -104,7 +104,7 @@ async def test_of_a_recording_the_criticals_are_listed_first_and_a_press_opens_t
 ) -> None:
     canned.timeline = replayed_timeline()
     page = phone.page
-    await page.set_viewport_size(DESK)  # type: ignore[arg-type]
+    await page.set_viewport_size(DESKTOP)  # type: ignore[arg-type]
     await phone.open(f"{canned.address}/#files")
     await phone.live()
     rows = page.locator("#panel-files .file-raised button")
@@ -114,7 +114,7 @@ async def test_of_a_recording_the_criticals_are_listed_first_and_a_press_opens_t
     assert await columns.all_inner_texts() == ["Track", "Recording", "Car", "Length", "Size", "Critical", "Warning"]
     await rows.first.click()
     await expect(page.locator("html[data-replay]")).to_be_attached()
-    opened = [one for one in canned.heard if one["kind"] == "replay" and one["do"] == "open"]
+    opened = [one for one in canned.received if one["kind"] == "replay" and one["do"] == "open"]
     assert [round(one["at_s"]) for one in opened] == [251], "5 s before"
 
 
@@ -282,7 +282,7 @@ async def test_a_critical_alarm_of_a_recording_is_found_and_watched_in_six_press
 ) -> None:
     """As somebody who never saw the page, on a desktop: alarms that were recorded, and those of a bag judged anew."""
     page = phone.page
-    await page.set_viewport_size(DESK)  # type: ignore[arg-type]
+    await page.set_viewport_size(DESKTOP)  # type: ignore[arg-type]
     await phone.open(f"{street[0]}/#home")
     await phone.live()
     await phone.acknowledge_all()

@@ -1,4 +1,4 @@
-"""At the width of a phone: a signal of which messages come, but no value, says so, and why."""
+"""At the width of a phone: a signal of which messages come, but no value, is shown as that, with the reason."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from playwright.async_api import expect
 from tests.page.canned import Canned, alarm, live, slow
 from tests.page.canned_fleet import car, worst
 from tests.page.conftest import Phone
-from tests.page.test_alarm_list import answer, heard
+from tests.page.test_alarm_list import answer, received
 from tests.page.test_alarm_states import CRITICAL, ENDED, speeding
 from tests.page.test_overlaps import noticed
 from tests.page.test_slow_down import DIALOG, RAIL, Thumb
@@ -40,12 +40,12 @@ MAP = """() => {
 
 def fleet(canned: Canned, **more: Any) -> None:
     """Three cars, of which this page shows the first and the last is too fast."""
-    told = worst("Speed above limit", "12.0 m/s, limit 11.0 m/s", ago_s=9) | more
+    alarm = worst("Speed above limit", "12.0 m/s, limit 11.0 m/s", ago_s=9) | more
     canned.vehicle = "Ocelot"
     canned.cars = [
         car("Ocelot", 4.2, (0, 0, 0)),
         car("Serval", 3.0, (9, 0, 0)),
-        car(OTHER, 12.0, (0, 9, 0), worst=told),
+        car(OTHER, 12.0, (0, 9, 0), worst=alarm),
     ]
 
 
@@ -123,7 +123,7 @@ async def test_with_three_cars_the_right_one_is_slowed(phone: Phone, canned: Can
     if state != "armed":
         await phone.drawn(6)
         await phone.page.locator("#sheet-alarm [data-f=acknowledge]").tap()
-        answer(canned, await heard(canned, 1))
+        answer(canned, await received(canned, 1))
         await phone.f("slow").tap()
         await phone.page.locator("#sheet-slow [data-act=arm]").tap()
         await heard_any(canned, "arm")
@@ -137,7 +137,7 @@ async def test_with_three_cars_the_right_one_is_slowed(phone: Phone, canned: Can
 
 async def heard_any(canned: Canned, kind: str) -> dict[str, Any]:
     async with asyncio.timeout(20):
-        while not (found := [one for one in canned.heard if one["kind"] == kind]):
+        while not (found := [one for one in canned.received if one["kind"] == kind]):
             await asyncio.sleep(0.05)
     return found[-1]
 
@@ -160,7 +160,7 @@ async def test_five_alarms_three_of_them_returned_are_acknowledged(
     await expect(sheet).to_contain_text("Speed above limit")
     await phone.drawn(6)
     await sheet.locator("[data-f=acknowledge]").tap()
-    answer(canned, await heard(canned, 1))
+    answer(canned, await received(canned, 1))
     await expect(sheet).to_be_hidden()
     if width < 1000:
         await phone.f("strip").tap()
@@ -168,12 +168,12 @@ async def test_five_alarms_three_of_them_returned_are_acknowledged(
     await expect(ended).to_have_text("Acknowledge all that ended 3")
     await phone.drawn(6)
     await ended.tap()
-    answer(canned, await heard(canned, 4))
+    answer(canned, await received(canned, 4))
     waiting = page.locator("[data-f=alarms] [data-kind=unacknowledged]:visible")
     await expect(waiting).to_have_count(1)
     await phone.drawn(6)
     await waiting.locator("[data-do=acknowledge]").tap()
-    names = await heard(canned, 5)
+    names = await received(canned, 5)
     assert sorted(names) == ["gone", "late", "obstacle", "phone_missing", "speed_limit"]
     answer(canned, names)
     await expect(phone.f("strip")).to_have_attribute("data-known", "")
@@ -197,7 +197,7 @@ async def test_the_warning_of_this_car_is_covered_by_no_other_car_and_no_notice(
     await noticed(phone.page, canned)
     await phone.drawn(6)
     await warning.get_by_role("button", name="Acknowledge").tap()
-    answer(canned, await heard(canned, 1))
+    answer(canned, await received(canned, 1))
     await phone.page.evaluate("document.querySelector('.snacks > .note').remove()")
     await expect(warning).to_be_hidden()
     await expect(card).to_be_visible()

@@ -193,7 +193,7 @@ async def test_what_a_sheet_leaves_in_sight_acts_and_escape_closes_the_sheet_alo
     await phone.f("menu").tap()
     await phone.f("pause").tap()
     async with asyncio.timeout(20):
-        while not any(one["kind"] == "pause" for one in canned.heard):
+        while not any(one["kind"] == "pause" for one in canned.received):
             await asyncio.sleep(0.05)
     await expect(menu).to_be_visible()
     await page.keyboard.press("Escape")
@@ -217,10 +217,10 @@ async def test_a_sheet_leaves_a_docked_alarm_free_though_the_look_of_drawers_fai
     phone: Phone, canned: Canned
 ) -> None:
     page = phone.page
-    asked: list[str] = []
+    requests: list[str] = []
 
     async def refuse(route: Route) -> None:
-        asked.append(route.request.url)
+        requests.append(route.request.url)
         await route.abort()
 
     await page.route("**/drawers.css*", refuse)
@@ -233,7 +233,7 @@ async def test_a_sheet_leaves_a_docked_alarm_free_though_the_look_of_drawers_fai
     await expect(docked).to_be_visible()
     menu = page.locator("#sheet-menu")
     for _ in range(2):
-        before = len(asked)
+        before = len(requests)
         await click(page, SHEETS["sheet-menu"])
         await expect(menu).to_be_visible()
         box, pane = await menu.bounding_box(), await page.locator(".alarms-pane").bounding_box()
@@ -241,7 +241,7 @@ async def test_a_sheet_leaves_a_docked_alarm_free_though_the_look_of_drawers_fai
         assert pane is not None
         assert box["x"] + box["width"] <= pane["x"] + 1
         async with asyncio.timeout(10):
-            while len(asked) == before:
+            while len(requests) == before:
                 await asyncio.sleep(0.05)
         await page.keyboard.press("Escape")
         await expect(menu).to_be_hidden()

@@ -28,7 +28,7 @@ SETTINGS = "[limits.link_late]\nlate_s = 10.0\ncritical_s = 20.0\n"  # this mach
 OLD_MS = 1000  # a mark so old outlives everything
 SAME_MS = 100  # a mark's time by the server's clock and by the page's own
 SERVER_TOO = 0.3  # of the kills
-# The page presses its own key, until it is killed, and tells each mark that it says is stored.
+# The page presses its own key, until it is killed, and reports each mark that it shows as stored.
 MARKS = """() => setInterval(() => {
   const key = document.querySelector('[data-f="mark"]');
   if (!key || key.getAttribute('aria-disabled') === 'true') return;
@@ -39,13 +39,13 @@ MARKS = """() => setInterval(() => {
 
 # Of what the phone keeps, all was acknowledged by the server.
 NONE_WAITS = """() => new Promise((resolve) => {
-  const asked = indexedDB.open('catgraph-marks');
-  asked.onerror = () => resolve(false);
-  asked.onupgradeneeded = () => asked.transaction.abort(); // the page makes it
-  asked.onsuccess = () => {
-    const all = asked.result.transaction('marks').objectStore('marks').getAll();
+  const request = indexedDB.open('catgraph-marks');
+  request.onerror = () => resolve(false);
+  request.onupgradeneeded = () => request.transaction.abort(); // the page makes it
+  request.onsuccess = () => {
+    const all = request.result.transaction('marks').objectStore('marks').getAll();
     all.onsuccess = () => {
-      asked.result.close();
+      request.result.close();
       resolve(all.result.length > 0 && all.result.every(({ stored }) => stored > 0));
     };
   };
@@ -72,7 +72,7 @@ class Phone:
         """All of its processes, at once."""
         named = f"--user-data-dir={self._profile}"
         mine = psutil.Process().children(recursive=True)
-        (main,) = [one for one in mine if named in _words(one) and not any("--type=" in word for word in _words(one))]
+        (main,) = [one for one in mine if named in _words(one) and not any("--type=" in part for part in _words(one))]
         killed = [main, *main.children(recursive=True)]
         for process in killed:
             with contextlib.suppress(psutil.NoSuchProcess):

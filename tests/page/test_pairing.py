@@ -18,7 +18,7 @@ from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, page_data, running, server, simulate
 
-# What a browser itself writes of an answer that was no: a test asks for that.
+# What a browser itself writes of an answer that was no: a test provokes that.
 REFUSED = re.compile(r"responded with a status of (401|403|429)|WebSocket handshake: Unexpected response code: 403")
 
 
@@ -31,14 +31,14 @@ class Site:
 
     async def invitation(self, *options: str) -> tuple[str, str]:
         """PIN and token, as a person at the server gets them."""
-        asked = await asyncio.create_subprocess_exec(
+        command = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "server", "pair", "--data", str(self.data), *options),
             stdout=asyncio.subprocess.PIPE,
         )
-        told = (await asyncio.wait_for(asked.communicate(), 30))[0].decode()
-        pin, token = re.search(r"PIN (\d{6})", told), re.search(r"#pair=([\w-]+)", told)
-        assert pin is not None, told
-        assert token is not None, told
+        output = (await asyncio.wait_for(command.communicate(), 30))[0].decode()
+        pin, token = re.search(r"PIN (\d{6})", output), re.search(r"#pair=([\w-]+)", output)
+        assert pin is not None, output
+        assert token is not None, output
         return pin[1], token[1]
 
 
@@ -61,7 +61,7 @@ async def another_phone(browser: Browser) -> AsyncIterator[Phone]:
     try:
         phone = await phone_in(context)
         yield phone
-        assert [said for said in phone.complaints if not REFUSED.search(said)] == []
+        assert [line for line in phone.complaints if not REFUSED.search(line)] == []
     finally:
         await context.close()
 
@@ -85,11 +85,11 @@ async def test_a_pin_lets_a_phone_in_and_it_stays_in_over_a_reload(browser: Brow
         await expect(phone.page.locator("#pairing h1")).to_have_text("Pair this device")
         await expect(phone.page.locator("#monitor")).to_be_hidden()
         pin, _ = await site.invitation()
-        says = phone.f("pair-says", "#pairing")
+        message = phone.f("pair-says", "#pairing")
         await phone.f("pair-go", "#pairing").tap()
-        await expect(says).to_have_text("The PIN has 6 digits.")
+        await expect(message).to_have_text("The PIN has 6 digits.")
         await type_pin(phone, f"{(int(pin) + 1) % 10**6:06d}")
-        await expect(says).to_have_text("This PIN is wrong. Read it again from the server.")
+        await expect(message).to_have_text("This PIN is wrong. Read it again from the server.")
         await phone.f("pair-name", "#pairing").fill("Ann’s phone")
         await phone.page.locator("#pair-pin").press_sequentially(pin)  # by the keys of the phone itself
         await expect(phone.page.locator("#pair-pin")).to_have_value(f"{pin[:3]} {pin[3:]}")
@@ -123,20 +123,20 @@ async def test_a_link_pairs_a_viewer_and_is_gone_from_the_address_before_anythin
 ) -> None:
     async with another_phone(browser) as phone:
         _, token = await site.invitation("--viewer")
-        asked: list[str] = []
-        phone.page.on("request", lambda request: asked.append(f"{request.url} {request.headers.get('referer')}"))
+        requests: list[str] = []
+        phone.page.on("request", lambda request: requests.append(f"{request.url} {request.headers.get('referer')}"))
         await phone.open(f"{site.address}/#pair={token}")
         await expect(phone.page.locator("#pairing h1")).to_be_visible()
         await no_barrier(phone.page, "pairing")
         assert token not in phone.page.url
         await phone.f("pair-go", "#pairing").tap()
         await phone.live()
-        assert [one for one in asked if token in one] == []
+        assert [one for one in requests if token in one] == []
         assert token not in await phone.page.evaluate(
             "JSON.stringify([history.state, location.href, {...localStorage}])"
         )
 
-        # A viewer looks: what would change something is greyed, and says why.
+        # A viewer looks: what would change something is greyed, and shows why.
         pause = phone.f("pause")
         await expect(pause).to_have_attribute("aria-disabled", "true")
         await pause.tap(force=True)
@@ -154,7 +154,7 @@ async def test_a_link_pairs_a_viewer_and_is_gone_from_the_address_before_anythin
         )
         assert refused == [403, "viewer"]
 
-        # The same link lets nobody else in, and says so.
+        # The same link lets nobody else in, and the page shows that.
         async with another_phone(browser) as second:
             await second.open(f"{site.address}/#pair={token}")
             await second.f("pair-go", "#pairing").tap()

@@ -1,4 +1,4 @@
-"""Each part of the page on set states: what it shows, what it sends, and what it says of what is not known any more."""
+"""Each part of the page on set states: what it shows, what it sends, and its texts for what is not known any more."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ READY = {"state": "ACKED", "acknowledged_by": "You"}
 
 
 def sent(canned: Canned, kind: str) -> list[dict[str, Any]]:
-    return [one for one in canned.heard if one.get("kind") == kind]
+    return [one for one in canned.received if one.get("kind") == kind]
 
 
 async def until_sent(canned: Canned, kind: str) -> dict[str, Any]:
@@ -118,8 +118,8 @@ async def test_files_lists_what_is_saved_and_a_row_opens_its_menu(phone: Phone, 
     sheet = phone.page.locator("#sheet-file")
     await expect(sheet).to_contain_text("2 critical alarms")
     await expect(sheet).to_contain_text("Recovered")
-    for words in ("Open replay", "E-mail", "Download", "Delete"):
-        await expect(sheet.locator(".menu-list li", has_text=words).first).to_be_visible()
+    for text in ("Open replay", "E-mail", "Download", "Delete"):
+        await expect(sheet.locator(".menu-list li", has_text=text).first).to_be_visible()
 
 
 async def test_a_limit_that_is_typed_in_settings_is_sent_in_si(phone: Phone, canned: Canned) -> None:
@@ -150,9 +150,9 @@ async def test_a_critical_alarm_is_a_dialog_and_names_what_was_measured(phone: P
     await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "asking")
     await expect(sheet).not_to_have_attribute("data-moved", "")
     await phone.f("acknowledge", "#sheet-alarm").tap()
-    said = await until_sent(canned, "acknowledge")
-    assert (said["alarm"], said["occurrence"]) == ("Speed", 1)
-    await expect(sheet).to_be_visible()  # what the server has not confirmed still asks
+    command = await until_sent(canned, "acknowledge")
+    assert (command["alarm"], command["occurrence"]) == ("Speed", 1)
+    await expect(sheet).to_be_visible()  # the dialog stays until the server has confirmed
     canned.state["alarms"][0] |= READY
     await expect(sheet).to_be_hidden()
     await expect(phone.f("strip")).to_contain_text("Speed above limit")  # it stands, and is known
@@ -172,9 +172,9 @@ async def test_a_warning_is_shelved_for_so_many_minutes(phone: Phone, canned: Ca
     await expect(sheet).to_contain_text("Shelving ends by itself.")
     await expect(sheet).not_to_have_attribute("data-moved", "")
     await sheet.locator("[data-minutes]").first.tap()
-    said = await until_sent(canned, "shelve")
-    assert (said["alarm"], said["occurrence"]) == ("scan_slow", 2)
-    assert 0 < said["minutes"] <= 15
+    command = await until_sent(canned, "shelve")
+    assert (command["alarm"], command["occurrence"]) == ("scan_slow", 2)
+    assert 0 < command["minutes"] <= 15
     canned.state["alarms"][0] |= {"state": "SHELVED", "shelved_by": "You", "shelved_until_ms": 2**41, "place": "list"}
     await expect(snack).to_be_hidden()
     await phone.f("strip").tap()
@@ -230,7 +230,7 @@ async def test_a_server_that_falls_silent_covers_everything_and_its_return_uncov
 
 
 @pytest.mark.parametrize(
-    ("scene", "sheet", "words", "cut"),
+    ("scene", "sheet", "text", "cut"),
     [
         ("link-lost", "#sheet-lost", "watch the car. Last known: 4.2 m/s, object at 12.4 m, ", ("Server", "Bridge")),
         ("no-messages", "#sheet-mute", "Connected, but no message", ("Bridge", "Car")),
@@ -238,11 +238,11 @@ async def test_a_server_that_falls_silent_covers_everything_and_its_return_uncov
     ],
 )
 async def test_each_broken_part_of_the_chain_has_its_dialog(
-    phone: Phone, canned: Canned, scene: str, sheet: str, words: str, cut: tuple[str, str]
+    phone: Phone, canned: Canned, scene: str, sheet: str, text: str, cut: tuple[str, str]
 ) -> None:
     await show(canned, phone.page, scene)
     await expect(phone.page.locator(sheet)).to_be_visible()
-    await expect(phone.page.locator(sheet)).to_contain_text(words)
+    await expect(phone.page.locator(sheet)).to_contain_text(text)
     await is_cut(phone.page.locator(sheet), *cut)
     canned.state = live()
     await phone.live()
@@ -277,7 +277,7 @@ async def test_a_phone_that_is_not_paired_sees_nothing_of_the_car(phone: Phone, 
 async def test_another_car_that_needs_a_person_is_named_and_opened(phone: Phone, canned: Canned) -> None:
     await show(canned, phone.page, "cars")
     sheet = phone.page.locator("#sheet-cars")
-    for words in (
+    for text in (
         "Serval",
         "Speed above limit",
         "Margay",
@@ -286,7 +286,7 @@ async def test_another_car_that_needs_a_person_is_named_and_opened(phone: Phone,
         "GPS drift, acknowledged",
         "Desk 2",
     ):
-        await expect(sheet).to_contain_text(words)
+        await expect(sheet).to_contain_text(text)
     await expect(phone.f("car-count")).to_have_text("2")  # Caracal's is acknowledged
 
 
@@ -314,19 +314,19 @@ async def test_the_departure_check_lists_what_is_open(phone: Phone, canned: Cann
 
 async def test_the_mode_of_the_car_is_named(phone: Phone, canned: Canned) -> None:
     await opened(phone, canned)
-    for mode, words in (("autonomous", "Autonomous"), ("manual", "Manual"), ("unknown", "Mode not known")):
+    for mode, text in (("autonomous", "Autonomous"), ("manual", "Manual"), ("unknown", "Mode not known")):
         why = "silent" if mode == "unknown" else None
         canned.state["mode"] |= {"mode": mode, "why": why, "since_ms": 0, "source": "/mode", "way_m": 12.0}
-        await expect(phone.page.locator(".ledge [data-f=mode]")).to_contain_text(words, timeout=20_000)
+        await expect(phone.page.locator(".ledge [data-f=mode]")).to_contain_text(text, timeout=20_000)
 
 
 async def test_the_outbox_says_what_became_of_each_mail(phone: Phone, canned: Canned) -> None:
     await show(canned, phone.page, "outbox")
     mails = phone.page.locator("#sheet-outbox [data-mail]")
     await expect(mails).to_have_count(3)
-    for n, (state, words) in enumerate((("queued", "tried again by itself"), ("sent", "Sent"), ("failed", "refused"))):
+    for n, (state, text) in enumerate((("queued", "tried again by itself"), ("sent", "Sent"), ("failed", "refused"))):
         await expect(mails.nth(n)).to_have_attribute("data-state", state)
-        await expect(mails.nth(n)).to_contain_text(words)
+        await expect(mails.nth(n)).to_contain_text(text)
 
 
 async def test_a_replay_says_that_it_is_one_and_orders_nothing(phone: Phone, canned: Canned) -> None:
@@ -336,7 +336,7 @@ async def test_a_replay_says_that_it_is_one_and_orders_nothing(phone: Phone, can
     await expect(phone.page).to_have_title(re.compile("REPLAY"))
     await expect(phone.page.locator("#monitor > .rail")).to_be_hidden()
     await expect(phone.page.locator(".replay-line")).to_contain_text("Speed above limit")
-    await expect(phone.page.locator("#sheet-alarm")).to_be_hidden()  # what was an alarm then asks nobody now
+    await expect(phone.page.locator("#sheet-alarm")).to_be_hidden()  # what was an alarm then has no dialog now
 
 
 async def test_the_log_lists_what_happened_and_by_whom(phone: Phone, canned: Canned) -> None:

@@ -77,7 +77,7 @@ async def shift(browser: Browser, data: Path, car: Process) -> AsyncIterator[Shi
             await phone.live()
             phones.append(phone)
         yield Shift(phones[0], phones[1], client, console)
-    assert [said for phone in phones for said in phone.complaints] == []
+    assert [line for phone in phones for line in phone.complaints] == []
 
 
 @pytest.mark.gate
@@ -108,7 +108,7 @@ async def test_people_sign_on_act_and_hand_over(browser: Browser, car: Process, 
         await one.order(ann, "Take control")
         await expect(ann.f("who-name")).to_have_text("AK controls")
         await expect(ben.f("who-name")).to_have_text("A. K. (Pixel 7)")
-        await ann.page.reload()  # who is on duty stays so, and is not asked again
+        await ann.page.reload()  # who is on duty stays so, and there is no second prompt
         await ann.live()
         await expect(ann.f("who-name")).to_have_text("AK controls")
         await expect(ann.page.locator("#sheet-duty")).to_have_count(0)
@@ -168,10 +168,10 @@ async def test_what_opens_by_itself_covers_neither_an_alarm_nor_a_finger(
 ) -> None:
     async with shift(browser, tmp_path, car) as one, await browser.new_context(**PHONE) as context:
         late = await phone_in(context)
-        asked, loads = asyncio.Event(), asyncio.Event()
+        requested, loads = asyncio.Event(), asyncio.Event()
 
         async def hold(route: Route) -> None:
-            asked.set()
+            requested.set()
             await loads.wait()
             await route.continue_()
 
@@ -180,9 +180,9 @@ async def test_what_opens_by_itself_covers_neither_an_alarm_nor_a_finger(
         await late.open(one.ann.page.url)
         await late.live()
         await late.page.wait_for_timeout(600)  # of several pictures
-        assert not asked.is_set()
+        assert not requested.is_set()
         await late.page.evaluate("document.querySelector('#sliding').remove()")
-        await asyncio.wait_for(asked.wait(), 10)
+        await asyncio.wait_for(requested.wait(), 10)
         await one.console.patch("/api/settings", json={"values": {"speed_limit.max_mps": 2.0}})
         alarm = late.page.locator("#sheet-alarm")
         await expect(alarm).to_be_visible(timeout=15_000)
@@ -210,10 +210,10 @@ async def fits(page: Page, sheet: str) -> None:
 
 
 async def read_all(sheet: Locator) -> None:
-    """Says and presses line after line, until there is none left. The sheet gives way to an alarm, and comes back."""
-    words, following = sheet.locator('[data-f="take-over"]'), sheet.locator(".tick[data-next]")
+    """Reads and presses line after line, until there is none left. The sheet gives way to an alarm, and comes back."""
+    title, following = sheet.locator('[data-f="take-over"]'), sheet.locator(".tick[data-next]")
     async with asyncio.timeout(30):
-        while not await words.filter(has_text="all lines are read back").count():
+        while not await title.filter(has_text="all lines are read back").count():
             with contextlib.suppress(PlaywrightTimeout, AssertionError):  # a press at once was not meant for it
                 key = await following.get_attribute("data-line", timeout=1000)
                 await following.tap(timeout=1000)

@@ -19,7 +19,7 @@ M_NORTH = 1 / 110_890.0
 
 
 class Ride:
-    """Lays a phone into the car: its browser is told the car's own position twice a second, `north_m` aside."""
+    """Lays a phone into the car: its browser gets the car's own position twice a second, `north_m` aside."""
 
     def __init__(self, phone: Phone, address: str) -> None:
         self._phone, self._address = phone, address
@@ -139,14 +139,14 @@ async def test_a_reload_is_the_same_phone_and_needs_no_tap(phone: Phone, tmp_pat
 async def test_without_a_tap_and_a_permission_nothing_is_asked_and_nothing_sent(phone: Phone, tmp_path: Path) -> None:
     async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
         await phone.page.add_init_script(
-            "window.asked = 0; const geo = navigator.geolocation;"
+            "window.requests = 0; const geo = navigator.geolocation;"
             "for (const name of ['watchPosition', 'getCurrentPosition']) {"
-            "  const ask = geo[name].bind(geo); geo[name] = (...a) => { window.asked += 1; return ask(...a); }; }"
+            "  const ask = geo[name].bind(geo); geo[name] = (...a) => { window.requests += 1; return ask(...a); }; }"
         )
         await phone.open(watch.address)
         await phone.live()
         await asyncio.sleep(2.0)
-        assert await phone.page.evaluate("window.asked") == 0
+        assert await phone.page.evaluate("window.requests") == 0
         state = await phone.page.evaluate("fetch('/api/state').then((answer) => answer.json())")
         assert state["phone"] is None
         await expect(tile(phone, "Phone–car")).to_contain_text("no phone")

@@ -1,4 +1,4 @@
-"""A planned stop on the page: begun from the menu, said under the strip on every tab, ended with one key."""
+"""A planned stop on the page: begun from the menu, shown under the strip on every tab, ended with one key."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ async def test_it_is_begun_from_the_menu_with_a_reason(phone: Phone, canned: Can
         ["Parked", "In the workshop", "Charging or refuelling", "Being set up"]
     )
     await sheet.locator("[data-reason=charging]").tap()
-    said = await until_sent(canned, "planned_stop")
-    assert (said["reason"], said["vehicle"]) == ("charging", "car")
+    command = await until_sent(canned, "planned_stop")
+    assert (command["reason"], command["vehicle"]) == ("charging", "car")
     await expect(sheet).to_have_count(0)
 
 

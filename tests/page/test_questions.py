@@ -1,4 +1,4 @@
-"""What catgraph asks of the operator in control: card, sheet, the line that stays; and the sheet Signals."""
+"""The questions to the operator in control: card, sheet, the line that stays; and the sheet Signals."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CARD = ".questions .card"
 
 
 def ask(canned: Canned, *questions: dict[str, Any]) -> None:
-    """The canned car asks these."""
+    """The canned car has these questions."""
     canned.state["questions"] = list(questions)
     canned.candidates = {"scan": laser_offers()}
     for one in questions:
@@ -31,7 +31,7 @@ def ask(canned: Canned, *questions: dict[str, Any]) -> None:
 
 def sent(canned: Canned) -> list[dict[str, Any]]:
     """The changes of settings that the page has sent."""
-    return [one for one in canned.heard if one["kind"] == "set"]
+    return [one for one in canned.received if one["kind"] == "set"]
 
 
 async def home(phone: Phone, canned: Canned) -> None:
@@ -200,21 +200,21 @@ async def test_the_unit_of_a_signal_is_picked_in_signals(phone: Phone, canned: C
 
 
 @pytest.mark.parametrize(
-    ("words", "setting", "title"),
+    ("text", "setting", "title"),
     [
         ("assumed to look ahead: no transforms, and no setting", "mounting.yaw_deg", "Laser turned to the left"),
         ("gap from the laser: no bumper set", "obstacle.bumper_ahead_m", "Front bumper ahead of the rear axle"),
     ],
 )
 async def test_a_note_on_the_mounting_stands_on_scan_and_leads_to_its_settings(
-    phone: Phone, canned: Canned, words: str, setting: str, title: str
+    phone: Phone, canned: Canned, text: str, setting: str, title: str
 ) -> None:
-    canned.state["signals"]["scan"]["note"] = words
+    canned.state["signals"]["scan"]["note"] = text
     canned.settings = {"schema": {setting: FIELD | {"title": title}}, "values": {setting: 0.0}, "defaults": {}}
     await phone.open(f"{canned.address}/#scan")
     await phone.live()
     note = phone.f("note", "#panel-scan")
-    await expect(note).to_contain_text(words)
+    await expect(note).to_contain_text(text)
     await expect(note).to_be_in_viewport(ratio=1)
     await note.tap()
     await expect(phone.page.locator("#tab-settings")).to_have_attribute("aria-selected", "true")

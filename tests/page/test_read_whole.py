@@ -1,4 +1,4 @@
-"""Words and numbers that an operator must read whole: names of checks, waiting alarms, what is measured, defaults."""
+"""Texts and numbers that an operator must read whole: names of checks, waiting alarms, what is measured, defaults."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ OVER = """(both) => ((all) => all[0].some((a) => all[1].some((b) => {
 #: Defaults under the slider, or over an end of their range.
 COVERED = """() => [...document.querySelectorAll('#panel-settings .range')].filter((one) => {
   if (!one.checkVisibility()) return false;
-  const word = one.querySelector('.word').getBoundingClientRect();
+  const label = one.querySelector('.word').getBoundingClientRect();
   const range = document.createRange();
   range.selectNodeContents(one.querySelector('.word'));
   const { left, right, top, bottom } = range.getBoundingClientRect();
@@ -42,13 +42,13 @@ COVERED = """() => [...document.querySelectorAll('#panel-settings .range')].filt
     .filter((end) => end.checkVisibility({ visibilityProperty: true }));
   const isOverEnd = ends.map((end) => end.getBoundingClientRect())
     .some((end) => left < end.right && end.left < right && top < end.bottom && end.top < bottom);
-  return word.top < one.querySelector('input').getBoundingClientRect().bottom || isOverEnd;
+  return label.top < one.querySelector('input').getBoundingClientRect().bottom || isOverEnd;
 }).map((one) => one.textContent)"""
-#: Whether an element shows less than all of its words.
+#: Whether an element shows less than all of its text.
 LESS = "(one) => one.scrollWidth > one.clientWidth + 1 || one.scrollHeight > one.clientHeight + 1"
 
 
-async def names_are_whole(phone: Phone, canned: Canned, sizes: list[tuple[int, int]], words: str = "") -> None:
+async def names_are_whole(phone: Phone, canned: Canned, sizes: list[tuple[int, int]], font: str = "") -> None:
     """Bold, as those of what is not checked: so they are widest."""
     canned.state = live()
     canned.state["checks"] = [
@@ -57,8 +57,8 @@ async def names_are_whole(phone: Phone, canned: Canned, sizes: list[tuple[int, i
     ]
     await phone.open(f"{canned.address}/#home")
     await phone.live()
-    if words:
-        await phone.page.evaluate("(words) => document.documentElement.style.setProperty('--words', words)", words)
+    if font:
+        await phone.page.evaluate("(font) => document.documentElement.style.setProperty('--words', font)", font)
     await expect(phone.page.locator("#monitor .checks b")).to_have_count(len(NAMES))
     found = {}
     for width, height in sizes:
@@ -78,7 +78,7 @@ async def test_each_is_in_each_window(phone: Phone, canned: Canned) -> None:
     await names_are_whole(phone, canned, EACH, 'Roboto, "Liberation Sans", Arial')  # DejaVu is a quarter wider
 
 
-#: Words under the name of a check whose letters reach out of their line at its foot, where they are cut.
+#: Text under the name of a check whose letters reach out of their line at its foot, where they are cut.
 CUT_LOW = """() => [...document.querySelectorAll('#monitor .checks li button > span')].filter((one) => {
   const range = document.createRange();
   range.selectNodeContents(one);
@@ -290,7 +290,7 @@ async def test_stale_is_read_whole_on_a_small_phone(phone: Phone, canned: Canned
         assert foot <= 1 or height < 600, (width, height)
 
 
-#: Keys and fields that reach out of the window, or that show less than all of their words.
+#: Keys and fields that reach out of the window, or that show less than all of their text.
 SHORT = """(panel) => [...document.querySelectorAll(`#panel-${panel} :is(button, input, select, a)`)].filter((one) => {
   if (!one.checkVisibility() || one.matches('.unseen, [type=range]')) return false;
   const at = one.getBoundingClientRect();

@@ -31,13 +31,13 @@ def hostile(path: Path) -> Path:
 async def test_alarms_plots_and_nothing_from_the_network(phone: Phone, tmp_path: Path) -> None:
     out = tmp_path / "drive.html"
     assert main(["check", str(hostile(tmp_path / "a.bag")), "--html", str(out)]) == 1
-    asked: list[str] = []
-    phone.page.on("request", lambda request: asked.append(request.url))
+    requests: list[str] = []
+    phone.page.on("request", lambda request: requests.append(request.url))
     await phone.page.goto(out.as_uri())
     await expect(phone.page.get_by_text("Speed above limit").first).to_be_visible()
     await expect(phone.page.locator(".uplot canvas").first).to_be_visible()
     assert await phone.page.title() != "stolen"
-    assert asked == [out.as_uri()]
+    assert requests == [out.as_uri()]
     assert await phone.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 

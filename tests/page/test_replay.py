@@ -82,7 +82,7 @@ async def test_a_link_leads_to_a_moment_and_one_tap_back_to_live(phone: Phone, w
     )  # another one while the live car has an alarm, as one does on a busy machine
     await expect(icon).to_have_attribute("href", re.compile("catgraph-replay"), timeout=30_000)
     await expect(page.locator("#monitor > .rail")).to_be_hidden()
-    assert not await page.locator("#sheet-alarm[open]").count(), "what was an alarm then asks nobody now"
+    assert not await page.locator("#sheet-alarm[open]").count(), "what was an alarm then has no dialog now"
     await page.get_by_role("button", name="Leave").tap()
     await phone.live()
     await expect(page.locator("#monitor > .rail")).to_be_visible()
@@ -171,7 +171,7 @@ async def test_the_scan_is_that_of_the_recording_and_does_not_grow_old(phone: Ph
     page = await replayed(phone, watch, 30.0, "scan")
     nearest = page.locator('#panel-scan [data-f="distance"]')
     await expect(nearest).to_have_text(re.compile("^(19|20)"), timeout=15_000)
-    await page.wait_for_timeout(2500)  # it stands, and is told again and again
+    await page.wait_for_timeout(2500)  # it stands, and is sent again and again
     await expect(nearest).to_have_text(re.compile("^(19|20)"))
     assert "stale" not in str(await page.locator("#panel-scan").inner_text()).lower()
 

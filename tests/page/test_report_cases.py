@@ -65,7 +65,7 @@ async def provoke(car: Process, fault: str, page: Page) -> None:
         await car.type("stop")
 
 
-async def dialog_on_each_tab(browser: Browser, drive: Drive, fault: str, title: str, words: str) -> None:
+async def dialog_on_each_tab(browser: Browser, drive: Drive, fault: str, title: str, text: str) -> None:
     """The dialog stands on every tab; one OK closes it on all, and each page is where it was.
 
     `fault`: lasts longer than the five waits together, because an alarm that returned has no dialog.
@@ -77,7 +77,7 @@ async def dialog_on_each_tab(browser: Browser, drive: Drive, fault: str, title: 
             sheet = page.locator("#sheet-alarm")
             await expect(sheet).to_be_visible(timeout=LONG)
             await expect(sheet.locator("[data-f=title]")).to_have_text(title)
-            await expect(sheet).to_contain_text(re.compile(words))
+            await expect(sheet).to_contain_text(re.compile(text))
         await pages["map"].locator("#sheet-alarm [data-f=acknowledge]").tap()
         for tab, page in pages.items():
             await expect(page.locator("#sheet-alarm")).to_be_hidden()
@@ -120,7 +120,7 @@ async def test_case_02_the_right_address_opens_home(phone: Phone, drive: Drive, 
 async def test_case_04_a_lost_link_shows_its_dialog_and_what_was_recorded_is_saved_and_listed(
     phone: Phone, tmp_path: Path
 ) -> None:
-    """Saved and listed before the dialog says so, and before the connect screen; a link that returns goes on."""
+    """Saved and listed before the dialog states it, and before the connect screen; a link that returns goes on."""
     car = await Process(*simulate()).start()
     port = car.shown.split(":")[1]
     async with running(*server(tmp_path / "watch", car.address)) as watch:

@@ -105,7 +105,7 @@ async def test_681_beams_of_a_real_laser_with_those_below_range_min_not_drawn(
         )
         usable = int(re.match(r"\d+", counts)[0])  # type: ignore[index]
         assert 500 < usable < 681
-        assert abs(len(squares) - usable) <= 25  # the words change five times a second, the plot with every scan
+        assert abs(len(squares) - usable) <= 25  # the text changes five times a second, the plot with every scan
         scale = (height - 34 - 14) / 10
         x, y = (height - 34 - np.array(squares)[:, 1]) / scale, (206 - np.array(squares)[:, 0]) / scale
         ranges = np.hypot(x, y)
@@ -243,11 +243,11 @@ async def test_a_tapped_return_is_told_in_words_and_stays_until_tapped_away(phon
     place = {"x": 206 - 6 * scale + 15, "y": height - 34 - 6 * scale}
     await aim.tap(position=place)
     await expect(marked).to_have_text(re.compile(r"Marked: \d\.\d m, 4\d° left, 0\.\d\d s ago"))
-    said = await phone.f("said", "#panel-scan").text_content()
-    assert 7.5 < float(re.match(r"[\d.]+", said)[0]) < 9.5  # type: ignore[index]
+    spoken = await phone.f("said", "#panel-scan").text_content()
+    assert 7.5 < float(re.match(r"[\d.]+", spoken)[0]) < 9.5  # type: ignore[index]
     await phone.page.wait_for_timeout(700)
     await expect(marked).to_be_visible()  # it is followed from scan to scan
-    assert await phone.f("said", "#panel-scan").text_content() == said  # and told once
+    assert await phone.f("said", "#panel-scan").text_content() == spoken  # and announced once
     await aim.tap(position={"x": 206 + 60, "y": height - 34 - 9 * scale})  # where nothing is
     await expect(marked).to_be_hidden()
     await aim.focus()
@@ -304,7 +304,7 @@ async def test_of_a_thread_that_draws_no_more_the_page_takes_over(phone: Phone, 
     await phone.page.wait_for_function("() => window.wasStale", timeout=8_000)
     await expect(phone.f("none", "#panel-scan")).to_be_hidden()
     assert phone.page.workers == []
-    assert [said for said in phone.complaints if "now draws the scan itself" in said] != []
+    assert [line for line in phone.complaints if "now draws the scan itself" in line] != []
     phone.complaints.clear()
 
 
@@ -330,10 +330,10 @@ async def test_the_thread_draws_what_the_page_would(phone: Phone, tmp_path: Path
 
 # It is stale for half a second only, between 1 s and the page's taking over: who looks now and then may miss it.
 NOTE_STALE = """() => {
-  const words = document.querySelector('#panel-scan [data-f="none-words"]');
-  const note = () => { window.wasStale ||= words.checkVisibility() && words.textContent.startsWith('STALE 1'); };
+  const text = document.querySelector('#panel-scan [data-f="none-words"]');
+  const note = () => { window.wasStale ||= text.checkVisibility() && text.textContent.startsWith('STALE 1'); };
   const all = { subtree: true, childList: true, characterData: true, attributes: true };
-  new MutationObserver(note).observe(words.closest('#panel-scan'), all);
+  new MutationObserver(note).observe(text.closest('#panel-scan'), all);
 }"""
 
 
@@ -373,7 +373,7 @@ ODD = {
     "blind": lambda t: drives.laser(t, np.full(181, np.nan)),
     "narrow": lambda t: drives.laser(t, 7.0 + 0.1 * np.sin(np.arange(61) + t), -np.pi / 6, np.pi / 180),
 }
-SAYS = {
+EXPECTED = {
     "one beam": ("blind", "1 of 1 beams", "not in view"),
     "no beams": ("blind", "0 of 0 beams", "not in view"),
     "10 000 beams": ("12.0", "of 10000 beams", "invalid"),
@@ -395,7 +395,7 @@ def as_json(scan: Any) -> dict[str, Any]:
 
 
 async def test_no_scan_is_too_odd(phone: Phone) -> None:
-    """Whatever a laser says, the page draws it or says why not, and its console stays clean."""
+    """Whatever a laser sends, the page draws it or shows why not, and its console stays clean."""
     async with roaming() as car:
         car.bridge.advertise(LASER, "sensor_msgs/LaserScan")
         laser = {"scan": ODD["narrow"]}
@@ -408,12 +408,12 @@ async def test_no_scan_is_too_odd(phone: Phone) -> None:
         scanning = asyncio.create_task(scan())
         async with serving(Config(vehicles=(Vehicle(name="car", address=car.address),))) as address:
             await phone.open(f"{address}/#scan")
-            for odd, (distance, beams, told) in SAYS.items():
+            for odd, (distance, beams, text) in EXPECTED.items():
                 laser["scan"] = ODD[odd]
                 await expect(phone.f("beams", "#panel-scan")).to_contain_text(beams, timeout=12_000)
                 await phone.acknowledge_all()
                 await expect(phone.f("distance", "#panel-scan")).to_contain_text(distance)
-                await expect(phone.page.locator("#scan-described")).to_contain_text(told)
+                await expect(phone.page.locator("#scan-described")).to_contain_text(text)
                 await expect(phone.f("straight", "#panel-scan")).to_be_visible()
                 await phone.f("aim", "#panel-scan").tap(position={"x": 206, "y": 100})
                 await phone.f("aim", "#panel-scan").focus()
@@ -422,8 +422,8 @@ async def test_no_scan_is_too_odd(phone: Phone) -> None:
         scanning.cancel()
 
 
-def age(words: str | None) -> float:
-    found = re.search(r"[\d.]+", words or "")
+def age(text: str | None) -> float:
+    found = re.search(r"[\d.]+", text or "")
     assert found is not None
     return float(found[0])
 

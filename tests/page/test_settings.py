@@ -134,7 +134,7 @@ async def test_a_stroke_over_the_sliders_scrolls_and_sets_nothing(phone: Phone, 
     await phone.page.touchscreen.tap(box["x"] + box["width"] * 0.8, box["y"] + 22)  # beside the thumb
     await stroke(phone.page, (300, 700, 300, 300))
     await phone.page.wait_for_function("() => document.querySelector('#panel-settings').scrollTop > 50")
-    assert [one for one in canned.heard if one["kind"] == "set"] == []
+    assert [one for one in canned.received if one["kind"] == "set"] == []
     await expect(number(phone)).to_have_value("11.0")
 
 
@@ -176,7 +176,7 @@ async def test_what_is_typed_is_taken_with_comma_or_point_or_refused_in_words(
 async def test_what_the_server_refuses_goes_back_and_its_sentence_stands_there(
     phone: Phone, watch: Process, api: httpx.AsyncClient
 ) -> None:
-    """Another page changed something between the look and the hand: the page says so and shows what is in force."""
+    """Another page changed something between display and press: the page shows that and shows what is in force."""
     await settings(phone, watch)
     # This page's own wire is held for the length of a change by another: what it sends names a version that is over.
     await phone.page.evaluate("""() => {
@@ -260,10 +260,10 @@ async def test_a_limit_shows_the_last_minute_of_its_signal_while_it_is_in_sight(
     await expect(row(phone).locator(".trace[data-drawn]")).to_be_visible()
     folded = phone.page.locator(".group:not([open]) .trace[data-drawn]")
     await expect(folded).to_have_count(0)
-    asked: list[str] = []
-    phone.page.on("request", lambda request: asked.append(request.url))
+    requests: list[str] = []
+    phone.page.on("request", lambda request: requests.append(request.url))
     await phone.page.wait_for_timeout(1500)
-    assert [url for url in asked if "/api/trends" in url or "/api/checks" in url] == []
+    assert [url for url in requests if "/api/trends" in url or "/api/checks" in url] == []
 
 
 @pytest.mark.gate
@@ -423,7 +423,7 @@ async def test_the_file_goes_out_and_comes_in_and_a_bad_one_is_refused_in_words(
     assert await limit(api) == 17.5
     await phone.page.locator(".find .undo").tap()
     await until_limit(api, 11.0)
-    phone.complaints[:] = [said for said in phone.complaints if "422" not in said]
+    phone.complaints[:] = [line for line in phone.complaints if "422" not in line]
 
 
 async def test_another_topic_is_picked_and_given_back(phone: Phone, watch: Process, api: httpx.AsyncClient) -> None:
@@ -489,10 +489,10 @@ async def test_each_alarm_sound_can_be_tried_before_a_car_is_connected(phone: Ph
     async with running(*server(tmp_path)) as watch:
         await phone.open(watch.address)
         await phone.page.locator("#connect [data-f=settings]").tap()
-        says = phone.page.locator("[data-f=sound-says]")
-        for sound, words in (("high", "ten quick"), ("medium", "three rising"), ("low", "two falling")):
+        message = phone.page.locator("[data-f=sound-says]")
+        for sound, text in (("high", "ten quick"), ("medium", "three rising"), ("low", "two falling")):
             await phone.page.locator(f"[data-sound-key={sound}]").tap()
-            await expect(says).to_contain_text(words)
+            await expect(message).to_contain_text(text)
 
 
 async def test_the_slow_down_goes_under_the_left_thumb_and_stop_to_the_far_corner(phone: Phone, watch: Process) -> None:

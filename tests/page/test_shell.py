@@ -1,4 +1,4 @@
-"""The page among a phone's apps: what installs it, what is kept of it, and what it says when the server is gone."""
+"""The page among a phone's apps: what installs it, what is kept of it, and what it shows when the server is gone."""
 
 from __future__ import annotations
 
@@ -81,9 +81,9 @@ async def test_chromium_finds_nothing_that_stands_against_installing(browser: Br
         cdp = await page.context.new_cdp_session(page)
         manifest = await cdp.send("Page.getAppManifest")
         assert manifest["errors"] == []
-        told = json.loads(manifest["data"])
-        assert (told["id"], told["start_url"], told["scope"], told["display"]) == ("/", "/", "/", "standalone")
-        assert {one["url"] for one in told["shortcuts"]} == {"/#map", "/#scan", "/#files", "/#settings"}
+        app = json.loads(manifest["data"])
+        assert (app["id"], app["start_url"], app["scope"], app["display"]) == ("/", "/", "/", "standalone")
+        assert {one["url"] for one in app["shortcuts"]} == {"/#map", "/#scan", "/#files", "/#settings"}
         await until(page, WORKER)
         faults = (await cdp.send("Page.getInstallabilityErrors"))["installabilityErrors"]
         # A window that leaves no traces, as each test's is, may install nothing: that is all it finds.
@@ -142,13 +142,13 @@ async def test_the_menu_offers_to_install_where_the_browser_does(browser: Browse
         await expect(key).to_be_hidden()
         await page.evaluate(
             """() => { const offer = new Event('beforeinstallprompt', { cancelable: true });
-              offer.prompt = async () => { window.asked = (window.asked ?? 0) + 1; return { outcome: 'accepted' }; };
+              offer.prompt = async () => { window.calls = (window.calls ?? 0) + 1; return { outcome: 'accepted' }; };
               window.wasTaken = !window.dispatchEvent(offer); }"""
         )
         assert await page.evaluate("window.wasTaken") is True, "no browser's bar over the instruments"
         await page.evaluate("document.querySelector('#sheet-menu').showModal()")
         await key.tap()
-        assert await page.evaluate("window.asked") == 1
+        assert await page.evaluate("window.calls") == 1
         await expect(page.locator("#sheet-menu")).not_to_have_attribute("open", "")
         await page.evaluate("document.querySelector('#sheet-menu').showModal()")
         await expect(key).to_be_hidden()
@@ -226,12 +226,12 @@ async def test_a_phone_says_that_the_server_is_gone_and_comes_back_by_itself(
         await page.wait_for_function("() => localStorage.getItem('catgraph.answered') !== null", timeout=15_000)
         await one.kill()
         await page.reload()
-        says = page.locator("#offline")
-        await expect(says).to_contain_text("The server does not answer")
-        await expect(says).to_contain_text("This device monitors nothing now.")
-        await expect(says.locator('[data-f="where"]')).to_have_text(one.shown)
-        await expect(says.locator('[data-f="answered"]')).to_have_text(re.compile(r"\d\d:\d\d:\d\d, \d+ s ago"))
-        await expect(says.locator('[data-f="then"]')).to_have_text(
+        offline = page.locator("#offline")
+        await expect(offline).to_contain_text("The server does not answer")
+        await expect(offline).to_contain_text("This device monitors nothing now.")
+        await expect(offline.locator('[data-f="where"]')).to_have_text(one.shown)
+        await expect(offline.locator('[data-f="answered"]')).to_have_text(re.compile(r"\d\d:\d\d:\d\d, \d+ s ago"))
+        await expect(offline.locator('[data-f="then"]')).to_have_text(
             "A car was being monitored then. It may still be moving."
         )
         assert await page.locator(".gauge, #monitor, [data-panel], [role=meter]").count() == 0
@@ -239,7 +239,7 @@ async def test_a_phone_says_that_the_server_is_gone_and_comes_back_by_itself(
         await page.set_viewport_size({"width": 320, "height": 480})
         assert await page.evaluate("document.documentElement.scrollWidth") <= 320
         await page.locator('[data-f="try"]').tap()
-        await expect(says.locator('[data-f="next"]')).to_have_text("This page tries again every 3 s.")
+        await expect(offline.locator('[data-f="next"]')).to_have_text("This page tries again every 3 s.")
         async with running(*server(tmp_path, car.address, port), folder=project):
             await expect(page.locator("#monitor, #connect").first).to_be_attached(timeout=15_000)
             assert page.url == f"{one.address}/#map"
@@ -275,17 +275,17 @@ async def test_a_new_version_comes_at_the_next_load_and_never_mixed(
 ) -> None:
     house.change(changing, "first")
     port = free_port()
-    said = "() => [document.documentElement.dataset.app, document.documentElement.dataset.about ?? null]"
+    versions = "() => [document.documentElement.dataset.app, document.documentElement.dataset.about ?? null]"
     later = "document.querySelector('[data-screen=about]').click()"
     async with opened(browser) as page, opened_beside(page) as other:
         one = await Process(*server(tmp_path / "data", port=port), folder=changing).start()
         (before,) = await kept_by(page, one.address)
         await other.goto(one.address)
-        assert await page.evaluate(said) == ["first", None]
+        assert await page.evaluate(versions) == ["first", None]
         await one.kill()
         house.change(changing, "second")
         async with running(*server(tmp_path / "data", port=port), folder=changing):
-            # The open page goes on, with what it was made of: also what it asks for only now.
+            # The open page goes on, with what it was made of: also what it requests only now.
             note = page.locator(".snack.note").filter(has_text="A new version is available.")
             await expect(note).to_be_visible(timeout=20_000)
             await page.evaluate(later)
@@ -307,7 +307,7 @@ async def test_a_new_version_comes_at_the_next_load_and_never_mixed(
                 f"async () => {{ const all = await caches.keys(); return all.length === 1 && all[0] !== '{before}'; }}",
             )
             await page.reload()
-            assert await page.evaluate(said) == ["second", None]
+            assert await page.evaluate(versions) == ["second", None]
 
 
 @contextlib.asynccontextmanager
@@ -351,7 +351,7 @@ async def test_a_worker_goes_also_where_no_page_helps_it(browser: Browser, proje
         async with running(*server(tmp_path, port=port), folder=project) as one:
             await kept_by(page, one.address)
         async with running(*server(tmp_path, port=port), "--no-worker", folder=project):
-            # The browser asks for the worker's script by itself, at least once a day.
+            # The browser requests the worker's script by itself, at least once a day.
             await page.goto(f"{one.address}/docs")
             await page.evaluate("async () => { await (await navigator.serviceWorker.getRegistration('/')).update(); }")
             await gone(page)
@@ -376,7 +376,7 @@ async def test_without_a_worker_the_page_is_the_same(browser: Browser, project: 
     ):
         faults: list[str] = []
         page.on("pageerror", lambda error: faults.append(str(error)))
-        page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+        page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
         await page.add_init_script(
             """navigator.serviceWorker.register = async () => {
               throw new DOMException('not trusted', 'SecurityError');

@@ -14,14 +14,14 @@ from tests.page.test_fleet import Fleet, fleet
 from tests.page.test_slow_down import armed_by_hand
 
 CLEARED = """() => new Promise((resolve, reject) => {
-  const asked = indexedDB.deleteDatabase('catgraph');
-  asked.onsuccess = () => resolve(null);
-  asked.onerror = asked.onblocked = () => reject(asked.error ?? new Error('blocked'));
+  const request = indexedDB.deleteDatabase('catgraph');
+  request.onsuccess = () => resolve(null);
+  request.onerror = request.onblocked = () => reject(request.error ?? new Error('blocked'));
 })"""
 OWN_KEY = """() => new Promise((resolve) => {
-  const asked = indexedDB.open('catgraph', 1);
-  asked.onsuccess = () => {
-    const database = asked.result;
+  const request = indexedDB.open('catgraph', 1);
+  request.onsuccess = () => {
+    const database = request.result;
     const found = database.transaction('keys').objectStore('keys').get('orders');
     found.onsuccess = () => {
       database.close();
@@ -43,7 +43,7 @@ SIGNING_MS = """async () => {
 
 
 async def devices(one: Fleet) -> list[str]:
-    """What the log of the car says of devices."""
+    """The devices in the car's log."""
     async with httpx.AsyncClient(base_url=one.agent.address) as car:
         events: list[dict[str, Any]] = (await car.get("/api/events", params={"limit": 1000})).json()["events"]
     return [str(event["text"]) for event in events if event["change"] == "device"]
@@ -80,7 +80,7 @@ async def test_a_page_signs_what_it_orders_and_a_cleared_browser_begins_anew(pho
         assert len(found) == 2, found
         assert "a name that another key has" in found[1]
 
-        # What became of an order whose answer was lost is found out, and said.
+        # What became of an order whose answer was lost is found out, and shown.
         note = page.locator(".snack.note")
         one.agent.freeze()
         await phone.f("pause").tap()
@@ -96,4 +96,4 @@ async def test_a_page_signs_what_it_orders_and_a_cleared_browser_begins_anew(pho
         await expect(note).to_contain_text("The link was cut in the direction to the car, between server and agent.")
         await phone.live()
         await expect(phone.f("pause")).to_contain_text("Resume")
-        phone.complaints[:] = [said for said in phone.complaints if "503" not in said]  # what it asked of a lost agent
+        phone.complaints[:] = [line for line in phone.complaints if "503" not in line]  # its request to a lost agent

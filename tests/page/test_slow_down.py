@@ -70,7 +70,7 @@ class Thumb:
         await self.touch("touchEnd")
 
     async def slow_the_car(self) -> None:
-        """Slides to the end, and again where the page says that it came too late: a busy machine is."""
+        """Slides to the end, and again where the page shows that it came too late: a busy machine is."""
         for is_last in (False, False, True):
             await self.drag(1.0)
             with contextlib.nullcontext() if is_last else contextlib.suppress(AssertionError):
@@ -85,20 +85,20 @@ async def thumb(phone: Phone, car: Canned) -> Thumb:
     return Thumb(phone, await phone.page.context.new_cdp_session(phone.page))
 
 
-def heard(car: Canned, kind: str) -> list[dict[str, Any]]:
-    return [one for one in car.heard if one["kind"] == kind]
+def received(car: Canned, kind: str) -> list[dict[str, Any]]:
+    return [one for one in car.received if one["kind"] == kind]
 
 
-async def until_heard(thumb: Thumb, car: Canned, kind: str) -> dict[str, Any]:
+async def until_received(thumb: Thumb, car: Canned, kind: str) -> dict[str, Any]:
     async with asyncio.timeout(20):
-        while not (found := heard(car, kind)):
+        while not (found := received(car, kind)):
             await asyncio.sleep(0.05)
     return found[-1]
 
 
 async def nothing_ordered(thumb: Thumb, car: Canned) -> None:
     await said_more(car)  # an order would have come before
-    assert heard(car, "slow_down") == []
+    assert received(car, "slow_down") == []
     await expect(thumb.slide()).to_have_attribute("data-kind", "armed")
 
 
@@ -107,10 +107,10 @@ async def test_slid_and_let_go_it_is_ordered_with_what_proves_that_it_is_new(thu
     await expect(thumb.phone.f("strip")).to_have_text("Armedan aid, not an emergency stop")
     await expect(thumb.phone.f("legend-car")).to_have_text("slow-down: armed")
     await thumb.drag(0.95)
-    said = await until_heard(thumb, car, "slow_down")
-    assert said["pressed_ago_s"] >= 0
-    assert said["held_s"] >= 0
-    assert said["heard_ms"] > 1e12
+    command = await until_received(thumb, car, "slow_down")
+    assert command["pressed_ago_s"] >= 0
+    assert command["held_s"] >= 0
+    assert command["heard_ms"] > 1e12
     car.state["decelerate"] = slowed()
     await expect(thumb.slide()).to_have_attribute("data-kind", "go")
     await expect(thumb.slide()).to_have_text("Slowing to 0.0 m/s", use_inner_text=True)
@@ -123,14 +123,14 @@ async def test_slid_and_let_go_it_is_ordered_with_what_proves_that_it_is_new(thu
     )
     await expect(thumb.phone.f("order-line")).to_have_text(re.compile(r"By Pixel 7 from 4\.2 m/s, \d\.\d s ago"))
     await expect(thumb.phone.f("stop")).to_be_hidden()
-    assert len(heard(car, "slow_down")) == 1
+    assert len(received(car, "slow_down")) == 1
 
 
 async def test_the_order_says_how_long_ago_the_finger_left(thumb: Thumb, car: Canned) -> None:
     await thumb.drag(0.95)
-    said = await until_heard(thumb, car, "slow_down")
-    assert 0 <= said["pressed_ago_s"] < 0.5
-    assert 0 <= said["held_s"] < 1
+    command = await until_received(thumb, car, "slow_down")
+    assert 0 <= command["pressed_ago_s"] < 0.5
+    assert 0 <= command["held_s"] < 1
 
 
 @pytest.mark.gate
@@ -168,7 +168,7 @@ async def test_two_fingers_order_nothing_whichever_came_first(thumb: Thumb, car:
     await thumb.touch("touchEnd")
     await nothing_ordered(thumb, car)
     await thumb.drag(1.0)  # and afterwards it works as ever
-    await until_heard(thumb, car, "slow_down")
+    await until_received(thumb, car, "slow_down")
 
 
 @pytest.mark.gate
@@ -177,11 +177,11 @@ async def test_what_goes_beyond_hits_no_other_key(thumb: Thumb, car: Canned) -> 
     assert pause is not None
     await thumb.drag(0.6, end=(pause["x"] + 20, pause["y"] + 20))  # back over the other keys
     await nothing_ordered(thumb, car)
-    assert heard(car, "pause") == []
+    assert received(car, "pause") == []
     tab = await thumb.phone.page.locator("#tab-settings").bounding_box()
     assert tab is not None
     await thumb.drag(1.0, end=(tab["x"] + 30, tab["y"] + 30))  # right enough, and far too high
-    await until_heard(thumb, car, "slow_down")
+    await until_received(thumb, car, "slow_down")
     await expect(thumb.phone.page.locator("#tab-home")).to_have_attribute("aria-selected", "true")
 
 
@@ -191,10 +191,10 @@ async def test_from_the_keyboard_enter_is_held_for_a_second(thumb: Thumb, car: C
     await keys.press("Enter", delay=300)
     await nothing_ordered(thumb, car)
     await keys.down("Enter")
-    await until_heard(thumb, car, "slow_down")
+    await until_received(thumb, car, "slow_down")
     await thumb.phone.page.wait_for_timeout(1300)
     await keys.up("Enter")
-    assert len(heard(car, "slow_down")) == 1  # held on, it is one order
+    assert len(received(car, "slow_down")) == 1  # held on, it is one order
 
 
 @pytest.mark.gate
@@ -204,12 +204,12 @@ async def test_under_the_left_thumb_it_is_slid_to_the_left(thumb: Thumb, car: Ca
     assert box is not None
     y = box["y"] + box["height"] / 2
     for begin, end in ((box["x"] + 34, box["x"] + box["width"] - 34), (box["x"] + box["width"] - 34, box["x"] + 34)):
-        assert heard(car, "slow_down") == []
+        assert received(car, "slow_down") == []
         await thumb.touch("touchStart", (begin, y))
         await thumb.touch("touchMove", ((begin + end) / 2, y))
         await thumb.touch("touchMove", (end, y))
         await thumb.touch("touchEnd")
-    await until_heard(thumb, car, "slow_down")
+    await until_received(thumb, car, "slow_down")
 
 
 @pytest.mark.gate
@@ -233,11 +233,11 @@ async def test_off_it_says_why_or_arms(thumb: Thumb, car: Canned) -> None:
     await expect(sheet.locator("[data-act]")).to_have_count(0)
     car.state["decelerate"] = slow("not_armed", rivals=["/lap_driver"])
     await expect(sheet).to_contain_text("Arm the slow-down?")
-    for words in (
+    for text in (
         "geometry_msgs/Twist", "/lap_driver: the last message wins, so the car may not slow", "1.5 m/s²",
         "An aid, not an emergency stop", "No guard on the car: link loss will NOT slow the car.",
     ):  # fmt: skip
-        await expect(sheet).to_contain_text(words)
+        await expect(sheet).to_contain_text(text)
     await expect(thumb.phone.f("legend-car")).to_have_text("slow-down: not armed")
     car.refuses["arm"] = "The type of /catvehicle/cmd_vel is not known."
     await sheet.get_by_role("button", name="Arm").tap()
@@ -245,7 +245,7 @@ async def test_off_it_says_why_or_arms(thumb: Thumb, car: Canned) -> None:
     car.refuses.clear()
     await sheet.get_by_role("button", name="Arm").tap()
     await expect(sheet).to_be_hidden()
-    assert heard(car, "arm")[-1]["fence"] == 1
+    assert received(car, "arm")[-1]["fence"] == 1
 
 
 @pytest.mark.gate
@@ -256,11 +256,11 @@ async def test_who_is_not_in_control_asks_for_it(thumb: Thumb, car: Canned) -> N
     sheet = thumb.phone.page.locator("#sheet-slow")
     await expect(sheet).to_contain_text("Ben is in control and can arm it.")
     await sheet.get_by_role("button", name="Request control").tap()
-    assert (await until_heard(thumb, car, "control"))["do"] == "request"
+    assert (await until_received(thumb, car, "control"))["do"] == "request"
     await sheet.get_by_role("button", name="Close").tap()
     car.state["decelerate"] = slow("armed")
     await thumb.drag(1.0)  # any operator slows the car
-    await until_heard(thumb, car, "slow_down")
+    await until_received(thumb, car, "slow_down")
     car.state["decelerate"] = slowed()
     await expect(thumb.phone.f("release")).to_have_text("Only Ben can release")
     note = thumb.phone.page.locator(".snack.note", has_text="Ben is in control")
@@ -268,7 +268,7 @@ async def test_who_is_not_in_control_asks_for_it(thumb: Thumb, car: Canned) -> N
         while not await note.is_visible():  # a tap right behind a slide belongs to the slide
             await thumb.phone.f("release").tap()
             await thumb.phone.drawn()
-    assert heard(car, "release") == []
+    assert received(car, "release") == []
 
 
 @pytest.mark.gate
@@ -280,13 +280,13 @@ async def test_the_car_is_released_only_once_that_is_confirmed(thumb: Thumb, car
     await expect(sheet).to_contain_text("Still active: Speed above limit.")
     await sheet.get_by_role("button", name="Keep slowing").tap()
     await expect(sheet).to_be_hidden()
-    assert heard(car, "release") == []
+    assert received(car, "release") == []
     await thumb.phone.f("release").tap()
-    car.state["decelerate"] = slowed(number=4)  # another order: what was asked is not about it
+    car.state["decelerate"] = slowed(number=4)  # another order: the request is not about it
     await expect(sheet).to_be_hidden()
     await thumb.phone.f("release").tap()
     await sheet.get_by_role("button", name="Release the car").tap()
-    assert (await until_heard(thumb, car, "release"))["number"] == 4
+    assert (await until_received(thumb, car, "release"))["number"] == 4
     car.state["decelerate"] = slow("armed")
     await expect(thumb.phone.f("stop")).to_be_visible()
     await expect(thumb.phone.f("release")).to_be_hidden()
@@ -299,12 +299,12 @@ async def test_in_the_dialog_of_an_alarm(thumb: Thumb, car: Canned) -> None:
     await thumb.slide(DIALOG).tap()
     await expect(sheet).to_contain_text("Not slowed: the slow-down is not armed")
     await expect(sheet).to_contain_text("Use the physical stop.")
-    assert heard(car, "slow_down") == []
+    assert received(car, "slow_down") == []
     car.state["decelerate"] = slow("armed")
     boxes = [await thumb.slide(DIALOG).bounding_box(), await thumb.slide().bounding_box()]
     assert boxes[0] == boxes[1]  # at the same pixels as in the rail
     await thumb.drag(0.95, DIALOG)
-    await until_heard(thumb, car, "slow_down")
+    await until_received(thumb, car, "slow_down")
     car.state["decelerate"] = slowed()
     await expect(thumb.slide(DIALOG)).to_have_text("Slowing to 0.0 m/s", use_inner_text=True)
     await expect(sheet).to_be_visible()  # slowing the car acknowledges nothing
@@ -327,10 +327,10 @@ async def test_what_comes_by_itself_counts_down_above_everything_and_can_be_veto
     await thumb.phone.page.keyboard.press("Escape")
     await thumb.phone.page.keyboard.press("Enter")
     await thumb.phone.drawn()
-    assert heard(car, "veto") == []  # leaving it, or a key that was meant for something else, is no veto
+    assert received(car, "veto") == []  # leaving it, or a key that was meant for something else, is no veto
     await expect(banner).to_be_visible()
     await veto.tap()
-    assert (await until_heard(thumb, car, "veto"))["trigger"] == "speed"
+    assert (await until_received(thumb, car, "veto"))["trigger"] == "speed"
     await expect(banner).to_be_hidden()
 
 
@@ -357,7 +357,7 @@ async def test_a_viewer_sees_all_of_it_and_orders_nothing(browser: Browser, car:
         await phone.live()
         slide = phone.page.locator(RAIL)
         await expect(slide).to_have_text("Slow-down armed not for viewers", use_inner_text=True)
-        await slide.tap(force=True)  # it says of itself that it is disabled
+        await slide.tap(force=True)  # it is disabled by its own attribute
         await expect(phone.page.locator(".snack.note")).to_contain_text("viewer")
         car.state["decelerate"] = slowed()
         await phone.f("release").tap()
@@ -365,7 +365,7 @@ async def test_a_viewer_sees_all_of_it_and_orders_nothing(browser: Browser, car:
         car.state["decelerate"] = slow("armed", countdown=COUNTDOWN)
         await expect(phone.page.locator("#sheet-countdown")).to_contain_text("An operator may veto it.")
         await expect(phone.page.locator("#sheet-countdown [data-f=veto]")).to_be_hidden()
-        assert not any(heard(car, kind) for kind in ("slow_down", "release", "veto", "arm"))
+        assert not any(received(car, kind) for kind in ("slow_down", "release", "veto", "arm"))
     finally:
         await context.close()
     assert phone.complaints == []

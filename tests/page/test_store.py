@@ -26,7 +26,7 @@ def row(phone: Phone, id: str) -> Locator:
 @pytest.mark.own_phone
 async def test_each_row_says_where_its_copy_is_and_a_key_asks_for_it(phone: Phone, canned: Canned) -> None:
     stored: dict[str, Any] = {"car_1": FAILED, "car_2": NOT_STORED}
-    asked: list[tuple[str, Any]] = []
+    requests: list[tuple[str, Any]] = []
 
     async def listed(route: Route) -> None:
         answer = await route.fetch()
@@ -37,7 +37,7 @@ async def test_each_row_says_where_its_copy_is_and_a_key_asks_for_it(phone: Phon
         await route.fulfill(json=body)
 
     async def ask(route: Route) -> None:
-        asked.append((route.request.method, json.loads(route.request.post_data or "null")))
+        requests.append((route.request.method, json.loads(route.request.post_data or "null")))
         stored["car_2"] = NOT_STORED | {"state": "uploading", "share": 0.43, "is_asked": True}
         await route.fulfill(status=202, json=stored["car_2"])
 
@@ -55,12 +55,12 @@ async def test_each_row_says_where_its_copy_is_and_a_key_asks_for_it(phone: Phon
     await expect(sheet).to_contain_text("2 clips around alarms stored.")
     await sheet.get_by_role("button", name="Upload, then delete it here").tap()
     await expect(sheet).to_contain_text("deleted on this server for good")
-    assert asked == []
+    assert requests == []
     await sheet.get_by_role("button", name="Back").tap()
     await sheet.get_by_text("Copy in the store").tap()
     await sheet.get_by_role("button", name="Upload the whole file").tap()
     await expect(sheet).to_be_hidden()
-    assert asked == [("POST", {"delete": False})]
+    assert requests == [("POST", {"delete": False})]
     await expect(row(phone, "car_2").locator(".stored")).to_have_text("uploading 43 %")
 
 

@@ -80,7 +80,7 @@ async def do(phone: Phone, act: Callable[[], Awaitable[None]]) -> None:
 
 @pytest.mark.slow
 async def test_a_take_over_is_seen_and_described_with_one_tap(browser: Browser, tmp_path: Path) -> None:
-    """The key appears by itself and the form never does; a draft outlives "Later"; hostile words stay words."""
+    """The key appears by itself and the form never does; a draft outlives "Later"; hostile text stays text."""
     async with watching(browser, tmp_path) as watch:
         phone, page = watch.phone, watch.phone.page
         label, key, sheet = phone.f("mode-label"), phone.f("mode-key"), page.locator("#sheet-take-over")
@@ -107,8 +107,8 @@ async def test_a_take_over_is_seen_and_described_with_one_tap(browser: Browser, 
         await expect(sheet).to_have_count(0)
         await expect(label).to_contain_text("Manual")
         await expect(key).to_be_hidden()
-        (told,) = await watch.events("intervention_described")
+        (event,) = await watch.events("intervention_described")
         (intervention,) = await watch.events("intervention")
-        assert told["intervention"] == intervention["intervention"]
-        assert (told["what"], told["category"]) == (HOSTILE, "object_late")
-        assert told["initiated_by"] == "driver"
+        assert event["intervention"] == intervention["intervention"]
+        assert (event["what"], event["category"]) == (HOSTILE, "object_late")
+        assert event["initiated_by"] == "driver"

@@ -1,4 +1,4 @@
-"""The last minute on Home and the chart of the drive: what was missed is fetched, what nobody heard is hatched."""
+"""The last minute on Home and the chart of the drive: what was missed is fetched, what was not received is hatched."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ async def test_a_page_that_opens_late_shows_what_it_missed_and_hatches_what_nobo
     # Hatched before it was connected, then a line up to now, but for the moments in which this machine was late.
     assert speed.startswith("/" * 20)
     async with asyncio.timeout(30):  # a busy machine is late for some seconds, and what it missed comes then
-        while (heard := speed.lstrip("/.")).count("I") / max(1, len(heard)) <= 0.7:
+        while (drawn := speed.lstrip("/.")).count("I") / max(1, len(drawn)) <= 0.7:
             await asyncio.sleep(0.3)
             speed = await columns(phone, "speed")
     assert set(await columns(phone, "brake")) == {"."}
@@ -164,7 +164,7 @@ async def test_a_tap_opens_the_chart_of_the_drive_which_is_moved_read_and_left(p
     await phone.page.touchscreen.tap(box["x"] + box["width"] * 0.6, box["y"] + 20)
     await expect(phone.page.locator(".tag-text")).to_have_count(0)
 
-    # A drag to the right looks back: the chart is held and says so, until it is told to go on.
+    # A drag to the right looks back: the chart is held and shows it, until it is set to follow again.
     await drag(phone, box["x"] + 40, box["x"] + 160, box["y"] + 30)
     await expect(phone.page.locator(".trends-state")).to_contain_text(re.compile(r"Held at .*: not live"))
     assert await phone.page.locator(".trends-tools [aria-pressed=true]").count() == 0

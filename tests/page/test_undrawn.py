@@ -55,7 +55,7 @@ window setInterval never|window fetch|Promise.prototype catch|window matchMedia|
 WebSocket.prototype send|window IntersectionObserver|window MutationObserver
 EventTarget.prototype addEventListener
 """)
-TOLD = ("toFixed", "setAttribute", "replaceChildren", "textContent", "requestAnimationFrame")  # needs none of them
+REPORTED = ("toFixed", "setAttribute", "replaceChildren", "textContent", "requestAnimationFrame")  # needs none of them
 LOOK = """(() => {
   const one = (selector) => document.querySelector(selector);
   const opacity = (selector) => one(selector) ? Number(getComputedStyle(one(selector)).opacity) : 0;
@@ -63,7 +63,7 @@ LOOK = """(() => {
   return JSON.stringify({
     screen: document.body?.dataset.screen ?? '', start: text('#start h1'),
     begun: !one('#panel-home [data-late][hidden]'),
-    undrawn: opacity('.undrawn'), words: text('.undrawn'), veil: opacity('.veil'), on: one('.veil')?.dataset.on ?? '',
+    undrawn: opacity('.undrawn'), text: text('.undrawn'), veil: opacity('.veil'), on: one('.veil')?.dataset.on ?? '',
     speed: text('.gauge .speed'), strip: text('[data-f="strip-text"]'), link: text('#monitor .top .link'),
     dialog: Boolean(one('#sheet-alarm[open]')), title: document.title,
   });
@@ -98,8 +98,8 @@ class Glass:
     async def _look(self, script: str) -> dict[str, Any]:
         frame = (await self._cdp.send("Page.getFrameTree"))["frameTree"]["frame"]["id"]
         world = await self._cdp.send("Page.createIsolatedWorld", {"frameId": frame})
-        asked = {"expression": script, "contextId": world["executionContextId"], "returnByValue": True}
-        value = (await self._cdp.send("Runtime.evaluate", asked))["result"].get("value")
+        arguments = {"expression": script, "contextId": world["executionContextId"], "returnByValue": True}
+        value = (await self._cdp.send("Runtime.evaluate", arguments))["result"].get("value")
         return dict(json.loads(value)) if isinstance(value, str) else {}
 
     async def close(self) -> None:
@@ -126,9 +126,9 @@ class Glass:
 
 
 def is_covered(seen: dict[str, Any]) -> bool:
-    """The page says in words that it does not draw, over its head and over its values."""
+    """The page shows a text that it does not draw, over its head and over its values."""
     return (
-        seen["undrawn"] == 1 and (seen["veil"] == 1 or seen["screen"] != "monitor") and "Watch the car" in seen["words"]
+        seen["undrawn"] == 1 and (seen["veil"] == 1 or seen["screen"] != "monitor") and "Watch the car" in seen["text"]
     )
 
 
@@ -137,7 +137,7 @@ def is_given_up(seen: dict[str, Any]) -> bool:
 
 
 def is_silent(seen: dict[str, Any]) -> bool:
-    """Covered, because the server is not heard any more."""
+    """Covered, because the server does not send any more."""
     return seen["veil"] == 1 and seen["on"] == "all" and "Live" not in seen["link"]
 
 
@@ -147,12 +147,12 @@ def is_true(seen: dict[str, Any], speed: str) -> bool:
     return is_live and seen["speed"] == speed and TITLE in seen["strip"] and seen["dialog"]
 
 
-async def is_told(served: Canned, *, draws: bool) -> bool:
-    """Whether the page's newest word about itself comes to say so."""
+async def is_reported(served: Canned, *, draws: bool) -> bool:
+    """Whether the page's newest report about itself comes to state it."""
     due_s = time.monotonic() + 10
     while time.monotonic() < due_s:
-        told = [one["draws"] for one in served.heard if one["kind"] == "present"]
-        if told and told[-1] is draws:
+        reports = [one["draws"] for one in served.received if one["kind"] == "present"]
+        if reports and reports[-1] is draws:
             return True
         await asyncio.sleep(0.1)
     return False
@@ -216,12 +216,10 @@ async def broken_while_live(browser: Browser, functions: Functions) -> list[str]
             )
             if seen is None:
                 wrong.append(f"{owner}.{name} ({kind}): {await glass.look()}")
-            elif is_covered(seen) and not (
-                TITLE in seen["words"] or seen["dialog"] or "may be missing" in seen["words"]
-            ):
+            elif is_covered(seen) and not (TITLE in seen["text"] or seen["dialog"] or "may be missing" in seen["text"]):
                 wrong.append(f"{owner}.{name} ({kind}) does not name the alarm: {seen}")
-            elif is_covered(seen) and name in TOLD and not await is_told(served, draws=False):
-                wrong.append(f"{owner}.{name} ({kind}): the server is not told")
+            elif is_covered(seen) and name in REPORTED and not await is_reported(served, draws=False):
+                wrong.append(f"{owner}.{name} ({kind}): it is not reported to the server")
             await glass.do("catgraphMend()")
             if kind == "idle" and owner.endswith("t.prototype"):  # what seemed to be written is not: only a page that
                 await glass.page.wait_for_timeout(1500)  # is loaded anew is believed
@@ -231,8 +229,8 @@ async def broken_while_live(browser: Browser, functions: Functions) -> list[str]
                 await glass.page.locator("#undrawn-reload").tap(timeout=15_000)
             if await glass.until(lambda seen, speed=speed: is_true(seen, speed), 25) is None:
                 wrong.append(f"{owner}.{name} ({kind}), mended: {await glass.look()}")
-            elif name in TOLD and not await is_told(served, draws=True):
-                wrong.append(f"{owner}.{name} ({kind}), mended: the server is not told")
+            elif name in REPORTED and not await is_reported(served, draws=True):
+                wrong.append(f"{owner}.{name} ({kind}), mended: it is not reported to the server")
             if number % 2 == 0 and number < len(functions):  # a third failure within half a minute would be for good
                 await glass.page.reload(wait_until="commit")
         await glass.close()

@@ -44,10 +44,10 @@ async def test_who_signs_on_takes_over_what_is_left(phone: Phone, canned: Canned
         key = sheet.get_by_role("button", name=f"Take over: {name}")
         await expect(key).to_have_attribute("data-next", "")
         await expect(sheet.locator("ul")).not_to_have_attribute("data-moved", re.compile(""))
-        canned.heard.clear()
+        canned.received.clear()
         await key.tap()
-        said = await until_sent(canned, "take_alarm")
-        assert (said["alarm"], said["occurrence"], said["vehicle"]) == (one["id"], 1, "car")
+        command = await until_sent(canned, "take_alarm")
+        assert (command["alarm"], command["occurrence"], command["vehicle"]) == (one["id"], 1, "car")
         one |= {"acknowledged_by": "M. R. (Pixel 7)", "off_duty_ms": None}
         await expect(key).to_have_attribute("aria-pressed", "true")
     await expect(done).to_have_text("Done")
@@ -102,7 +102,7 @@ async def test_its_row_is_read_whole_beside_its_two_keys(phone: Phone, canned: C
     text, keys = await row.locator(".tx").bounding_box(), await row.locator(".ac").bounding_box()
     assert text is not None
     assert keys is not None
-    assert text["width"] >= 150, "the words of one column"
+    assert text["width"] >= 150, "the text of one column"
     assert text["x"] + text["width"] <= keys["x"]
 
 

@@ -29,10 +29,10 @@ async def test_a_viewer_may_take_the_file_and_orders_no_other_form_of_it(browser
             tables = sheet.get_by_role("button", name="CSV tables")
             await expect(tables).to_have_attribute("aria-disabled", "true")
             await expect(sheet.get_by_role("link", name="MCAP")).to_be_visible()
-            asked: list[str] = []
-            phone.page.on("request", lambda request: asked.append(f"{request.method} {request.url}"))
+            requests: list[str] = []
+            phone.page.on("request", lambda request: requests.append(f"{request.method} {request.url}"))
             await tables.tap(force=True)
             await expect(phone.page.locator(".snack.note")).to_contain_text("This device is paired as a viewer.")
-            assert [one for one in asked if one.startswith("POST")] == []
+            assert [one for one in requests if one.startswith("POST")] == []
         finally:
             await context.close()

@@ -24,8 +24,8 @@ async def test_a_weak_radio_is_said_beside_the_age(phone: Phone, canned: Canned,
     canned.answers_after_s = 0.4
     await phone.page.set_viewport_size({"width": width, "height": 780})
     await phone.open(canned.address)
-    word = phone.page.locator('#monitor [data-f="word"]')
-    await expect(word).to_have_text("Weak")
+    state = phone.page.locator('#monitor [data-f="word"]')
+    await expect(state).to_have_text("Weak")
     link = phone.page.locator('#monitor [data-f="link"]')
     label = await link.get_attribute("aria-label") or ""
     assert label.startswith("Weak ")
@@ -34,4 +34,4 @@ async def test_a_weak_radio_is_said_beside_the_age(phone: Phone, canned: Canned,
     if folder := os.environ.get("CATGRAPH_LOOK"):
         await phone.page.screenshot(path=Path(folder) / f"weak-{width}.png")
     canned.answers_after_s = 0.0
-    await expect(word).to_have_text("Live", timeout=20_000)
+    await expect(state).to_have_text("Live", timeout=20_000)

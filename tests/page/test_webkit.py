@@ -10,7 +10,7 @@ from tests.page.drives import steady
 from tests.page.processes import replay, running, server
 from tests.page.webdriver import lacking, webkit
 
-WORD = "return document.querySelector('#monitor [data-f=word]')?.textContent === 'Live'"
+IS_LIVE = "return document.querySelector('#monitor [data-f=word]')?.textContent === 'Live'"
 
 
 @pytest.mark.skipif(lacking() is not None, reason=str(lacking()))
@@ -25,7 +25,7 @@ async def test_a_drive_in_webkit(tmp_path: Path) -> None:
     ):
         await page.open(watch.address)
         await page.run("window.complaints = []; addEventListener('error', (e) => complaints.push(e.message));")
-        await page.until(WORD)
+        await page.until(IS_LIVE)
         await page.until("return document.querySelector('.gauge .speed')?.textContent === '12.6'")
         await page.until("return document.querySelector('#sheet-alarm')?.open")
         assert "Speed above limit" in await page.run("return document.querySelector('#sheet-alarm').innerText")
@@ -43,5 +43,5 @@ async def test_a_drive_in_webkit(tmp_path: Path) -> None:
             await page.until("return document.querySelector('#monitor .veil').dataset.on === 'all'")
         finally:
             watch.thaw()
-        await page.until(WORD)
+        await page.until(IS_LIVE)
         assert await page.run("return window.complaints") == []

@@ -28,7 +28,7 @@ from tests.page.test_marks import picture
 WITHIN_S = 0.2
 READER = Path(__file__).with_name("mcap_attachments.mjs")
 MARKS = ("tap", "voice", "words", "without server")  # in the order of their moments
-WORDS = "The box stood behind the corner."
+TEXT = "The box stood behind the corner."
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="module")
@@ -59,7 +59,7 @@ async def test_the_report_holds_the_whole_day_at_the_right_second(
         for what, seconds in off_s.items():
             record_property(f"{what} [s]", round(seconds, 3))
         print(off_s, day.taps)
-        late_s = 3 * day.ann.stutter_s  # what a server logs when it hears of it, on a machine that lets it wait
+        late_s = 3 * day.ann.stutter_s  # what a server logs when it receives it, on a machine that lets it wait
         exact = (*MARKS, "intervention")
         too_far = {
             what for what, seconds in off_s.items() if abs(seconds) > WITHIN_S + (0 if what in exact else late_s)
@@ -70,7 +70,7 @@ async def test_the_report_holds_the_whole_day_at_the_right_second(
         await on_paper(equipped, day, parts)
         await replayed(day, parts)
         await mailed(day, parts)
-        complaints = [said for phone in day.phones for said in phone.complaints if not LOST.search(said)]
+        complaints = [line for phone in day.phones for line in phone.complaints if not LOST.search(line)]
         assert complaints == []
 
 
@@ -115,7 +115,7 @@ def mark_key(phone: Phone) -> Locator:
 
 
 async def marked(day: Day) -> None:
-    """By a tap, by voice with a photo, with words."""
+    """By a tap, by voice with a photo, with text."""
     phone, page = day.ann, day.ann.page
     await tapped_through(phone, mark_key(phone))
     day.truth_ms["tap"] = await page.evaluate("presses.at(-1)")
@@ -130,9 +130,9 @@ async def marked(day: Day) -> None:
     await page.locator('[data-f="mark-words"]').tap()
     sheet = page.locator("#sheet-mark")
     await sheet.get_by_role("button", name="Control").tap()
-    await sheet.locator("textarea").fill(WORDS)
+    await sheet.locator("textarea").fill(TEXT)
     await sheet.get_by_role("button", name="Keep").tap()
-    await day.marks(3, category="control", words=WORDS)
+    await day.marks(3, category="control", words=TEXT)
 
 
 async def taken_over(day: Day) -> None:
@@ -144,11 +144,11 @@ async def taken_over(day: Day) -> None:
 
 
 async def described(day: Day) -> None:
-    """The operator says why the driver took over, in the next part of the drive: the server was killed meanwhile."""
+    """The operator enters why the driver took over, in the next part of the drive: the server was killed meanwhile."""
     page = day.ann.page
     sheet = page.locator("#sheet-take-over")
     await tapped_through(day.ann, day.ann.f("mode-key"))
-    await sheet.locator('[data-f="what"]').fill(WORDS)
+    await sheet.locator('[data-f="what"]').fill(TEXT)
     await tapped_through(day.ann, sheet.locator('[data-category="object_late"]'))
     await tapped_through(day.ann, sheet.locator('[data-f="keep"]'))
     await expect(sheet).to_have_count(0)
@@ -210,9 +210,9 @@ def in_report(day: Day, parts: list[str], report: dict[str, Any]) -> dict[str, f
     assert len(marks) == len({mark["mark"] for mark in marks}) == 4
     found = dict(zip(MARKS, (mark["marked_ms"] for mark in marks), strict=True))
     assert [(mark["voice"], mark["photo"]) for mark in marks] == [(False, False), (True, True), *2 * [(False, False)]]
-    assert [mark["words"] for mark in marks] == ["", "", WORDS, ""]
+    assert [mark["words"] for mark in marks] == ["", "", TEXT, ""]
     (one,) = report["interventions"]
-    assert (one["kind_of"], one["initiated_by"], one["what"]) == ("to_manual", "driver", WORDS)
+    assert (one["kind_of"], one["initiated_by"], one["what"]) == ("to_manual", "driver", TEXT)
     assert one["described_by"].startswith("A. K.")
     found["intervention"] = one["at_ms"]
     departure = report["departure"]
@@ -239,17 +239,17 @@ async def listed_by_readers(day: Day, files: list[bytes], folder: Path) -> None:
     node = await asyncio.create_subprocess_exec("node", str(READER), str(path), stdout=asyncio.subprocess.PIPE)
     out, _ = await asyncio.wait_for(node.communicate(), 30)
     assert node.returncode == 0
-    told = json.loads(out)
-    assert told["schemas"]["/catgraph/marks"] == "foxglove.Log"
-    assert {one["mediaType"]: (one["name"], one["bytes"]) for one in told["attachments"]} == {
+    info = json.loads(out)
+    assert info["schemas"]["/catgraph/marks"] == "foxglove.Log"
+    assert {one["mediaType"]: (one["name"], one["bytes"]) for one in info["attachments"]} == {
         kind: (one.name, len(one.data)) for kind, one in attachments.items()
     }
-    for one in told["attachments"]:
+    for one in info["attachments"]:
         assert abs(one["log_ms"] - day.truth_ms["voice"]) < 1000 * WITHIN_S
 
 
 async def on_paper(browser: Browser, day: Day, parts: list[str]) -> None:
-    """The page of the report shows the same: each thing at its second, voice and photo to be heard and seen."""
+    """The page of the report shows the same: each thing at its second, voice and photo included."""
     page = await browser.new_page()
     await page.goto(f"{day.watch.address}/api/recordings/{parts[1]}/report", timeout=60_000)
     report = page.locator("article.drive")
@@ -261,7 +261,7 @@ async def on_paper(browser: Browser, day: Day, parts: list[str]) -> None:
     photo = report.locator("section.marks img")
     assert await photo.evaluate("(photo) => photo.naturalWidth") > 0
     taken_over = report.locator("section.interventions tbody tr")
-    await expect(taken_over).to_contain_text(WORDS)
+    await expect(taken_over).to_contain_text(TEXT)
     assert (await taken_over.locator("td.n").inner_text()) in seconds_of(day.truth_ms["intervention"])
     await expect(report).to_contain_text("had failed, fixed")
     true = [day.truth_ms[what] for what in MARKS]
@@ -276,7 +276,7 @@ def seconds_of(true_ms: float) -> set[str]:
 
 
 async def replayed(day: Day, parts: list[str]) -> None:
-    """A replay has a flag for each mark, and at its moment what was said, with its voice and its photo."""
+    """A replay has a flag for each mark, and at its moment its text, with its voice and its photo."""
     marks = (await day.json(f"/api/recordings/{parts[0]}/marks"))["marks"]
     phone = day.ben
     card = phone.page.locator(".mark-card")
@@ -287,7 +287,7 @@ async def replayed(day: Day, parts: list[str]) -> None:
         await expect(phone.page.locator(".scrub .marks .flag")).to_have_count(len(marks))
         await expect(card).to_be_visible()
         if what == "words":
-            await expect(card).to_contain_text(WORDS)
+            await expect(card).to_contain_text(TEXT)
         else:
             await expect(card.locator(".card-parts img")).to_be_visible()
             assert (await day.get(f"/api/recordings/{parts[0]}/marks/{marks[1]['mark']}/voice")).content
@@ -304,7 +304,7 @@ async def mailed(day: Day, parts: list[str]) -> None:
     assert name == f"{parts[0]}.html"
     assert all(part in page for part in parts)
     assert "audio/webm;base64," in page
-    assert WORDS in page
+    assert TEXT in page
 
 
 def mailed_pages(day: Day) -> list[tuple[str, str]]:

@@ -21,7 +21,7 @@ HEIGHTS = (480, 600, 900, 1059, 1180)
 EMPTY = 0.16  # of the window: a list of alarms without alarms is the largest part that may be empty
 LOW = 520  # up to it the gauge fills the height, as on a phone on its side
 FEW = 1.0  # a list of few files may leave all below it empty
-# Parts over each other, parts cut, words cut, and the largest empty rectangle.
+# Parts over each other, parts cut, text cut, and the largest empty rectangle.
 WRONG = Path(__file__).with_name("window_faults.js").read_text(encoding="utf-8").split("\n", 1)[1].rstrip().rstrip(";")
 DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
@@ -44,7 +44,7 @@ async def walk(page: Page, sizes: list[tuple[int, int]], empty: float = EMPTY) -
 
 
 async def test_no_window_has_a_blank_a_sliced_or_a_covered_part(phone: Phone, canned: Canned) -> None:
-    await phone.open(f"{canned.address}/#home")  # not tapped yet: it says that its sound is off
+    await phone.open(f"{canned.address}/#home")  # not tapped yet: it shows that its sound is off
     await phone.live()
     await expect(phone.f("sound-off")).to_be_visible()
     await phone.page.locator("[data-tab=map]").click()
@@ -55,7 +55,7 @@ async def test_no_window_has_a_blank_a_sliced_or_a_covered_part(phone: Phone, ca
     await phone.page.set_viewport_size({"width": 1920, "height": 1080})
     await expect(phone.page.locator("#monitor [data-pane=signals] li").first).to_contain_text("20.0 Hz")
     await expect(phone.f("driven")).to_have_text("76.1")
-    await expect(phone.f("head-people")).to_have_text("unknown")  # nobody said who is there
+    await expect(phone.f("head-people")).to_have_text("unknown")  # who is there is unknown
     await show(canned, phone.page, "home")
     await phone.live()
     assert await walk(phone.page, [(width, HEIGHTS[n % 5]) for n, width in enumerate(WIDTHS)]) == {}
@@ -89,7 +89,7 @@ def critical(**more: Any) -> Json:
 
 
 def answered(canned: Canned) -> list[str]:
-    return [str(one["alarm"]) for one in canned.heard if one["kind"] in ("acknowledge", "silence")]
+    return [str(one["alarm"]) for one in canned.received if one["kind"] in ("acknowledge", "silence")]
 
 
 async def until_answered(canned: Canned, *names: str) -> None:
@@ -186,7 +186,7 @@ async def test_keys_of_a_keyboard(phone: Phone, canned: Canned) -> None:
     await page.keyboard.press("s")
     await page.keyboard.press("a")
     await until_answered(canned, "speed_limit", "speed_limit")
-    assert not [one for one in canned.heard if one["kind"] in ("slow_down", "arm")]
+    assert not [one for one in canned.received if one["kind"] in ("slow_down", "arm")]
     canned.state = live()
     await page.keyboard.press("?")
     keys = page.locator("#sheet-keys")
@@ -276,14 +276,14 @@ async def test_no_old_speed_stands_in_the_bar_of_a_page(phone: Phone, canned: Ca
 
 @pytest.mark.own_phone
 @pytest.mark.parametrize(
-    ("more", "link", "words"),
+    ("more", "link", "text"),
     [
         ({"format": "folder", "several_files": "a folder of several files"}, None, "It is a folder of several files"),
         ({"format": "zstd", "several_files": None}, "Packed MCAP or db3", "the file as it is, packed with zstd"),
     ],
 )
 async def test_what_a_recording_can_be_downloaded_as(
-    phone: Phone, canned: Canned, more: dict[str, str | None], link: str | None, words: str
+    phone: Phone, canned: Canned, more: dict[str, str | None], link: str | None, text: str
 ) -> None:
     page = phone.page
 
@@ -299,7 +299,7 @@ async def test_what_a_recording_can_be_downloaded_as(
     dock = page.locator("#panel-files .file-dock")
     await expect(dock.get_by_role("button", name="Share")).to_have_count(1 if link else 0)
     await dock.get_by_role("button", name="Download").click()
-    await expect(dock).to_contain_text(words)
+    await expect(dock).to_contain_text(text)
     await expect(dock.locator("a[download]")).to_have_count(1 if link else 0)
     if link:
         await expect(dock.get_by_role("link", name=link)).to_be_visible()

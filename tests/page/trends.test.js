@@ -11,20 +11,20 @@ const NAMES = SPECS.map(({ name }) => name);
  * @param {object} [more]
  * @returns {any}
  */
-const told = (first, lowest, { highest = lowest, now = first + lowest.length + 0.3, since = 0, name = 'speed' } = {}) => ({
+const steps = (first, lowest, { highest = lowest, now = first + lowest.length + 0.3, since = 0, name = 'speed' } = {}) => ({
   step_s: STEP_S, since, first, now,
   lowest: Object.fromEntries(NAMES.map((one) => [one, one === name ? lowest : lowest.map(() => null)])),
   highest: Object.fromEntries(NAMES.map((one) => [one, one === name ? highest : lowest.map(() => null)])),
 });
 /** @param {number} from @param {number} count @param {number} [value] */
-const steady = (from, count, value = 4) => told(from, Array(count).fill(value));
+const steady = (from, count, value = 4) => steps(from, Array(count).fill(value));
 /** @param {[number, number][]} gaps */
 const rounded = (gaps) => gaps.map((gap) => gap.map((at) => Math.round(at * 10) / 10));
 
-test('what was told is drawn, what was not is a gap and never a line', () => {
+test('what was received is drawn, what was not is a gap and never a line', () => {
   const minute = new Minute();
   minute.take(steady(0, 50));
-  minute.take(told(50, Array(20).fill(null)));
+  minute.take(steps(50, Array(20).fill(null)));
   minute.take(steady(70, 30, 6));
   const course = minute.course('speed', 100, 0.05);
   assert.deepEqual(rounded(course.gaps), [[-60, -20], [-10, -6]]);
@@ -35,7 +35,7 @@ test('what was told is drawn, what was not is a gap and never a line', () => {
   assert.deepEqual([course.low, course.high], [4, 6]);
 });
 
-test('a page that opens late asks for the minute, and what it is not given stays hatched', () => {
+test('a page that opens late requests the minute, and what it does not get stays hatched', () => {
   const minute = new Minute();
   minute.take({ ...steady(1000, 4), since: 900 });
   assert.equal(minute.missed, 899);
@@ -63,7 +63,7 @@ test('a radio gap of two minutes leaves nothing of what was before it', () => {
   assert.deepEqual(rounded(course.gaps), [[-60, -0.8]]);
 });
 
-test('silence grows at the right while nothing is told', () => {
+test('silence grows at the right while nothing is received', () => {
   const minute = new Minute();
   minute.take(steady(0, 100));
   assert.deepEqual(rounded(minute.course('speed', 101, 0.05).gaps), [[-60, -20.2]]); // the frame that tells the step under way
@@ -73,7 +73,7 @@ test('silence grows at the right while nothing is told', () => {
 
 test('a slow signal has no gaps between its messages, a fast one has', () => {
   const minute = new Minute();
-  minute.take(told(0, Array.from({ length: 300 }, (_, i) => (i % 5 === 0 ? 7 : null))));
+  minute.take(steps(0, Array.from({ length: 300 }, (_, i) => (i % 5 === 0 ? 7 : null))));
   assert.equal(minute.course('speed', 300, 1).gaps.length, 0);
   assert.ok(minute.course('speed', 300, 1).lowest.every((one) => one === 7));
   assert.equal(minute.course('speed', 300, 0.05).gaps.length, 59);
@@ -81,7 +81,7 @@ test('a slow signal has no gaps between its messages, a fast one has', () => {
 
 test('no object in range is no gap and no line', () => {
   const minute = new Minute();
-  minute.take(told(0, [...Array(140).fill(8), ...Array(20).fill('none'), ...Array(140).fill(9)], { name: 'distance' }));
+  minute.take(steps(0, [...Array(140).fill(8), ...Array(20).fill('none'), ...Array(140).fill(9)], { name: 'distance' }));
   const course = minute.course('distance', 300, 0.05);
   assert.deepEqual(course.gaps, []);
   assert.equal(course.lowest.filter((one) => one === null).length, 1);
@@ -90,7 +90,7 @@ test('no object in range is no gap and no line', () => {
 
 test('peaks of a fast signal are kept', () => {
   const minute = new Minute();
-  minute.take(told(0, [4, 3.1, 4], { highest: [4, 9.5, 4] }));
+  minute.take(steps(0, [4, 3.1, 4], { highest: [4, 9.5, 4] }));
   const course = minute.course('speed', 3, 0.05);
   assert.deepEqual([course.low, course.high], [3.1, 9.5]);
 });

@@ -4,7 +4,7 @@ import { chooseSpeedUnit, inUnits, shownIn, speedIn, speedUnit, speedWords, spok
 
 afterEach(() => chooseSpeedUnit('m/s'));
 
-test('m/s is what a phone shows that was never asked', () => {
+test('m/s is what a phone shows without a chosen unit', () => {
   assert.equal(speedUnit(), 'm/s');
   assert.deepEqual(speedWords(4.2), ['4.2', 'm/s']);
   assert.equal(inUnits('12.6 m/s, limit 11.0 m/s'), '12.6 m/s, limit 11.0 m/s');

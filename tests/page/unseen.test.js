@@ -21,13 +21,13 @@ test('an unknown speed, age or limit is not known, and never 0', () => {
 test('the page counts as the server does', () => { // tests/monitor/test_unseen.py reads the same table
   const table = JSON.parse(readFileSync(new URL('../monitor/unseen.json', import.meta.url), 'utf-8'));
   assert.deepEqual([KEPT_M, LATE_ABOVE_S], [table.kept_m, table.late_above_s]);
-  for (const [speed_mps, age_s, limit, metres, words] of table.ways) {
-    assert.deepEqual([unseenMetres(speed_mps, age_s, limit), unseenWords(unseenMetres(speed_mps, age_s, limit))], [metres, words]);
+  for (const [speed_mps, age_s, limit, metres, text] of table.ways) {
+    assert.deepEqual([unseenMetres(speed_mps, age_s, limit), unseenWords(unseenMetres(speed_mps, age_s, limit))], [metres, text]);
   }
   for (const [late_s, kept_mps] of table.kept) assert.equal(keptSpeed(late_s), kept_mps);
 });
 
-test('no drive within the limit is longer than the bound, and the words are never less than it', () => {
+test('no drive within the limit is longer than the bound, and the text is never less than it', () => {
   let seed = 7;
   const next = () => (seed = (seed * 16807) % 2147483647) / 2147483647;
   for (let round = 0; round < 300; round += 1) {
@@ -82,7 +82,7 @@ test('a speed is proposed above 200 ms, from the car to the glass, and never rou
   chooseSpeedUnit('m/s');
 });
 
-test('no speed is proposed unless the setting says so, nor while nothing comes', () => {
+test('no speed is proposed unless the setting requires it, nor while nothing comes', () => {
   assert.deepEqual(proposalOf(glass({ limit: () => 0 })), []);
   assert.deepEqual(proposalOf(glass({ limit: () => null })), []);
   assert.deepEqual(proposalOf(glass({ isSilent: true })), []);

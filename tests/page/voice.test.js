@@ -4,7 +4,7 @@ import { MarkKey } from '../../static/js/drive/mark-key.js';
 import { HELD_MS } from '../../static/js/drive/press.js';
 import { Voice } from '../../static/js/drive/voice.js';
 
-/** A microphone that says when it is let go, and a recorder of this browser. @param {any} Recorder */
+/** A microphone that reports when it is released, and a recorder of this browser. @param {any} Recorder */
 function microphone(Recorder) {
   let isOpen = false;
   const track = { onended: null, stop: () => { isOpen = false; } };

@@ -16,7 +16,7 @@ test('signals that are not fresh are listed first; those nobody publishes are no
   assert.deepEqual(lines.map(({ cells }) => cells), [['Laser', '0.0 Hz', 'STALE 7.3 s'], ['Command', 'no message yet', '–'], ['Heading', 'not measured', '–'], ['Speed', '20.0 Hz', '0.04 s']]);
 });
 
-test('who is in control stands first, then this page; why one cannot hear an alarm is said', () => {
+test('who is in control stands first, then this page; why one cannot hear an alarm is shown', () => {
   const reach = /** @type {any} */ ({ can: 2, of: 3, left_out: 0, pages: [person('c', 'Field 2', { can: false, why_text: 'sound is off' }), person('b', 'Desk 2'), person('a', 'Desk 1')] });
   const { head, lines } = peopleLines(reach, /** @type {any} */ ({ page: 'a' }), 'b');
   assert.equal(head, '3 pages, alarms audible on 2');

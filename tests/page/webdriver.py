@@ -169,8 +169,8 @@ async def session_of(client: httpx.AsyncClient) -> str:
     """The name of a new session."""
     options = {"binary": glob(BROWSERS)[0], "args": ["--automation"]}
     wanted = {"browserName": "MiniBrowser", "webkitgtk:browserOptions": options}
-    asked = {"capabilities": {"alwaysMatch": wanted}}
-    answer = (await client.post("/session", json=asked)).json()["value"]
+    body = {"capabilities": {"alwaysMatch": wanted}}
+    answer = (await client.post("/session", json=body)).json()["value"]
     session: str = answer["sessionId"]
     await client.post(f"/session/{session}/window/rect", json={"x": 0, "y": 0, "width": 420, "height": 900})
     return session

@@ -35,7 +35,7 @@
   const cut = all('#monitor :is(.checks b, .tabs button, .rail .key, .rail .slide .tx, .ph, .near, .block .v, .block .lab, .alarms-foot .key)')
     .filter((one) => (isFloor || !one.closest('.checks')) && one.scrollWidth > one.clientWidth + 1 && getComputedStyle(one).display !== 'inline');
   wrong.push(...cut.map((one) => `${one.className} ${one.textContent.trim()} cut`));
-  // The window as squares of 20 px; what has words or a picture is not empty.
+  // The window as squares of 20 px; what has text or a picture is not empty.
   const side = 20;
   const [columns, rows] = [Math.floor(innerWidth / side), Math.floor(innerHeight / side)];
   const full = Array.from({ length: rows }, () => new Uint8Array(columns));
@@ -43,11 +43,11 @@
     for (let y = Math.max(0, Math.floor(at.top / side)); y < Math.min(rows, at.bottom / side); y += 1) full[y].fill(1, Math.max(0, Math.floor(at.left / side)), Math.max(0, Math.min(columns, Math.ceil(at.right / side))));
   };
   for (const one of all('#monitor :is(svg, canvas, button, input, .mapbox)')) fill(box(one));
-  const words = document.createTreeWalker(document.querySelector('#monitor'), NodeFilter.SHOW_TEXT);
+  const texts = document.createTreeWalker(document.querySelector('#monitor'), NodeFilter.SHOW_TEXT);
   const range = document.createRange();
-  while (words.nextNode()) {
-    if (!words.currentNode.data.trim() || !seen(words.currentNode.parentElement)) continue;
-    range.selectNodeContents(words.currentNode);
+  while (texts.nextNode()) {
+    if (!texts.currentNode.data.trim() || !seen(texts.currentNode.parentElement)) continue;
+    range.selectNodeContents(texts.currentNode);
     for (const at of range.getClientRects()) fill(at);
   }
   const heights = new Array(columns).fill(0);

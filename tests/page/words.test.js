@@ -43,7 +43,7 @@ test('a heading is clockwise from north', () => {
   assert.deepEqual(heading(-45), { degrees: '315°', point: 'NW' });
 });
 
-test('the numbers of a sentence are told from its words', () => {
+test('the numbers of a sentence are distinguished from its text', () => {
   const numbers = (/** @type {string} */ text) => pieces(text).filter((piece) => piece.isNumber).map((piece) => piece.text);
   assert.deepEqual(numbers('192.168.4.1 is there, but nothing listens on port 9090.'), ['192.168.4.1', '9090']);
   assert.deepEqual(numbers('12.6 m/s, limit 11.0 m/s since 14:07:31'), ['12.6', '11.0', '14:07:31']);

@@ -48,7 +48,7 @@ export function layOut(alarms) {
   const standing = sorted.filter((alarm) => alarm.state !== 'SHELVED');
   const isPrompted = asking.some((alarm) => alarm.active && alarm.place !== 'list');
   return {
-    // One that has ended is asked about in its turn: its dialog would cover what is active and unacknowledged.
+    // An ended alarm waits for its turn: its dialog would cover what is active and unacknowledged.
     dialog: asking.find((alarm) => alarm.place === 'dialog' && (alarm.active || !isPrompted)) ?? null,
     snackbars: asking.filter((alarm) => alarm.place === 'snackbar'),
     standing,
@@ -58,8 +58,8 @@ export function layOut(alarms) {
 }
 
 /**
- * The sound that must be heard now, or null. What is acknowledged, silenced, shelved or over is silent. While paused the server
- * tells only what a pause does not hide: a lost link, a pause that somebody forgot. A server that fell silent while it
+ * The sound that must play now, or null. What is acknowledged, silenced, shelved or over is silent. While paused the server
+ * reports only what a pause does not hide: a lost link, a forgotten pause. A server that fell silent while it
  * watched a car is the loudest alarm of all, for nothing else can be announced; a paused one watches nothing.
  * @param {State | null} frame
  * @param {{isServerLost: boolean, isLossAcknowledged: boolean}} page

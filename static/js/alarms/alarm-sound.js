@@ -24,7 +24,7 @@ export class AlarmSound {
     return /** @type {string | undefined} */ (this.#context?.state) === 'interrupted';
   }
 
-  /** Would an alarm be heard now? */
+  /** Whether an alarm would sound now. */
   get isRunning() {
     return this.#context?.state === 'running';
   }
@@ -32,7 +32,7 @@ export class AlarmSound {
   /** Called within a tap: browsers sound only after one. Never waits for the answer, which some never give. */
   arm() {
     if (!this.isPossible) return;
-    // On an iPhone a page's sound obeys the silent switch unless it says that it plays for its own sake (Safari 16.4 on).
+    // On an iPhone the silent switch mutes a page's sound unless the page declares it as playback (Safari 16.4 on).
     const { audioSession } = /** @type {{audioSession?: {type: string}}} */ (/** @type {unknown} */ (navigator));
     if (audioSession) audioSession.type = 'playback';
     this.#context ??= new AudioContext({ latencyHint: 'interactive' });
@@ -80,7 +80,7 @@ export class AlarmSound {
     return 'sounding';
   }
 
-  /** What sounds now, heard or not. */
+  /** What sounds now, audible or not. */
   get saying() {
     return this.#sound;
   }
@@ -113,7 +113,7 @@ export class AlarmSound {
   /** @param {Loud} sound */
   #vibrate(sound) {
     const { vibration, every_s } = burstOf(sound);
-    // Browsers let nobody vibrate before a touch; then the sound is blocked too, and the page says so.
+    // Browsers block vibration before a touch; the sound is blocked too then, and the page shows that.
     if (!vibration.length || typeof navigator.vibrate !== 'function' || !navigator.userActivation?.hasBeenActive) return;
     navigator.vibrate(vibration);
     this.#shake = setInterval(() => navigator.vibrate(vibration), every_s * 1000);

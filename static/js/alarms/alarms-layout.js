@@ -1,4 +1,4 @@
-// The list of alarms as words: which row stands where, how its state reads, what its keys are, what fits a page of it. Pure functions, no DOM.
+// The list of alarms as text: the order of its rows, the text of each state, the keys of a row, the rows of a page. Pure functions, no DOM.
 
 import { byUrgency } from './alarm-layout.js';
 import { markWords, ownerWords, snackWords } from './standing.js';
@@ -10,7 +10,7 @@ import { ICONS } from '../core/priority.js';
  * @typedef {import('../core/protocol-types.js').SuppressedAlarm} Suppressed
  * @typedef {'unacknowledged' | 'returned' | 'acknowledged' | 'shelved' | 'suppressed'} Kind
  * @typedef {'silence' | 'acknowledge' | 'shelve' | 'unshelve' | 'take_alarm'} Key
- * @typedef {{key: string, id: string, kind: Kind, icon: string, priority: string, title: string, words: string, at: string, state: string, silent: string, keys: Key[], alarm: Alarm | null}} Row
+ * @typedef {{key: string, id: string, kind: Kind, icon: string, priority: string, title: string, detail: string, at: string, state: string, silent: string, keys: Key[], alarm: Alarm | null}} Row
  */
 
 const KINDS = /** @type {Record<Alarm['state'], Kind>} */ ({ UNACKED: 'unacknowledged', RTN_UNACKED: 'returned', ACKED: 'acknowledged', SHELVED: 'shelved' });
@@ -38,7 +38,7 @@ function rowOf(alarm, mayAct) {
   const kind = kindOf(alarm);
   return {
     key: `${alarm.id} ${alarm.occurrence} ${alarm.state}`, id: alarm.id, kind, icon: kind === 'shelved' ? 'clock' : ICONS[alarm.priority], priority: alarm.priority, title: alarm.title,
-    words: rowWords(alarm), at: timeOfDay(alarm.raised_ms), state: listedWords(alarm), silent: silentWords(alarm), keys: mayAct ? keysOf(alarm) : [], alarm,
+    detail: detailOf(alarm), at: timeOfDay(alarm.raised_ms), state: listedWords(alarm), silent: silentWords(alarm), keys: mayAct ? keysOf(alarm) : [], alarm,
   };
 }
 
@@ -55,8 +55,8 @@ export function keysOf(alarm) {
   return alarm.sound === 'none' || alarm.silenced_until_ms ? ['acknowledge'] : ['silence', 'acknowledge'];
 }
 
-/** What is measured against what, as short as it can be said. @param {Alarm} alarm */
-function rowWords(alarm) {
+/** The measured value against its limit, as short as possible. @param {Alarm} alarm */
+function detailOf(alarm) {
   const { active, verdict, measured, limit } = alarm;
   if (!active) return alarm.trip_text || alarm.text;
   const isCompared = verdict === 'fault' && measured && limit && measured.unit === limit.unit && measured.value !== null && limit.value !== null;
@@ -80,12 +80,12 @@ export function comparedWords(measured, limit) {
 /** @param {Suppressed} one @returns {Row} */
 function suppressedRow({ id, title, priority, by, raised_ms }) {
   return {
-    key: `${id} suppressed`, id, kind: 'suppressed', icon: 'bell-off', priority, title, words: `cause: ${by.join(', ')}`, at: raised_ms === null ? '' : timeOfDay(raised_ms),
+    key: `${id} suppressed`, id, kind: 'suppressed', icon: 'bell-off', priority, title, detail: `cause: ${by.join(', ')}`, at: raised_ms === null ? '' : timeOfDay(raised_ms),
     state: 'suppressed', silent: '', keys: [], alarm: null,
   };
 }
 
-/** The state of an alarm in the words of ISA-18.2. @param {Alarm} alarm */
+/** The state of an alarm in the terms of ISA-18.2. @param {Alarm} alarm */
 export function stateWords(alarm) {
   const by = (/** @type {string | null | undefined} */ who) => (who ? ` by ${who}` : '');
   if (alarm.state === 'SHELVED') return `shelved until ${timeOfDay(alarm.shelved_until_ms)}${by(alarm.shelved_by)}`;

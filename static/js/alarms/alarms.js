@@ -13,7 +13,7 @@ import { speedUnit, speedWords } from '../core/units.js';
 /**
  * @typedef {import('./alarms-layout.js').Row} Row
  * @typedef {import('../core/protocol-types.js').StandingAlarm} Alarm
- * @typedef {{element: HTMLElement, words: HTMLElement, state: HTMLElement, meant: Meant, place: number}} Drawn
+ * @typedef {{element: HTMLElement, detail: HTMLElement, state: HTMLElement, meant: Meant, place: number}} Drawn
  */
 
 const LABELS = { silence: 'Silence', acknowledge: 'Acknowledge', shelve: 'Shelve', unshelve: 'Unshelve', take_alarm: 'Take over' };
@@ -42,7 +42,7 @@ export function mount(root, store, { close, inHead = () => null } = {}) {
 class AlarmList {
   /** @type {Map<string, Drawn>} */
   #drawn = new Map();
-  #said = '';
+  #texts = '';
   #order = '';
   /** @type {Row[]} */
   #rows = [];
@@ -156,18 +156,18 @@ class AlarmList {
     for (const [name, row] of keyed) {
       const at = drawn.get(name);
       if (!at) continue;
-      setWords(at.words, row.words);
+      setWords(at.detail, row.detail);
       setWords(at.state, row.state);
     }
-    const said = this.#rows.map(({ words, state }) => `${words} ${state}`).join('|').replace(/[0-9]/g, '0'); // all digits have one width
+    const texts = this.#rows.map(({ detail, state }) => `${detail} ${state}`).join('|').replace(/[0-9]/g, '0'); // all digits have one width
     if (isOther) this.pager.lay();
-    else if (said !== this.#said) this.pager.look();
-    this.#said = said;
+    else if (texts !== this.#texts) this.pager.look();
+    this.#texts = texts;
   }
 
   /** @param {Row} row @returns {Drawn} */
   #build(row) {
-    const [words, state] = [html('span', { class: 'm' }), html('span', { class: 's' })];
+    const [detail, state] = [html('span', { class: 'm' }), html('span', { class: 's' })];
     const meant = new Meant();
     const keys = row.keys.map((name) => {
       const key = html('button', { type: 'button', class: name === 'acknowledge' ? 'key solid' : 'key', 'data-do': name }, LABELS[name]);
@@ -175,7 +175,7 @@ class AlarmList {
       key.addEventListener('click', (event) => {
         const { alarm } = row;
         if (!alarm || (event.detail !== 0 && !meant.by(event))) return; // a key with the focus keeps it wherever it moves
-        if (name === 'shelve') openShelve(this.store, alarm, (sentence) => setWords(this.parts.says, sentence));
+        if (name === 'shelve') openShelve(this.store, alarm, (sentence) => setWords(this.parts.message, sentence));
         else void this.#command(name, alarm);
       });
       return key;
@@ -184,8 +184,8 @@ class AlarmList {
     const isWaiting = row.kind === 'unacknowledged' || row.kind === 'returned';
     const title = html('span', { class: 't' }, row.title);
     const at = html('span', { class: 'h' }, isWaiting || !row.at ? '' : 'since ', html('span', { class: 'n' }, row.at));
-    const text = html('button', { type: 'button', class: 'tx', 'data-f': 'open' }, ...(isWaiting ? [html('span', {}, title, at), html('span', {}, words, state)]
-      : [html('span', {}, title), html('span', {}, words), html('span', { class: 'l3' }, state, at)]));
+    const text = html('button', { type: 'button', class: 'tx', 'data-f': 'open' }, ...(isWaiting ? [html('span', {}, title, at), html('span', {}, detail, state)]
+      : [html('span', {}, title), html('span', {}, detail), html('span', { class: 'l3' }, state, at)]));
     text.addEventListener('click', () => openScreen('check', row.id));
     const silent = html('span', { class: 'quiet' });
     setWords(silent, row.silent);
@@ -193,14 +193,14 @@ class AlarmList {
     const element = html('li', { 'data-kind': row.kind, 'data-priority': row.priority, 'data-waits': isWaiting }, mark, text,
       ...(answers.length ? [html('div', { class: 'ac' }, ...answers)] : []));
     meant.element = element;
-    return { element, words, state, meant, place: -1 };
+    return { element, detail, state, meant, place: -1 };
   }
 
   /** @param {'acknowledge' | 'silence' | 'unshelve' | 'take_alarm'} kind @param {Alarm} alarm */
   async #command(kind, alarm) {
-    setWords(this.parts.says, '');
+    setWords(this.parts.message, '');
     const answer = await this.store.ask(kind, { alarm: alarm.id, ...(kind === 'unshelve' ? {} : { occurrence: alarm.occurrence }) });
-    if (!answer.ok) setWords(this.parts.says, answer.reason ?? 'Refused.');
+    if (!answer.ok) setWords(this.parts.message, answer.reason ?? 'Refused.');
   }
 }
 
@@ -214,7 +214,7 @@ function build(root) {
   const list = html('ul', { class: 'alarms', 'data-f': 'alarms' });
   const none = html('p', { class: 'state', 'data-f': 'alarms-none' });
   const lately = html('p', { class: 'lately', 'data-f': 'alarms-lately' });
-  const says = html('p', { class: 'note-line bad', role: 'alert', 'data-f': 'alarms-says' });
+  const message = html('p', { class: 'note-line bad', role: 'alert', 'data-f': 'alarms-says' });
   const ended = html('button', { type: 'button', class: 'key', 'data-f': 'alarms-ended' });
   const these = html('button', { type: 'button', class: 'key', 'data-f': 'alarms-these', hidden: true });
   const foot = html('div', { class: 'alarms-foot' }, ended, these);
@@ -222,8 +222,8 @@ function build(root) {
     html('div', { class: 'alarms-head' }, html('h2', { tabindex: -1 }, 'Alarms'), count,
       html('span', { class: 'alarms-speed', 'aria-label': 'Speed' }, speed, unit),
       html('button', { type: 'button', class: 'btn', 'aria-label': 'Alarm log', 'data-screen': 'log' }, icon('clock')), close),
-    load, note, none, list, lately, says, foot));
-  return { count, speed, unit, close, load, note, list, none, lately, says, ended, these, foot };
+    load, note, none, list, lately, message, foot));
+  return { count, speed, unit, close, load, note, list, none, lately, message, ended, these, foot };
 }
 
 /** Why nothing can be acknowledged here now; empty where it can. @param {import('../core/store.js').Store} store */

@@ -24,7 +24,7 @@ export class CheckFeed {
   #asked_ms = -Infinity;
   #isBusy = false;
   #isStopped = false;
-  /** The server has no such check, or the replay is over: it is not asked again. */
+  /** The server has no such check, or the replay is over: it is not requested again. */
   #isRefused = false;
   /** @type {number | null} the newest event that the history knows */
   #event = null;

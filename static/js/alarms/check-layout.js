@@ -1,4 +1,4 @@
-// One check as words and numbers: its answer, its three numbers, its alarms in this drive, the scale of its minute. Pure functions, no DOM.
+// One check as text and numbers: its answer, its three numbers, its alarms in this drive, the scale of its minute. Pure functions, no DOM.
 
 import { shownIn } from '../core/units.js';
 import { age, ageWords, counted, fixed, timeOfDay } from '../core/format.js';
@@ -108,13 +108,13 @@ export function episodesOf(events) {
  * @param {number} now_ms by the server's clock
  */
 export function episodeWords({ at_ms, ended_ms, worst, unit, side, by, took_s }, now_ms) {
-  const said = [
+  const parts = [
     ended_ms === null ? 'active' : '',
     worst === null ? '' : `${side === 'above' ? 'highest' : 'lowest'} ${fixed(worst)} ${unit}`.trim(),
     by === null ? (ended_ms === null ? '' : 'not acknowledged') : `acknowledged by ${by} after ${ageWords(took_s ?? 0)}`,
   ];
   const lasted_s = ((ended_ms ?? now_ms) - at_ms) / 1000;
-  return { at: timeOfDay(at_ms), text: said.filter(Boolean).join(', ') || 'ended', lasted: ageWords(lasted_s) };
+  return { at: timeOfDay(at_ms), text: parts.filter(Boolean).join(', ') || 'ended', lasted: ageWords(lasted_s) };
 }
 
 /** "3 times, 18.4 s in all". @param {Episode[]} episodes @param {number} now_ms */

@@ -153,7 +153,7 @@ class CheckView {
   async #answer(name) {
     const { alarm, store, parts } = this;
     if (!alarm) return;
-    const say = (/** @type {string} */ sentence) => setWords(parts.says, sentence);
+    const say = (/** @type {string} */ sentence) => setWords(parts.message, sentence);
     say('');
     if (name === 'shelve') return openShelve(store, alarm, say);
     const answer = await store.ask(name, { alarm: alarm.id, ...(name === 'unshelve' ? {} : { occurrence: alarm.occurrence }) });
@@ -215,9 +215,9 @@ class CheckView {
     this.#history = key;
     const mark = ICONS[feed.answer?.priority ?? 'warning'];
     parts.history.replaceChildren(...rows.map(({ at, text, lasted }) => {
-      const said = html('span', { class: 'm' });
-      setWords(said, text);
-      return html('li', {}, html('span', { class: 'n' }, at), icon(mark, 's'), said, html('span', { class: 'n' }, lasted));
+      const detail = html('span', { class: 'm' });
+      setWords(detail, text);
+      return html('li', {}, html('span', { class: 'n' }, at), icon(mark, 's'), detail, html('span', { class: 'n' }, lasted));
     }));
   }
 
@@ -265,7 +265,7 @@ function momentOf({ frame }) {
 }
 
 /**
- * What the check says, and why it says nothing.
+ * The answer of the check, or why it has none.
  * @param {import('../core/protocol-types.js').Verdict} verdict @param {string | null} why @param {boolean} isKnown
  * @param {string | undefined} text @param {string} problem
  */
@@ -285,8 +285,8 @@ function build(root) {
   const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close the check', 'data-f': 'close' }, icon('close'));
   const [sentence, needs] = [html('p', { class: 'say', 'data-f': 'check-sentence' }), html('p', { class: 'sub', 'data-f': 'check-needs' })];
   const [alarmTitle, state, story] = [html('b'), html('span', { class: 'm' }), html('p')];
-  const [keys, says] = [html('div', { class: 'ac' }), html('p', { class: 'bad', role: 'alert' })];
-  const alarm = html('section', { class: 'block check-alarm', 'aria-label': 'Its alarm', 'data-f': 'check-alarm' }, html('p', {}, alarmTitle, ' ', state), story, keys, says);
+  const [keys, message] = [html('div', { class: 'ac' }), html('p', { class: 'bad', role: 'alert' })];
+  const alarm = html('section', { class: 'block check-alarm', 'aria-label': 'Its alarm', 'data-f': 'check-alarm' }, html('p', {}, alarmTitle, ' ', state), story, keys, message);
   const figures = Array.from({ length: 3 }, () => ({ label: html('span', { class: 'lab' }), value: html('span', { class: 'n v' }), unit: html('span', { class: 'u' }) }));
   const three = html('section', { class: 'three', 'data-f': 'check-figures', 'aria-label': 'Numbers' }, ...figures.map(({ label, value, unit: of }) => html('div', {}, label, html('br'), value, of)));
   const [chartSays, canvas] = [html('span', { class: 'age', 'data-f': 'check-chart-says' }), html('canvas', { class: 'minute', role: 'img', 'aria-label': 'Last 60 s' })];
@@ -307,6 +307,6 @@ function build(root) {
     html('div', { class: 'alarms-head' }, mark, title, tag, html('span', { class: 'alarms-speed', 'aria-label': 'Speed' }, speed, unit), close),
     body, html('div', { class: 'alarms-foot' }, trends, html('div', { class: 'turn' }, before, place, after)));
   root.replaceChildren(view);
-  return { view, mark, title, tag, speed, unit, close, sentence, needs, alarm, alarmTitle, state, story, keys, says, figures, chart, chartSays, canvas, thresholds,
+  return { view, mark, title, tag, speed, unit, close, sentence, needs, alarm, alarmTitle, state, story, keys, message, figures, chart, chartSays, canvas, thresholds,
     thresholdTitle, thresholdWords, change, rows, past, total, history, siblings, siblingsTitle, others, body, before, after, place, trends };
 }

@@ -1,4 +1,4 @@
-// The checks on Home: a row of marks in fixed places, and a tile each that says OK, FAULT, or not checked and why. Each opens.
+// The checks on Home: a row of marks in fixed places, and a tile each that shows OK, FAULT, or not checked and why. Each opens.
 
 import { tilesOf } from './alarm-layout.js';
 import { field, html, icon, listen, setAttribute, setIcon, setText, setWords } from '../core/dom.js';
@@ -10,7 +10,7 @@ import { openScreen } from '../core/open-screen.js';
  */
 
 /**
- * What the tiles show. While the values are not live nothing is checked, whatever the frame says; nor while paused, but
+ * What the tiles show. While the values are not live nothing is checked, whatever the frame states; nor while paused, except
  * for the faults that the server finds all the same: those of the link, and a pause that lasts too long.
  * @param {State} frame
  * @param {string | null} why why nothing is checked, or null

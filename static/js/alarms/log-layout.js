@@ -1,4 +1,4 @@
-// The alarm log as words: how an event reads, what a filter leaves, which day it was. Pure functions, no DOM.
+// The alarm log as text: the text of an event, the rows of a filter, the day of a row. Pure functions, no DOM.
 
 import { rowsOf } from './alarms-layout.js';
 import { standingWords } from './standing.js';
@@ -31,8 +31,8 @@ const MONTHS = ['January', 'February', 'March', 'April', 'May', 'June', 'July', 
  * @param {AlarmEvent} event
  */
 export function eventWords(event) {
-  const words = wordsOf(event);
-  return event.brought_from ? { ...words, text: [words.text, `brought back from ${event.brought_from}`].filter(Boolean).join(' · ') } : words;
+  const row = wordsOf(event);
+  return event.brought_from ? { ...row, text: [row.text, `brought back from ${event.brought_from}`].filter(Boolean).join(' · ') } : row;
 }
 
 /** @param {AlarmEvent} event */
@@ -59,13 +59,13 @@ function hiddenWords({ state, change, suppressed_by }) {
 }
 
 /**
- * What stands, in the words of the log: who has seen it, then what is suppressed; what is hidden bears its own icon.
+ * The standing alarms in the form of the log: who has seen it, then what is suppressed; what is hidden bears its own icon.
  * @param {import('../core/protocol-types.js').StandingAlarm[]} alarms
  * @param {import('../core/protocol-types.js').SuppressedAlarm[]} suppressed
  * @returns {{icon: string, colour: string, title: string, text: string, at: string, kind: string}[]}
  */
 export function standingRows(alarms, suppressed) {
-  return rowsOf(alarms, suppressed, false).map(({ kind, icon, priority, title, state, alarm, at, words: cause }) => ({
+  return rowsOf(alarms, suppressed, false).map(({ kind, icon, priority, title, state, alarm, at, detail: cause }) => ({
     icon, colour: kind === 'shelved' || kind === 'suppressed' ? '' : MARKS[/** @type {keyof typeof MARKS} */ (priority)]?.[1] ?? '',
     title, text: alarm ? standingWords(alarm) : `${state} · ${cause}`, at, kind,
   }));
@@ -88,7 +88,7 @@ export function fits(event, { kind, text }) {
  * @param {Filter} filter
  * @returns {Record<string, string>}
  */
-export function asked({ kind, text }) {
+export function filterParams({ kind, text }) {
   const wanted = text.trim();
   return {
     ...(kind === 'other' ? { alarm: '' } : kind === 'all' ? {} : { priority: kind }),
@@ -97,7 +97,7 @@ export function asked({ kind, text }) {
 }
 
 /**
- * One list, newest first: what this page heard, with the times in which it was blind, and what the server told of before.
+ * One list, newest first: what this page received, with the times in which it was blind, and the older events of the server.
  * A blind time is shown whatever the filter: nobody knows what would have stood there.
  * @param {Row[]} here newest first
  * @param {AlarmEvent[]} older newest first, from the server
@@ -119,7 +119,7 @@ export function gapLine(gap) {
 }
 
 /**
- * The number below which the server is asked for more.
+ * The number below which more is requested from the server.
  * @param {Row[]} here
  * @returns {number | null} null: from the newest on
  */
@@ -148,7 +148,7 @@ function midnight(date) {
 }
 
 /**
- * How the row of an acknowledgement says how long it took: "12.6 m/s · by Ann · after 2.3 s".
+ * The text of an acknowledgement with its delay: "12.6 m/s · by Ann · after 2.3 s".
  * @param {AlarmEvent} event an acknowledgement
  * @param {Row[]} rows
  */

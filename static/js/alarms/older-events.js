@@ -1,7 +1,7 @@
 // Older events of the alarm log than the page has: requested from the server in batches, with the filter of the log.
 
 import { rankedEvents } from '../core/priority.js';
-import { asked, lowest } from './log-layout.js';
+import { filterParams, lowest } from './log-layout.js';
 
 const BATCH = 100; // events a request
 
@@ -10,7 +10,7 @@ const BATCH = 100; // events a request
 /** The query of a request for events that fit a filter. @param {import('./log-layout.js').Filter} filter @param {Record<string, string>} [more] */
 export function queryOf(filter, more = {}) {
   const vehicle = document.documentElement.dataset['vehicle'];
-  return new URLSearchParams({ ...(vehicle ? { vehicle } : {}), ...more, ...asked(filter) });
+  return new URLSearchParams({ ...(vehicle ? { vehicle } : {}), ...more, ...filterParams(filter) });
 }
 
 export class OlderEvents {

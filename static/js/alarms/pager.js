@@ -16,8 +16,8 @@ export class PagedList {
     const key = (/** @type {string} */ name, /** @type {string} */ label) => html('button', { type: 'button', class: 'key', 'aria-label': label, 'data-f': name }, icon(name === 'before' ? 'back' : 'next'));
     this.before = key('before', 'Previous page');
     this.after = key('after', 'Next page');
-    this.words = html('span', { role: 'status', 'data-f': 'pages' });
-    this.element = html('div', { class: 'turn' }, this.before, this.words, this.after);
+    this.position = html('span', { role: 'status', 'data-f': 'pages' });
+    this.element = html('div', { class: 'turn' }, this.before, this.position, this.after);
     const observer = new ResizeObserver(() => this.lay());
     observer.observe(list);
     this.stops = [
@@ -39,7 +39,7 @@ export class PagedList {
     this.#show();
   }
 
-  /** Rows may have grown by their words: measured again where they no longer fit. */
+  /** Longer texts may have made rows higher: measured again where they no longer fit. */
   look() {
     if (this.list.scrollHeight > this.list.clientHeight + 1) this.lay();
   }
@@ -60,7 +60,7 @@ export class PagedList {
     setAttribute(this.before, 'aria-disabled', from === 0);
     setAttribute(this.after, 'aria-disabled', to >= length);
     const { above } = this;
-    setWords(this.words, length ? `${to - from > 1 ? `${above + from + 1}–${above + to}` : above + to} of ${above + length}` : '');
+    setWords(this.position, length ? `${to - from > 1 ? `${above + from + 1}–${above + to}` : above + to} of ${above + length}` : '');
     this.onTurn();
   }
 

@@ -1,4 +1,4 @@
-// A planned stop in words. Pure functions, no DOM.
+// The texts of a planned stop. Pure functions, no DOM.
 
 import { timeOfDay } from '../core/format.js';
 
@@ -26,7 +26,7 @@ export function lineWords({ since_ms, by }) {
   return `since ${timeOfDay(since_ms)}${by ? ` by ${by}` : ''}`;
 }
 
-/** What the sheet says. @param {PlannedStop | null} stop */
+/** The text of the sheet. @param {PlannedStop | null} stop */
 export function sheetWords(stop) {
   return stop ? `${MEANING} ${stop.is_speed_known ? ENDS : NOT_KNOWN}` : `The car stands on purpose. ${MEANING} ${ENDS}`;
 }

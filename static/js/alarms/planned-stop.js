@@ -44,11 +44,11 @@ export function openPlannedStop(store, say) {
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-planned-stop', 'aria-labelledby': 'planned-stop-title', 'aria-describedby': 'planned-stop-words' },
     html('div', { class: 'bd' }, title, text), html('div', { class: 'keys' }, reasons, end, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
   const act = async (/** @type {'planned_stop' | 'end_planned_stop'} */ kind, /** @type {{reason?: Reason}} */ fields) => {
-    sheet.close(); // what is refused is said beneath it
+    sheet.close(); // a refusal is shown beneath it
     await order(store, say, kind, fields);
   };
-  reasons.append(...Object.entries(REASONS).map(([reason, words]) => {
-    const key = html('button', { type: 'button', class: 'key', 'data-reason': reason, 'data-operator': '' }, words);
+  reasons.append(...Object.entries(REASONS).map(([reason, label]) => {
+    const key = html('button', { type: 'button', class: 'key', 'data-reason': reason, 'data-operator': '' }, label);
     key.addEventListener('click', () => void act('planned_stop', { reason: /** @type {Reason} */ (reason) }));
     return key;
   }));

@@ -6,7 +6,7 @@
  * @typedef {{pulses: Pulse[], every_s: number, gain: number, vibration: number[]}} Burst
  */
 
-// Notes with their harmonics lie between 300 and 4000 Hz, where a small loudspeaker is loud and an ear is keen.
+// Notes with their harmonics lie between 300 and 4000 Hz, where a small loudspeaker is loud and hearing is sensitive.
 const C5 = 523.25, E4 = 329.63, G4 = 392, A4 = 440, A5 = 880;
 
 /** @type {Record<'high' | 'medium' | 'low' | 'count', Burst>} */

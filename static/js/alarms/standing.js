@@ -3,11 +3,11 @@
 import { ageWords, fixed, sinceTime, timeOfDay } from '../core/format.js';
 
 /**
- * What is wrong, and who has said what to it.
+ * What is wrong, and how operators have responded.
  * @param {import('../core/protocol-types.js').StandingAlarm} alarm
  */
 export function standingWords(alarm) {
-  return [alarm.active ? snackWords(alarm) : alarm.trip_text || alarm.text, said(alarm), markWords(alarm)].filter(Boolean).join(' · ');
+  return [alarm.active ? snackWords(alarm) : alarm.trip_text || alarm.text, responseOf(alarm), markWords(alarm)].filter(Boolean).join(' · ');
 }
 
 /** The mark of an alarm in a planned stop; empty: there is none. @param {Pick<import('../core/protocol-types.js').StandingAlarm, 'planned_stop'>} alarm */
@@ -72,7 +72,7 @@ export function isLeftBehind({ off_duty_ms, acknowledged_by }, me) {
 }
 
 /** @param {import('../core/protocol-types.js').StandingAlarm} alarm */
-function said(alarm) {
+function responseOf(alarm) {
   const by = (/** @type {string | null | undefined} */ who) => (who ? ` by ${who}` : '');
   if (alarm.state === 'SHELVED') return `shelved${by(alarm.shelved_by)} until ${timeOfDay(alarm.shelved_until_ms)}`;
   if (alarm.state === 'ACKED') return ownerWords(alarm);

@@ -1,14 +1,14 @@
-// What the tap on Connect asks of the phone: sound, a screen that stays awake, its position. What is refused is said.
+// What the tap on Connect requests of the phone: sound, a screen that stays awake, its position. A refusal is shown.
 
 /**
- * @typedef {'asks' | 'ready' | 'refused' | 'missing'} Armed asks: not asked yet; missing: this browser or page cannot
+ * @typedef {'asks' | 'ready' | 'refused' | 'missing'} Armed asks: not requested yet; missing: this browser or page cannot
  * @typedef {{sound: Armed, screen: Armed, position: Armed}} Arms
  */
 
 export class Arming {
   /** @type {WakeLockSentinel | null} */
   #lock = null;
-  #isAsked = false;
+  #isRequested = false;
   /** @type {Armed} */
   screen = 'wakeLock' in navigator ? 'asks' : 'missing';
 
@@ -26,7 +26,7 @@ export class Arming {
 
   /** Within the tap. Nothing here is waited for: the vehicle is connected meanwhile. */
   ask() {
-    this.#isAsked = true;
+    this.#isRequested = true;
     this.alarmSound.arm();
     this.#stayAwake();
     this.phone.arm();
@@ -35,16 +35,16 @@ export class Arming {
   #soundArm() {
     if (!this.alarmSound.isPossible) return 'missing';
     if (this.alarmSound.isRunning) return 'ready';
-    return this.#isAsked ? 'refused' : 'asks';
+    return this.#isRequested ? 'refused' : 'asks';
   }
 
   #stayAwake() {
-    if (!this.#isAsked || document.hidden || this.screen === 'missing' || (this.#lock && !this.#lock.released)) return;
+    if (!this.#isRequested || document.hidden || this.screen === 'missing' || (this.#lock && !this.#lock.released)) return;
     navigator.wakeLock.request('screen').then(
       (lock) => {
         this.#lock = lock;
         this.screen = 'ready';
-        // Hidden, the phone takes it back and it is asked for again; while the page is seen it is the battery saver's doing.
+        // The phone releases it while the page is hidden, and it is requested again; a release while the page is visible comes from the battery saver.
         lock.addEventListener('release', () => { if (!document.hidden) this.screen = 'refused'; });
       },
       () => { this.screen = 'refused'; },

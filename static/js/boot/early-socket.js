@@ -1,4 +1,4 @@
-// The socket that was dialled before this script was here (early.js), as the page's own: what came meanwhile is heard first.
+// The socket that was dialled before this script was here (early.js), as the page's own: what came meanwhile is delivered first.
 
 /**
  * @typedef {{type: 'open' | 'message' | 'close', data?: string | ArrayBuffer, at_ms: number}} SocketEvent at_ms: when it came, monotonic

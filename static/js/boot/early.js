@@ -38,7 +38,7 @@
 
   /** @param {string | null} ticket */
   function dial(ticket) {
-    if (ticket === undefined) throw new Error('no ticket'); // why, is asked and said once the page is there
+    if (ticket === undefined) throw new Error('no ticket'); // the loaded page finds and shows the reason
     if (early.isGivenUp) return;
     const address = new URL('/ws', location.href);
     address.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';

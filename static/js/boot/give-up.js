@@ -2,7 +2,7 @@
 
 import { field, need, setAttribute, setText, setWords, show } from '../core/dom.js';
 
-/** Where the page's own screen stands that the server is being reached, it says that this page does not work. */
+/** Shows that this page does not work in place of the screen that the server is being reached. */
 export function giveUp() {
   const start = need(document, '#start');
   for (const dialog of document.querySelectorAll('dialog')) dialog.remove(); // closed, it would take that for an answer

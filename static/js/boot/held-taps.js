@@ -1,4 +1,4 @@
-// What is pressed while the page has not yet put its ears up is pressed again once it has: no tap is lost.
+// What is pressed before the page has added its listeners is pressed again once it has: no tap is lost.
 
 const PRESSED = 'button, a, label, input, select, summary';
 
@@ -9,7 +9,7 @@ export function holdTaps() {
   /** @param {Event} event */
   const hold = (event) => {
     const { target } = event;
-    // What asks the operator was put up by what listens already: held, a press could be taken for one of what asks by then.
+    // A dialog or notice was shown by code that listens already: a held press could be applied to a later one.
     if (!(target instanceof Element) || target.closest('dialog[open], .snack')) return;
     event.preventDefault(); // a form is not sent by itself
     event.stopImmediatePropagation();

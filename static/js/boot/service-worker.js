@@ -1,4 +1,4 @@
-// The page on this phone beyond this visit: the worker that keeps its shell, and word of a newer page when it is safe to say so.
+// The page on this phone beyond this visit: the worker that keeps its shell, and the notice of a newer page when it is safe to show it.
 // Loaded once the page has begun.
 
 import { need, show } from '../core/dom.js';
@@ -7,7 +7,7 @@ import { closeSheet } from '../shell/sheet.js';
 /**
  * @typedef {import('../core/store.js').Store} Store
  * @typedef {import('../core/protocol-types.js').State} State
- * @typedef {'kept' | 'missing' | 'refused' | 'off' | 'asked'} Keeping
+ * @typedef {'kept' | 'missing' | 'refused' | 'off'} Keeping
  */
 
 const ANSWERED = 'catgraph.answered';
@@ -16,7 +16,7 @@ const OFFER_AGAIN_MS = 10 * 60_000;
 const STANDING_MPS = 0.3;
 
 /**
- * Why the page must not be loaded anew now, or null: for some seconds nothing would be seen, and sound asks for a touch.
+ * Why the page must not be loaded anew now, or null: for some seconds nothing would be seen, and sound needs a touch.
  * @param {State | null} frame
  * @param {{isSilent: boolean, isMonitoring: boolean, hasDialog: boolean}} seen
  */
@@ -82,7 +82,7 @@ export class Shell {
       await workers.ready;
       keeping('kept');
     } catch {
-      keeping('refused'); // everything works without it, but the words when the server is gone
+      keeping('refused'); // everything works without it, except the message when the server is gone
     }
   }
 

@@ -1,4 +1,4 @@
-// On the plain page that explains: looks whether this browser trusts the server by now, and says so.
+// On the page of set-up: checks whether this browser trusts the server by now, and shows it.
 
 const LOOK_EVERY_MS = 3000;
 const body = document.body;

@@ -1,4 +1,4 @@
-// The line on Home that says how many operators would hear an alarm; behind it, what this phone can do.
+// The line on Home with the number of operators who would hear an alarm; behind it, what this phone can do.
 
 import { reachOf } from './control-layout.js';
 import { field, listen, setAttribute, setIcon, need, setWords } from '../core/dom.js';

@@ -1,4 +1,4 @@
-// What the page says of control and of who would hear an alarm: pure functions of the newest frame and of events.
+// The texts of control and of who would hear an alarm: pure functions of the newest frame and of events.
 
 import { initialsOf } from './duty-layout.js';
 import { counted, fixed } from '../core/format.js';
@@ -11,7 +11,7 @@ import { counted, fixed } from '../core/format.js';
 
 /**
  * The chip in the top bar.
- * @param {ControlNow | null} control null: nobody has told yet
+ * @param {ControlNow | null} control null: not received yet
  * @param {string} page this page
  * @param {boolean} isSilent
  * @param {import('../core/protocol-types.js').Duty | null} [duty] who is on duty at this device
@@ -48,7 +48,7 @@ export function reachOf(reach) {
 }
 
 /**
- * What a page is told of what happened to control, or null where it is this page's own doing or shown otherwise.
+ * The notice of a change of control, or null where it is this page's own doing or shown otherwise.
  * @param {AlarmEvent} event
  * @param {string} page
  * @returns {{title: string, text: string, offers: 'take' | 'request' | null} | null}
@@ -87,14 +87,14 @@ export function noticeOf(event, page) {
  */
 export function sheetOf(control, reach, page) {
   const others = (reach?.pages ?? []).filter((one) => one.here && one.page !== page);
-  const asked = (control.requests ?? []).find((one) => one.page === page);
+  const own = (control.requests ?? []).find((one) => one.page === page);
   const former = control.former && control.former.page !== page ? ` ${control.former.name} can reclaim it for ${seconds(control.former.may_return_s)}.` : '';
   if (control.page === page && page) {
     return { state: 'you', title: 'You are in control', text: 'Only this page can connect, pause, stop and change settings. Any operator can acknowledge alarms.', handTo: others, asked_s: null };
   }
   if (control.holder) {
-    const text = asked ? `You requested control. It is granted in ${seconds(asked.left_s)} unless it is refused.` : 'A request is granted unless it is refused within 10 s. Taking over is announced to everyone.';
-    return { state: asked ? 'asking' : 'other', title: `${control.holder} is in control`, text, handTo: [], asked_s: asked ? asked.left_s : null };
+    const text = own ? `You requested control. It is granted in ${seconds(own.left_s)} unless it is refused.` : 'A request is granted unless it is refused within 10 s. Taking over is announced to everyone.';
+    return { state: own ? 'asking' : 'other', title: `${control.holder} is in control`, text, handTo: [], asked_s: own ? own.left_s : null };
   }
   return { state: 'free', title: 'No one is in control', text: `The first to act takes control.${former}`, handTo: [], asked_s: null };
 }

@@ -5,11 +5,11 @@ import { openHandover } from './duty.js';
 import { partOf } from './duty-layout.js';
 import { html, icon, listen, need, setAttribute, setWords } from '../core/dom.js';
 
-/** A refusal is answered with a key for so long: another one of the same words is another [ms]. */
+/** A refusal is answered with a key for so long: another one with the same text is another [ms]. */
 const REFUSED_MS = 3000;
-/** What happened to control waits so long for its turn to be said, and is then no news any more [ms]. */
+/** What happened to control waits at most so long to be announced; later it is dropped [ms]. */
 const NEWS_MS = 20_000;
-/** What happened longer before it was told is no news [ms]. */
+/** An event received later than this is not announced [ms]. */
 const FRESH_MS = 5000;
 /** A page that wakes has more to tell at once, and the last to speak would take the place of the others [ms]. */
 const SETTLES_MS = 400;
@@ -55,7 +55,7 @@ export class Control {
     import('./control-sheet.js').then(({ openControl }) => openControl(this.store, this)).catch(() => this.say('The list of operators could not be loaded.', 'Not opened'));
   }
 
-  /** Told once of every refusal, so that whoever says it can offer a way. @param {import('../core/store.js').Answer} answer */
+  /** Called once for every refusal, so that its notice can offer a key. @param {import('../core/store.js').Answer} answer */
   note(answer) {
     this.#refused = answer.heldBy && answer.reason ? { reason: answer.reason, at_ms: this.store.now() } : null;
   }
@@ -77,7 +77,7 @@ export function mount(snacks, store, control) {
   const text = html('span');
   const keep = html('button', { type: 'button', class: 'key' }, 'Keep');
   const give = html('button', { type: 'button', class: 'key solid' }, 'Hand over');
-  const asks = html('div', { class: 'snack asks', role: 'alert', 'data-f': 'asks' },
+  const prompt = html('div', { class: 'snack asks', role: 'alert', 'data-f': 'asks' },
     html('div', { class: 'side' }, icon('operator')), html('div', { class: 'tx' }, html('b', {}, 'Control requested'), text), html('div', { class: 'ac' }, keep, give));
   let asking = '';
   /** @type {{notice: NonNullable<ReturnType<typeof noticeOf>>, at_ms: number} | null} */
@@ -88,28 +88,28 @@ export function mount(snacks, store, control) {
     const { control: now } = store;
     const request = store.isSilent ? null : askedOf(now, store.page);
     asking = request?.page ?? '';
-    if (!request) asks.remove();
-    else if (!asks.isConnected) snacks.prepend(asks);
+    if (!request) prompt.remove();
+    else if (!prompt.isConnected) snacks.prepend(prompt);
     if (request) setWords(text, `${request.name} gets it in ${seconds(request.left_s - store.lag_s)} unless you keep it.`);
   }
 
   /** @param {import('../core/protocol-types.js').LogEvent[]} events */
   function announce(events) {
-    const now_ms = store.frame?.server.time_ms ?? Infinity; // a page that was just loaded is told old news: who has control now, the bar says
+    const now_ms = store.frame?.server.time_ms ?? Infinity; // a page that was just loaded receives old events: the bar shows who has control now
     const notice = events.filter((event) => event.change === 'control' && now_ms - event.at_ms <= FRESH_MS).map((event) => noticeOf(event, store.page)).findLast((one) => one !== null);
     if (notice) news = { notice, at_ms: store.now() };
     speak();
   }
 
-  /** It takes no other notice's place: that this page was blind, or why an order was refused, is told first. */
+  /** It takes no other notice's place: that this page was blind, or why an order was refused, is shown first. */
   function speak() {
     if (!news || snacks.querySelector('.note:not([data-of="control"])')) return;
-    const { notice: { title, text: words, offers }, at_ms } = news;
+    const { notice: { title, text, offers }, at_ms } = news;
     if (store.now() - at_ms < SETTLES_MS) return;
     news = null;
     if (store.now() - at_ms > NEWS_MS) return;
     const way = offers ? { label: offers === 'take' ? 'Take control' : 'Request it', act: () => void control.order(offers) } : undefined;
-    control.say(words, title, way);
+    control.say(text, title, way);
     setAttribute(need(snacks, '.note'), 'data-of', 'control');
   }
 
@@ -120,7 +120,7 @@ export function mount(snacks, store, control) {
     store.on('log', announce),
     store.on('switch', () => {
       news = null;
-      asks.remove();
+      prompt.remove();
     }),
     listen(keep, 'click', () => void control.order('keep', { to: asking })),
     listen(give, 'click', () => void control.handOver(asking)),

@@ -4,7 +4,7 @@ const KEY = 'catgraph.device';
 const SIGNS = 'abcdefghjkmnpqrstuvwxyz23456789'; // none that is mistaken for another
 
 /**
- * The kind of device in a user agent, in few words.
+ * The kind of device in a user agent, in short.
  * @param {string} userAgent
  */
 export function kindOf(userAgent) {
@@ -40,7 +40,7 @@ export function deviceName(userAgent, storage, random = (n) => Math.floor(Math.r
   return name;
 }
 
-/** Where names are kept; a browser may refuse even to be asked. */
+/** Where names are kept; a browser may refuse access to it. */
 export function keptHere() {
   try {
     return window.localStorage;

@@ -1,4 +1,4 @@
-// Who is on duty, in words: pure functions of what the server told.
+// The texts of who is on duty: pure functions of what the server sent.
 
 import { timeOfDay } from '../core/format.js';
 

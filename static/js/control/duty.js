@@ -1,4 +1,4 @@
-// Who is on duty at this device: asks once who it is where there is a list, tells how a duty ended, shows a hand-over.
+// Who is on duty at this device: prompts once where there is a list of people, notifies of the end of a duty, shows a hand-over.
 
 import { LeftNotice, dutyWords, partOf } from './duty-layout.js';
 import { isLeftBehind } from '../alarms/standing.js';
@@ -6,8 +6,8 @@ import { field, listen, need, setText } from '../core/dom.js';
 import { request } from './request.js';
 import { closeSheet, mustWait } from '../shell/sheet.js';
 
-/** In this tab it was asked already who is on duty. */
-const ASKED = 'catgraph.asked-duty';
+/** Set once this tab has prompted for who is on duty. */
+const PROMPTED = 'catgraph.asked-duty';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
@@ -24,7 +24,7 @@ const ASKED = 'catgraph.asked-duty';
  * Opens who is on duty here, and the list to sign on from.
  * @param {DutyStore & {name?: string}} store
  * @param {Say} say
- * @param {() => boolean} [mayOpen] asked once it is loaded
+ * @param {() => boolean} [mayOpen] called once it is loaded
  * @returns {Promise<boolean | null>} whether it opened; null: it could not be loaded
  */
 export function openDuty(store, say, mayOpen = () => true) {
@@ -61,22 +61,22 @@ function mayAsk(store) {
   return store.frame !== null && !isSlowing(store) && !document.querySelector('dialog[open]') && !document.documentElement.hasAttribute('data-replay');
 }
 
-/** Asks once in this tab, and never over another sheet: whoever does not want to sign on closes it. @param {Store} store @param {Say} say */
+/** Prompts once in this tab, and never over another sheet: whoever does not want to sign on closes it. @param {Store} store @param {Say} say */
 function asker(store, say) {
-  let isAskedHere = false; // or it cannot be, or it is being opened
+  let isPromptedHere = false; // or it cannot be, or it is being opened
 
   return async () => {
-    if (isAskedHere || !mayAsk(store)) return;
-    isAskedHere = true;
+    if (isPromptedHere || !mayAsk(store)) return;
+    isPromptedHere = true;
     try {
-      if (sessionStorage.getItem(ASKED)) return;
-      sessionStorage.setItem(ASKED, '');
+      if (sessionStorage.getItem(PROMPTED)) return;
+      sessionStorage.setItem(PROMPTED, '');
     } catch {
-      return; // it cannot be remembered that it was asked
+      return; // a page without storage would prompt at each load
     }
     const isOpen = await openDuty(store, say, () => mayAsk(store));
-    if (isOpen) sessionStorage.setItem(ASKED, '1');
-    isAskedHere = isOpen !== false;
+    if (isOpen) sessionStorage.setItem(PROMPTED, '1');
+    isPromptedHere = isOpen !== false;
   };
 }
 
@@ -141,7 +141,7 @@ function handoverNotice(store, say) {
 export function mount(store, say) {
   const menu = /** @type {HTMLDialogElement} */ (need(document, '#sheet-menu'));
   const key = field(menu, 'duty');
-  const words = field(menu, 'duty-words');
+  const text = field(menu, 'duty-words');
   const showEnded = dutyEndedNotice(store, say);
   const askOnce = asker(store, say);
   const drawHandover = handoverNotice(store, say);
@@ -149,7 +149,7 @@ export function mount(store, say) {
 
   function draw() {
     const { duty } = store;
-    setText(words, dutyWords(duty));
+    setText(text, dutyWords(duty));
     if (!duty || store.isViewer) return;
     showEnded();
     showLeft();
@@ -171,7 +171,7 @@ export function mount(store, say) {
   return () => stops.forEach((stop) => stop());
 }
 
-/** Opens the hand-over that concerns this page. @param {import('../core/store.js').Store} store @param {import('./control.js').Say} say @param {(isByHand: boolean) => void} [onClosed] @param {() => boolean} [mayOpen] asked once it is loaded */
+/** Opens the hand-over that concerns this page. @param {import('../core/store.js').Store} store @param {import('./control.js').Say} say @param {(isByHand: boolean) => void} [onClosed] @param {() => boolean} [mayOpen] called once it is loaded */
 export function openHandover(store, say, onClosed = () => {}, mayOpen = () => true) {
   import('./handover-sheet.js').then(({ HandoverSheet }) => {
     if (!mustWait() && mayOpen() && !document.querySelector('#sheet-handover[open]')) new HandoverSheet(store, say, onClosed);

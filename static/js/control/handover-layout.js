@@ -1,4 +1,4 @@
-// A hand-over, in words: what the taker reads back. Fetched with its sheet.
+// The texts of a hand-over: what the taker reads back. Fetched with its sheet.
 
 import { isLeftBehind, snackWords } from '../alarms/standing.js';
 import { sinceTime, timeOfDay } from '../core/format.js';
@@ -10,10 +10,10 @@ import { sinceTime, timeOfDay } from '../core/format.js';
 
 /** The second line of a line. @param {HandoverLine} line */
 export function lineWords({ text, since_ms, until_ms, off_duty_ms }) {
-  const words = off_duty_ms ? `${text.replace(/\.$/, '')}, off duty since ${sinceTime(off_duty_ms)}` : text; // who has acknowledged it ends the text
+  const line = off_duty_ms ? `${text.replace(/\.$/, '')}, off duty since ${sinceTime(off_duty_ms)}` : text; // who has acknowledged it ends the text
   const since = since_ms === null ? '' : `since ${timeOfDay(since_ms)}`;
   const until = until_ms === null ? '' : `back at ${timeOfDay(until_ms)}`;
-  return [words, since || until].filter(Boolean).join(' · ');
+  return [line, since || until].filter(Boolean).join(' · ');
 }
 
 /**

@@ -33,7 +33,7 @@ export class HandoverSheet {
     this.count = html('span', { class: 'sub' });
     this.by = html('bdi');
     this.to = html('bdi');
-    this.words = html('p', { class: 'sub', id: 'handover-words' });
+    this.text = html('p', { class: 'sub', id: 'handover-words' });
     this.list = html('ul', { class: 'read-back', 'aria-label': 'What is in force' });
     this.keyTitle = html('b');
     this.keyText = html('span');
@@ -44,7 +44,7 @@ export class HandoverSheet {
     this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed duty-sheet', id: 'sheet-handover', 'aria-labelledby': 'handover-title', 'aria-describedby': 'handover-words' },
       html('div', { class: 'duty-head' }, html('h2', { id: 'handover-title', tabindex: '-1' }, 'Hand over'), this.count, close),
       html('div', { class: 'duty-body', tabindex: '0', role: 'group', 'aria-label': 'What is in force' },
-        html('div', { class: 'from-to' }, this.by, icon('next'), this.to), this.words, this.list),
+        html('div', { class: 'from-to' }, this.by, icon('next'), this.to), this.text, this.list),
       html('div', { class: 'duty-keys' }, this.bad, this.key, this.end)));
     const stops = [store.on('draw', () => this.#draw()), addSheet(this.sheet)];
     let isByHand = false;
@@ -80,7 +80,7 @@ export class HandoverSheet {
     setText(this.count, `${handover.lines.length - handover.left} of ${handover.lines.length} read back`);
     drawName(this.by, handover.by);
     drawName(this.to, handover.name);
-    setWords(this.words, part === 'taker' ? `Say each line aloud and press it. Control stays with ${handover.by} until the last line.` : `${handover.name} says each line aloud and presses it. You stay in control until the last line.`);
+    setWords(this.text, part === 'taker' ? `Say each line aloud and press it. Control stays with ${handover.by} until the last line.` : `${handover.name} says each line aloud and presses it. You stay in control until the last line.`);
     this.#drawLines(handover, part);
     show(this.key, part === 'taker');
     setText(this.keyTitle, end.title);

@@ -1,4 +1,4 @@
-// The list of people, in words. Fetched with the list.
+// The texts of the list of people. Fetched with the list.
 
 import { timeOfDay } from '../core/format.js';
 

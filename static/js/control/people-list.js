@@ -14,10 +14,10 @@ import { counted } from '../core/format.js';
 
 /**
  * @param {HTMLElement} place
- * @param {HTMLDetailsElement} group in which it lies: what is folded away asks nothing
+ * @param {HTMLDetailsElement} group in which it is: while folded it requests nothing
  * @param {import('../core/store.js').Store} store
  * @param {Say} say
- * @param {(words: string) => void} head says at the group's head what holds
+ * @param {(text: string) => void} head shows the state in the group's summary
  */
 export async function mount(place, group, store, say, head) {
   await styled('people');
@@ -31,7 +31,7 @@ export async function mount(place, group, store, say, head) {
 class PeopleGroup {
   #drawn = '';
 
-  /** @param {HTMLElement} place @param {HTMLDetailsElement} group @param {import('../core/store.js').Store} store @param {Say} say @param {(words: string) => void} head */
+  /** @param {HTMLElement} place @param {HTMLDetailsElement} group @param {import('../core/store.js').Store} store @param {Say} say @param {(text: string) => void} head */
   constructor(place, group, store, say, head) {
     this.group = group;
     this.say = say;

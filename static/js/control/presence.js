@@ -1,8 +1,8 @@
-// Tells the server once a second how this page stands: whether it is seen, whether it draws, and whether an alarm would be heard from it.
+// Reports the state of this page once a second: whether it is seen, whether it draws, and whether an alarm would be audible.
 
-/** A word so often while nothing changes [ms]; three are missed before control lapses. */
+/** A report so often while nothing changes [ms]; three are missed before control lapses. */
 const EVERY_MS = 1000;
-/** An age beyond this says no more [s]. */
+/** An age beyond this is not distinguished [s]. */
 const MOST_LAG_S = 86_400;
 
 export class Presence {
@@ -22,19 +22,19 @@ export class Presence {
     this.deviceStatus = deviceStatus;
     const look = () => this.#look();
     store.on('tick', look);
-    store.on('duty', look); // who is on duty is logged with the next word
+    store.on('duty', look); // who is on duty is logged with the next report
     store.on('beat', look); // while the page is hidden frames come and its timers hardly run
     store.sync.whenOpen(() => {
       this.#sent_ms = -Infinity;
       look();
     });
-    store.on('leave', () => this.#send({ ...this.#word(), leaves: true }));
+    store.on('leave', () => this.#send({ ...this.#report(), leaves: true }));
     document.addEventListener('visibilitychange', look);
     window.addEventListener('pageshow', look);
-    window.addEventListener('pagehide', () => this.#send({ ...this.#word(), leaves: true }));
+    window.addEventListener('pagehide', () => this.#send({ ...this.#report(), leaves: true }));
   }
 
-  #word() {
+  #report() {
     const { alarmSound, arms } = this.arming;
     return {
       visible: !document.hidden,
@@ -49,19 +49,19 @@ export class Presence {
   }
 
   #look() {
-    const word = this.#word();
-    const key = JSON.stringify([word, this.store.duty]);
+    const report = this.#report();
+    const key = JSON.stringify([report, this.store.duty]);
     const now_ms = this.store.now();
     if (key === this.#sent && now_ms - this.#sent_ms < EVERY_MS) return;
-    if (!this.#send(word)) return;
+    if (!this.#send(report)) return;
     this.#sent = key;
     this.#sent_ms = now_ms;
   }
 
-  /** @param {object} word */
-  #send(word) {
+  /** @param {object} report */
+  #send(report) {
     const { seal: { named }, sync } = this.store;
     if (!named || !sync.hasGreeted) return false; // before its hello the server would count it as another page
-    return this.store.socket.send({ kind: 'present', ...word, ...named, lag_s: Math.min(MOST_LAG_S, this.store.lag_s) });
+    return this.store.socket.send({ kind: 'present', ...report, ...named, lag_s: Math.min(MOST_LAG_S, this.store.lag_s) });
   }
 }

@@ -6,7 +6,7 @@ import { ownName } from './own-name.js';
 const SILENT = 'The server does not answer.';
 
 /**
- * Asks the server; a refusal is an Error with its sentence.
+ * Sends a request to the server; a refusal is an Error with its reason.
  * @param {string} path
  * @param {{method?: string, body?: object, signal?: AbortSignal}} [how]
  * @returns {Promise<any>}

@@ -17,7 +17,7 @@ import { stateWords } from '../drive/departure-layout.js';
  * @typedef {PersonRow['role']} Role
  */
 
-/** @param {DutyStore} store @param {import('./duty.js').Say} say @param {() => boolean} [mayOpen] asked once it is loaded @returns {Promise<boolean>} whether it opened */
+/** @param {DutyStore} store @param {import('./duty.js').Say} say @param {() => boolean} [mayOpen] called once it is loaded @returns {Promise<boolean>} whether it opened */
 export async function openSignOn(store, say, mayOpen = () => true) {
   await styled('people');
   if (mustWait() || !mayOpen() || document.querySelector('#sheet-duty[open]')) return false;
@@ -41,7 +41,7 @@ class SignOn {
     this.store = store;
     this.say = say;
     this.title = html('h2', { id: 'duty-title' }, 'Who is on duty?');
-    this.words = html('p', { class: 'sub', id: 'duty-words' });
+    this.text = html('p', { class: 'sub', id: 'duty-words' });
     this.rows = html('ul', { class: 'people-rows', 'aria-label': 'People' });
     this.name = /** @type {HTMLInputElement} */ (html('input', { type: 'text', maxlength: 30, autocomplete: 'off', autocapitalize: 'words', spellcheck: 'false', enterkeyhint: 'done', 'aria-label': 'Name or initials', placeholder: 'Name or initials' }));
     this.field = html('div', { class: 'field', hidden: true }, this.name);
@@ -56,7 +56,7 @@ class SignOn {
     const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close', 'data-f': 'no' }, icon('close'));
     this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed duty-sheet', id: 'sheet-duty', 'aria-labelledby': 'duty-title', 'aria-describedby': 'duty-words' },
       html('div', { class: 'duty-head' }, this.title, close),
-      html('div', { class: 'duty-body', tabindex: '0', role: 'group', 'aria-label': 'List of people' }, this.words, this.rows, this.field),
+      html('div', { class: 'duty-body', tabindex: '0', role: 'group', 'aria-label': 'List of people' }, this.text, this.rows, this.field),
       this.role, html('div', { class: 'duty-keys' }, this.bad, this.key, this.departure, this.off)));
     const stops = [store.on('duty', () => void this.#ask()), addSheet(this.sheet)];
     this.sheet.addEventListener('close', () => stops.forEach((stop) => stop()), { once: true });
@@ -139,7 +139,7 @@ class SignOn {
     const row = this.#list?.people.find((one) => one.id === this.#chosen);
     const isNew = this.#chosen === NEW;
     setText(this.title, me ? `${me.name} is on duty` : 'Who is on duty?');
-    setWords(this.words, me ? `As ${me.title} since ${timeOfDay(me.since_ms).slice(0, 5)}. Choose another person if this device changes hands.` : 'The name goes with every order, acknowledgement and setting of this device.');
+    setWords(this.text, me ? `As ${me.title} since ${timeOfDay(me.since_ms).slice(0, 5)}. Choose another person if this device passes to another person.` : 'The name goes with every order, acknowledgement and setting of this device.');
     for (const key of this.rows.querySelectorAll('[data-person]')) setAttribute(key, 'aria-pressed', String(key.getAttribute('data-person') === this.#chosen));
     for (const key of this.roles.children) setAttribute(key, 'aria-pressed', String(key.getAttribute('data-role-key') === this.#role));
     show(this.field, isNew);

@@ -1,5 +1,5 @@
-// What a viewer sees: every key that would change something is greyed, and a press on it says why. The server refuses the
-// same by itself; this is so that nobody is surprised.
+// What a viewer sees: every key that would change something is greyed, and a press on it shows why. The server refuses the
+// same by itself; here the reason is visible before a press.
 
 import { styled } from '../core/style-sheet.js';
 import { need } from '../core/dom.js';
@@ -7,7 +7,7 @@ import { isAsked } from '../shell/sheet.js';
 
 export const WHY = 'This device is paired as a viewer. An operator can change that: Settings, Paired devices.';
 
-/** The keys of an operator. One that is missing here is refused by the server, in the same words. */
+/** The keys of an operator. The server refuses a key that is missing here, with the same text. */
 const KEYS = [
   '#monitor :is([data-f="stop"], [data-f="pause"], [data-f="slow"])', '.sheet [data-f="slow"]', '#sheet-menu [data-f="record"]', '[data-f="files-record"]',
   '#connect [data-f="go"]', '#sheet-stop [data-f="yes"]', '.sheet:is(#sheet-lost, #sheet-mute, #sheet-failed) [data-f="retry"]',
@@ -23,8 +23,8 @@ const KEYS = [
 export function mountViewer(store, say) {
   styled('access');
   const acknowledge = need(document, '#sheet-alarm [data-f="acknowledge"]');
-  const word = acknowledge.lastChild;
-  const usual = word?.textContent ?? '';
+  const label = acknowledge.lastChild;
+  const usual = label?.textContent ?? '';
 
   /** @param {Event} event */
   const hold = (event) => {
@@ -33,7 +33,7 @@ export function mountViewer(store, say) {
     event.stopImmediatePropagation();
     if (event.type !== 'click' && event.type !== 'submit') return;
     const sheet = event.target.closest('dialog');
-    if (sheet && isAsked(sheet)) sheet.close(); // what is said stands beneath it
+    if (sheet && isAsked(sheet)) sheet.close(); // the message is shown beneath it
     say(WHY, 'A viewer can only watch');
   };
   for (const type of ['click', 'pointerdown', 'input', 'change', 'submit']) document.addEventListener(type, hold, { capture: true });
@@ -42,7 +42,7 @@ export function mountViewer(store, say) {
     const { isViewer } = store;
     document.documentElement.toggleAttribute('data-viewer', isViewer);
     // The alarm's own key closes it on this phone: it stays unacknowledged for who may acknowledge it.
-    if (word) word.textContent = isViewer ? 'Close here' : usual;
+    if (label) label.textContent = isViewer ? 'Close here' : usual;
     for (const key of document.querySelectorAll(KEYS)) {
       if (isViewer) key.setAttribute('aria-disabled', 'true');
       else if (key.getAttribute('aria-disabled') === 'true') key.removeAttribute('aria-disabled');

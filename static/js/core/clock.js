@@ -9,7 +9,7 @@ const READING_MS = 5;
 
 /**
  * Bounds how far this page's clock is ahead of the server's. A message was received after it was sent: (receive − sent) is
- * never too small. It was sent after the server had received what it follows: (asked − sent) is never too large. The bounds
+ * never too small. It was sent after the server had received what it follows: (request − sent) is never too large. The bounds
  * hold for one run of the server, over all connections to it, and widen by the drift.
  */
 export class ServerClock {

@@ -1,6 +1,6 @@
 // When the values on the glass may be believed: the page's own watch over its frames.
 
-/** After so long without a fresh frame the values are covered [ms]. The CSS animation in veil.css says the same. */
+/** After so long without a fresh frame the values are covered [ms]. The CSS animation in veil.css has the same time. */
 export const COVER_AFTER_MS = 2000;
 /** A frame older than this is not service, it is a memory [ms]. */
 export const STALE_FRAME_MS = 2000;

@@ -130,7 +130,7 @@ export function show(element, isShown) {
 }
 
 /**
- * Keep an attribute of `element` as something else is: a rule of style that asked for it (`:has()`) would be asked anew for
+ * Keep an attribute of `element` as something else is: a style rule with `:has()` would be evaluated anew for
  * every element with every frame.
  * @param {Element} element
  * @param {string} name

@@ -6,7 +6,7 @@ import { fixed } from './format.js';
 export class DrawProof {
   #n = 0;
   #text = html('span');
-  #words = html('span');
+  #sentence = html('span');
 
   /** Does writing have an effect? */
   isDrawn() {
@@ -14,9 +14,9 @@ export class DrawProof {
     const [now, speed] = [`proof ${this.#n}`, fixed(this.#n + 0.25)];
     setText(this.#text, now);
     setAttribute(this.#text, 'data-n', this.#n);
-    setWords(this.#words, `at ${speed} m`);
-    const [text, words] = [this.#text, this.#words];
-    return textOf(text) === now && text.attributes[0]?.value === String(this.#n) && speed.length === 3 && textOf(words) === 'at ' && textOf(words.childNodes[1]) === speed;
+    setWords(this.#sentence, `at ${speed} m`);
+    const [text, sentence] = [this.#text, this.#sentence];
+    return textOf(text) === now && text.attributes[0]?.value === String(this.#n) && speed.length === 3 && textOf(sentence) === 'at ' && textOf(sentence.childNodes[1]) === speed;
   }
 }
 

@@ -18,7 +18,7 @@ export class EventLog {
   last = null;
   /** The run of the server that it is of. @type {string | null} */
   #boot = null;
-  /** The run that greeted, until it said where its log goes on for this page. @type {string | null} */
+  /** The run that greeted, until it states where its log continues for this page. @type {string | null} */
   #joining = null;
   /** What this page had of logs that it left, oldest first, and the moment of the newest; events after a number are new in the present log. */
   #left = { events: /** @type {Set<string>} */ (new Set()), newest_ms: -Infinity, new_after: 0 };

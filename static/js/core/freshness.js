@@ -7,7 +7,7 @@ export const LAG_GRACE_S = 0.6;
  * @typedef {import('./protocol-types.js').SignalState<any>} Signal
  * @typedef {import('./protocol-types.js').SignalFreshness} Freshness
  * @typedef {import('./protocol-types.js').Question} Question
- * @typedef {Freshness | 'not_chosen' | 'not_in_unit'} Ink not_chosen: which topic carries the signal is asked; not_in_unit: its unit is asked
+ * @typedef {Freshness | 'not_chosen' | 'not_in_unit'} Ink not_chosen: the topic of the signal is still to be chosen; not_in_unit: its unit is
  */
 
 /**

@@ -17,7 +17,7 @@ export const ABSENT = /** @type {Record<Absent, string>} */ ({
 export const isAbsent = (ink) => ink in ABSENT;
 
 /**
- * Write `text` as a value of this freshness; where there is none, say so in words and never write 0.
+ * Write `text` as a value of this freshness; where there is none, write that as text and never 0.
  * @param {HTMLElement} element of class n
  * @param {Freshness} ink
  * @param {string} text

@@ -9,7 +9,7 @@ export function keptVehicle() {
 }
 
 /**
- * An address of this server as it is to be asked for now. A page turns to other cars: what outlasts that keeps the answer.
+ * An address of this server as it is to be requested now. The page changes to other cars: what outlasts such a change stores this address.
  * @param {string} path
  */
 export function keptAt(path) {

@@ -29,7 +29,7 @@ export class Known {
   judgedBy = { topics: {}, units: {} };
   /** Who this page is to the server. @type {import('./protocol-types.js').Hello['who'] | null} */
   who = null;
-  /** Who is on duty at this device; null: the server has not told. @type {import('./protocol-types.js').Duty | null} */
+  /** Who is on duty at this device; null: not received yet. @type {import('./protocol-types.js').Duty | null} */
   duty = null;
   /** The build of the page that the server has now; '' where it cannot say. */
   build = '';
@@ -53,7 +53,7 @@ export class Known {
     return isFirst;
   }
 
-  /** The list of all cars came; a web node hears of more of them as time goes on. @param {import('./protocol-types.js').Cars} cars */
+  /** The list of all cars came; a web node finds more of them over time. @param {import('./protocol-types.js').Cars} cars */
   list(cars) {
     this.cars = cars;
     this.vehicles = cars.cars.map(({ name }) => name);
@@ -79,12 +79,12 @@ export class Known {
     return this.who?.role === 'viewer';
   }
 
-  /** The name under which this page's orders are logged; '' where the server has not told. */
+  /** The name under which this page's orders are logged; '' before the server has sent it. */
   get signs() {
     return this.duty?.signs ?? '';
   }
 
-  /** What must be heard of: the live car, also while a recording is shown. @returns {State | null} */
+  /** The car whose alarms must be announced: the live one, also while a recording is shown. @returns {State | null} */
   get heeded() {
     return liveOf(this.frame);
   }

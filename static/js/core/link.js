@@ -1,4 +1,4 @@
-// What is known of the chain phone – server – bridge – car, and in which words: pure functions, no DOM.
+// The state of the chain phone – server – bridge – car, and its texts: pure functions, no DOM.
 
 import { age, timeOfDay } from './format.js';
 import { isWeak } from './round-trip.js';
@@ -11,7 +11,7 @@ import { isWeak } from './round-trip.js';
  * @property {'Live' | 'Silent' | 'Lost' | 'Dialling' | 'Waiting' | 'Waking' | 'Replay'} word
  * @property {number | null} age_s age of what is beyond the cut, or of the car's newest message
  * @property {0 | 1 | 2 | null} cut the broken wire: after the phone, the server or the bridge
- * @property {number | null} since_ms wall clock: when what is beyond the cut was last heard
+ * @property {number | null} since_ms wall clock: when what is beyond the cut was last received
  * @property {Node[]} nodes phone, server, bridge, car
  * @property {string} sentence what fell silent
  * @property {string} detail what is known beside it
@@ -19,8 +19,8 @@ import { isWeak } from './round-trip.js';
  * @property {boolean} [isUnserved] the server answers, and has nothing of the car
  */
 
-/** A car that has said nothing for so long after the bridge answered is called silent [s]. */
-const FIRST_WORD_S = 2;
+/** A car that has sent nothing for so long after the bridge answered is called silent [s]. */
+const FIRST_MESSAGE_S = 2;
 const NAMES = ['Phone', 'Server', 'Bridge', 'Car'];
 const BY_AGENT = ['Phone', 'Server', 'Agent', 'Car'];
 
@@ -69,7 +69,7 @@ function viewOf({ frame, isSilent, silence_s, lag_s, heard_ms, unserved = '' }) 
   }
   const live = ['here', `${age(lag_s)} s`, bridge_s === null ? 'answers' : `${age(bridge_s)} s`];
   const silent_s = car_s ?? older(session.connected_for_s, lag_s);
-  if (link.cut === 'bridge-car' || (car_s === null && (silent_s ?? 0) > FIRST_WORD_S)) {
+  if (link.cut === 'bridge-car' || (car_s === null && (silent_s ?? 0) > FIRST_MESSAGE_S)) {
     return {
       word: 'Silent', age_s: silent_s, cut: 2, since_ms: link.since_ms,
       nodes: nodesOf(2, [...live, silent_s === null ? 'silent' : `silent ${age(silent_s)} s`]),

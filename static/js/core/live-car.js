@@ -1,8 +1,8 @@
-// What a frame says of the live car, also while the page shows a recording.
+// The live car of a frame, also while the page shows a recording.
 
 /** @typedef {import('./protocol-types.js').State} State */
 
-/** What must be heard of; null: nothing is known of it. @param {State | null} frame @returns {State | null} */
+/** The frame whose alarms must be announced; null: there is none. @param {State | null} frame @returns {State | null} */
 export function liveOf(frame) {
   if (!frame?.replay) return frame;
   const { live } = frame;
@@ -24,7 +24,7 @@ export function controlOf(frame) {
  * The number of the lease by which a page is in control; null: it is not.
  * @param {ReturnType<typeof controlOf>} control as the newest frame has it
  * @param {string} page by which the server knows the page
- * @param {number | null} granted what an answer said, until the frames have it
+ * @param {number | null} granted as an answer stated, until the frames have it
  */
 export function fenceOf(control, page, granted) {
   const known = control?.page === page && page ? (control.fence ?? null) : null;

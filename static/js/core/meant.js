@@ -2,7 +2,7 @@
 
 /** So long after it came or moved a key takes no press [ms]. */
 const MEANT_MS = 400;
-/** What an event says of its time is not believed beyond so much [ms]. */
+/** An event's own time is not trusted beyond so much [ms]. */
 const OLDEST_MS = 10_000;
 
 /** When a finger or a key did it, by `performance.now()`: a busy page gets it later. @param {Event} event */

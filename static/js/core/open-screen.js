@@ -1,4 +1,4 @@
-// Any part of the page asks for a screen; shell/screens.js shows it.
+// Any part of the page can request a screen; shell/screens.js shows it.
 
 /**
  * @param {string} screen

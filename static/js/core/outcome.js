@@ -1,9 +1,9 @@
-// What became of a command, in words: carried out, refused, not delivered, or not known. The one place that words it.
+// The outcome of a command as text: carried out, refused, not delivered, or not known. The only place with these texts.
 
 /**
  * @typedef {import('./protocol-types.js').Reply} Reply
  * @typedef {NonNullable<Reply['outcome']>} Outcome
- * @typedef {NonNullable<Reply['became']> | 'done_late' | 'not_delivered'} Became the last two: as its own answer said, which came late
+ * @typedef {NonNullable<Reply['became']> | 'done_late' | 'not_delivered'} Became the last two: from its own answer, which came late
  * @typedef {NonNullable<Reply['cut']> | 'page-server'} Cut
  * @typedef {Exclude<import('./protocol-types.js').PageMessage['kind'], 'hello' | 'take' | 'have' | 'watch' | 'replay' | 'present' | 'position' | 'outcome'>} Ordered
  */

@@ -37,7 +37,7 @@ export class PageWatch {
   }
 
   /**
-   * For how long the phone slept since this was asked last [ms]: its monotonic clock stands still meanwhile, its wall clock does not.
+   * For how long the phone slept since the last call [ms]: its monotonic clock stands still meanwhile, its wall clock does not.
    * @param {number} now_ms monotonic
    */
   slept_ms(now_ms) {

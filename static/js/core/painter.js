@@ -1,4 +1,4 @@
-// When the page draws: what moves ten times a second, the rest five times, what asks for the operator at once. And whether it could.
+// When the page draws: what moves ten times a second, the rest five times, what needs the operator at once. And whether it could.
 
 import { Drawing } from './drawing.js';
 
@@ -62,7 +62,7 @@ export class Painter {
   }
 
   /**
-   * A fresh frame came: what asks for the operator is drawn at once; pointers ten times a second, the rest five times and with them.
+   * A fresh frame came: what needs the operator is drawn at once; pointers ten times a second, the rest five times and with them.
    * @param {import('./protocol-types.js').State} frame
    * @param {number} now_ms when it came
    * @param {boolean} isFirst nothing moves yet that a picture could fall between
@@ -92,7 +92,7 @@ export class Painter {
     if (!this.drawing.isFailed) return;
     if (!wasFailed) console.error('Nothing was drawn for 1 s');
     this.undrawn?.show();
-    this.#isMoved = false; // a picture that was asked for may never come
+    this.#isMoved = false; // a requested animation frame may never come
     this.#turns.clear();
     this.#isTurning = false;
   }
@@ -113,7 +113,7 @@ export class Painter {
     if (!this.drawing.isFailed) this.undrawn?.hide();
   }
 
-  /** The page covers itself: what was to be drawn, heard or sounded was not. @param {unknown} error */
+  /** The page covers itself: what was to be drawn, handled or sounded was not. @param {unknown} error */
   failed(error) {
     this.#hasFailed = true;
     this.drawing.failed();

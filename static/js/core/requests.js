@@ -1,10 +1,10 @@
-// What the page asked the server for, until it is answered; and of what was not answered, what became of it.
+// The requests of the page until they are answered, and the outcome of those that were not answered.
 
 import { maybe, withCut } from './outcome.js';
 
 /** A command is for now: without an answer by then it is not known what became of it [ms]. */
 const REPLY_MS = 4000;
-/** What became of a command that was not answered is asked so often [ms], and for so long. */
+/** The outcome of an unanswered command is queried so often [ms], and for so long. */
 const LOOKS_EVERY_MS = 1500;
 const LOOKS_FOR_MS = 60_000;
 /** So many of them at most; the oldest is given up. */
@@ -13,7 +13,7 @@ const MOST_LOST = 20;
 /**
  * @template {string} Kind
  * @typedef {import('./protocol-types.js').PageMessage extends infer One ? One extends {kind: Kind} ? Omit<One, 'kind' | 'id'> : never : never} FieldsOf
- *   what a command of this kind says
+ *   the fields of a command of this kind
  */
 
 /**
@@ -25,7 +25,7 @@ const MOST_LOST = 20;
  * @typedef {import('./outcome.js').Cut} Cut
  * @typedef {{kind: string, became: Became, reason: string, cut: Cut | null}} Found what became of a command that was not answered
  * @typedef {{kind: string, vehicle: unknown, at_ms: number, cut: Cut | null}} Lost cut: where, where known
- * @typedef {{kind: string, vehicle: unknown, at_ms: number, isSent: boolean, resolve: (answer: Answer) => void}} Waiting at_ms: when it was asked for
+ * @typedef {{kind: string, vehicle: unknown, at_ms: number, isSent: boolean, resolve: (answer: Answer) => void}} Waiting at_ms: when it was requested
  */
 
 const NOT_SENT = { ok: false, outcome: /** @type {const} */ ('not_delivered'), reason: 'Not sent: the server does not answer.', isBroken: true };
@@ -34,7 +34,7 @@ const NOT_SIGNED = { ok: false, outcome: NOT_SENT.outcome, reason: 'Not sent: th
 const ONLY_OF_PAGE = new Set(['replay', 'outcome', 'mark', 'remove_mark']);
 
 export class Requests {
-  #asked = 0;
+  #count = 0;
   /** Begins each id: those of another visit of this page are others. */
   #visit = [...crypto.getRandomValues(new Uint8Array(4))].map((byte) => byte.toString(16).padStart(2, '0')).join('');
   /** @type {Map<string, Waiting>} */
@@ -69,8 +69,8 @@ export class Requests {
    * @returns {Promise<Answer>}
    */
   ask(kind, fields, within_ms = REPLY_MS) {
-    this.#asked += 1;
-    const id = `${this.#visit}-${this.#asked}`;
+    this.#count += 1;
+    const id = `${this.#visit}-${this.#count}`;
     const message = { kind, id, ...fields };
     const asked_ms = performance.now();
     const sealed = this.#seal(message);
@@ -105,7 +105,7 @@ export class Requests {
     else this.#late(reply.id, answer, reply.cut ?? null);
   }
 
-  /** An answer that came when it was given up: nothing is cut but what it says. @param {string} id @param {Answer} answer @param {Cut | null} cut */
+  /** An answer that came when the request was given up: only the cut that it states counts. @param {string} id @param {Answer} answer @param {Cut | null} cut */
   #late(id, { ok, outcome, reason }, cut) {
     const lost = this.#lost.get(id);
     if (!lost) return;
@@ -118,7 +118,7 @@ export class Requests {
     for (const id of [...this.#waiting.keys()]) this.#lose(id, 'The connection to the server broke.', NOT_SENT, true);
   }
 
-  /** Another car is shown: what became of commands to the one before is not asked here. */
+  /** Another car is shown: the outcome of commands to the one before is not queried here. */
   forget() {
     this.#lost.clear();
   }

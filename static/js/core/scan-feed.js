@@ -1,11 +1,11 @@
-// The newest scan of the laser: asked for while anybody wants it, taken when it is offered.
+// The newest scan of the laser: requested while a part of the page needs it, taken when it is offered.
 
 import { readScan } from '../scan/scan-frame.js';
 
 export class ScanFeed {
   /** @type {import('../scan/scan-frame.js').Scan | null} */
   newest = null;
-  /** When the newest scan was asked for [ms, monotonic]: it cannot be older than its own age and that. */
+  /** When the newest scan was requested [ms, monotonic]: it cannot be older than its own age and that. */
   at_ms = -Infinity;
   #took_ms = -Infinity;
   /** @type {Set<string>} names of what wants the scan */

@@ -1,4 +1,4 @@
-// Signs what this device orders, by a key that cannot leave this browser: agents believe no web node who asks. server/protocol/signed_order.py.
+// Signs what this device orders, by a key that cannot leave this browser: an agent does not trust a web node's statement of who sent it. server/protocol/signed_order.py.
 
 const ALGORITHM = { name: 'ECDSA', namedCurve: 'P-256' };
 const SIGNING = { name: 'ECDSA', hash: 'SHA-256' };
@@ -9,11 +9,11 @@ const OWN = 'orders';
 /** A browser that has not found its key by then signs by a new one: no order may wait for its storage [ms]. */
 const KEPT_WITHIN_MS = 2000;
 
-/** What is of this page alone, what only asks, and what agents take without a signature: a mark may have waited on this phone. */
+/** Commands of this page alone, queries, and what agents accept without a signature: a mark may have waited on this phone. */
 const NO_ORDERS = new Set(['replay', 'outcome', 'mark', 'remove_mark', 'position', 'present']);
 
 /**
- * @typedef {object} Words what stands beside a command
+ * @typedef {object} Context what is signed beside a command
  * @property {string} vehicle
  * @property {string} challenge of the newest state of the car's agent
  * @property {string} by how this device is called
@@ -24,7 +24,7 @@ const NO_ORDERS = new Set(['replay', 'outcome', 'mark', 'remove_mark', 'position
  * @typedef {{text: string, key: string, signature: string}} Signed
  */
 
-/** What a page signs, once its server says that it passes orders on to agents, and by which key. */
+/** What a page signs, once its server states that it passes orders on to agents, and by which key. */
 export class Seal {
   #signs = false;
   /** @type {Signer | null} */
@@ -48,7 +48,7 @@ export class Seal {
     return this.#signer.isSettled ? this.#signer.named : null;
   }
 
-  /** The id of the key by which agents know this device; '' where it cannot sign; null: nobody asks for it. */
+  /** The id of the key by which agents know this device; '' where it cannot sign; null: no signature is required. */
   get key() {
     return this.#signs ? (this.#signer?.id ?? '') : null;
   }
@@ -63,7 +63,7 @@ export class Seal {
       if (!NO_ORDERS.has(message.kind)) console.error(`Sent unsigned, for no state of ${vehicle || 'the car'} names what to sign:`, message.kind);
       return null;
     }
-    return this.#signer?.sealed(message, this.#words(vehicle, challenge)) ?? null;
+    return this.#signer?.sealed(message, this.#context(vehicle, challenge)) ?? null;
   }
 
   /**
@@ -72,11 +72,11 @@ export class Seal {
    * @param {string} vehicle @param {string | undefined} challenge
    */
   async headers(command, long, vehicle, challenge) {
-    return this.#signs && challenge && this.#signer ? this.#signer.header(command, this.#words(vehicle, challenge), long) : {};
+    return this.#signs && challenge && this.#signer ? this.#signer.header(command, this.#context(vehicle, challenge), long) : {};
   }
 
-  /** @param {string} vehicle @param {string} challenge @returns {Words} */
-  #words(vehicle, challenge) {
+  /** @param {string} vehicle @param {string} challenge @returns {Context} */
+  #context(vehicle, challenge) {
     const { who, name, page, duty } = this.#self();
     const person = duty?.me ? { name: duty.me.name, role: duty.me.role } : null;
     return { vehicle, challenge, by: who && who.id !== 'local' ? who.name : name, page, person };
@@ -107,45 +107,45 @@ export class Signer {
   /**
    * The message with its command signed; as it is where this device cannot sign. null: messages of this kind are not signed.
    * @param {{kind: string, id: string} & Record<string, unknown>} message
-   * @param {Words} words
+   * @param {Context} context
    * @returns {Promise<object> | null}
    */
-  sealed(message, words) {
+  sealed(message, context) {
     if (NO_ORDERS.has(message.kind) || (this.isSettled && !this.id)) return null;
-    const made = this.#last.then(() => this.#sealed(message, words));
+    const made = this.#last.then(() => this.#sealed(message, context));
     this.#last = made.catch(() => {});
     return made;
   }
 
-  /** @param {{kind: string, id: string} & Record<string, unknown>} message @param {Words} words */
-  async #sealed({ id, ...command }, words) {
+  /** @param {{kind: string, id: string} & Record<string, unknown>} message @param {Context} context */
+  async #sealed({ id, ...command }, context) {
     await this.#ready;
     const { kind } = command;
-    return this.id ? { kind, id, vehicle: words.vehicle, signed: await this.sign(command, words) } : { id, ...command };
+    return this.id ? { kind, id, vehicle: context.vehicle, signed: await this.sign(command, context) } : { id, ...command };
   }
 
-  /** @param {Record<string, unknown>} command with its kind @param {Words} words @returns {Promise<Signed>} */
-  async sign(command, words) {
+  /** @param {Record<string, unknown>} command with its kind @param {Context} context @returns {Promise<Signed>} */
+  async sign(command, context) {
     await this.#ready;
     if (!this.#pair) throw new Error('This device cannot sign');
     const nonce = base64(crypto.getRandomValues(new Uint8Array(16)));
-    const text = JSON.stringify({ command, ...words, nonce });
+    const text = JSON.stringify({ command, ...context, nonce });
     const signature = await crypto.subtle.sign(SIGNING, this.#pair.privateKey, new TextEncoder().encode(PREFIX + text));
     return { text, key: this.#point, signature: base64(new Uint8Array(signature)) };
   }
 
   /**
    * The header of a request over HTTP that orders something; `long`: arguments of which only the hash is signed.
-   * @param {Record<string, unknown>} command @param {Words} words @param {Record<string, string>} long
+   * @param {Record<string, unknown>} command @param {Context} context @param {Record<string, string>} long
    * @returns {Promise<Record<string, string>>}
    */
-  async header(command, words, long) {
+  async header(command, context, long) {
     await this.#ready;
     if (!this.id) return {};
     /** @type {Record<string, string>} */
     const hashes = {};
     for (const [name, value] of Object.entries(long)) hashes[name] = await sha256(new TextEncoder().encode(value));
-    const signed = await this.sign(command, { ...words, hashes });
+    const signed = await this.sign(command, { ...context, hashes });
     return { 'X-Catgraph-Signed': base64(new TextEncoder().encode(JSON.stringify(signed))) };
   }
 
@@ -194,9 +194,9 @@ async function kept() {
 
 /** @returns {Promise<IDBDatabase>} */
 function opened() {
-  const asked = indexedDB.open(DATABASE, 1);
-  asked.onupgradeneeded = () => asked.result.createObjectStore(KEYS);
-  return done(asked);
+  const request = indexedDB.open(DATABASE, 1);
+  request.onupgradeneeded = () => request.result.createObjectStore(KEYS);
+  return done(request);
 }
 
 /** @template T @param {IDBRequest<T>} request @returns {Promise<T>} */

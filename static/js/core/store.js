@@ -38,7 +38,7 @@ export class Store extends Known {
   #clock = new ServerClock();
   #delay_ms = 0; // how long the newest frame was under way
   #started_ms = 0;
-  /** What an answer said of this page's lease, until the frames have it. @type {number | null} */
+  /** This page's lease as an answer stated, until the frames have it. @type {number | null} */
   #granted = null;
   /** @type {Emitter<Topic>} */
   #emitter = new Emitter((error) => this.painter.failed(error));
@@ -71,8 +71,8 @@ export class Store extends Known {
           this.sync.closed();
           this.scans.opened();
         }),
-        text: (text, at_ms) => this.#emitter.guard(() => this.#heard(text, at_ms)),
-        bytes: (bytes) => this.#emitter.guard(() => this.#heardScan(bytes)),
+        text: (text, at_ms) => this.#emitter.guard(() => this.#received(text, at_ms)),
+        bytes: (bytes) => this.#emitter.guard(() => this.#receivedScan(bytes)),
         closed: () => this.#emitter.guard(() => this.#broke()),
       },
       dial,
@@ -192,7 +192,7 @@ export class Store extends Known {
   }
 
   /** @param {string} text @param {number} [at_ms] when it came */
-  #heard(text, at_ms = this.now()) {
+  #received(text, at_ms = this.now()) {
     this.#woke(); // a phone that wakes may read what came before the page looks at the time
     const message = readMessage(text);
     if (!message) return void [this.unreadable += 1, this.socket.unread(text)];
@@ -254,7 +254,7 @@ export class Store extends Known {
   }
 
   /** @param {ArrayBuffer} bytes */
-  #heardScan(bytes) {
+  #receivedScan(bytes) {
     if (this.scans.take(bytes)) this.#emitter.emit('scan');
     else this.unreadable += 1;
   }

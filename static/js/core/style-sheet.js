@@ -7,7 +7,7 @@ const WAITS_MS = 1500;
 /** By address. @type {Map<string, Promise<void>>} */
 const fetched = new Map();
 
-/** Fetches it once. Rejects where it can't be loaded; whoever asks next tries again. @param {string} href @returns {Promise<void>} */
+/** Fetches it once. Rejects where it can't be loaded; the next call tries again. @param {string} href @returns {Promise<void>} */
 export function fetchStyle(href) {
   const known = fetched.get(href);
   if (known) return known;

@@ -52,7 +52,7 @@ export function unseenOf(store) {
 }
 
 /**
- * The speed to hold on a late link, where the setting asks for it, in two short lines: "≤ 11.1 m/s", "for 2.78 m".
+ * The speed to hold on a late link, where the setting requires it, in two short lines: "≤ 11.1 m/s", "for 2.78 m".
  * @param {import('./store.js').Store} store
  * @returns {string[]} none: nothing is proposed
  */

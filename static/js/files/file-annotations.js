@@ -41,7 +41,7 @@ export function annotate(dialog, model, row) {
  * @param {FilesModel} model
  * @param {Recording} row
  * @param {{title?: string, note?: string, weather?: string, tags?: string[]}} annotations
- * @param {HTMLElement} refused where a refusal is said
+ * @param {HTMLElement} refused where a refusal is shown
  */
 async function keep(dialog, model, row, annotations, refused) {
   try {

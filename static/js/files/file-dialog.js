@@ -1,4 +1,4 @@
-// The sheet in which a recording's actions stand: a title, what is said, what can be done, and the key that closes it.
+// The sheet of a recording's actions: a title, messages, actions, and the key that closes it.
 
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
 import { html, icon, listen, setAttribute, setText, words } from '../core/dom.js';
@@ -79,7 +79,7 @@ export class FileDialog {
    * @param {string} glyph
    * @param {string} label
    * @param {() => void} act
-   * @param {string} [end] a word at its end
+   * @param {string} [end] a label at its end
    */
   item(glyph, label, act, end = '') {
     const key = html('button', { type: 'button', 'data-operator': CHANGES.includes(glyph) }, icon(glyph), label, ...(end ? [html('span', { class: 'end' }, ...words(end))] : []));

@@ -74,14 +74,14 @@ export class FileMaker {
     this.#job?.giveUp();
     this.#job = job;
     const bar = /** @type {HTMLProgressElement} */ (html('progress', { max: 1, value: 0, 'aria-label': title }));
-    const said = html('p', { role: 'status' });
-    setWords(said, 'The server is starting.');
-    this.#dialog.show(title, [], [html('div', { class: 'progress' }, bar, said)], [this.#dialog.key('Cancel', () => job.giveUp())]);
+    const status = html('p', { role: 'status' });
+    setWords(status, 'The server is starting.');
+    this.#dialog.show(title, [], [html('div', { class: 'progress' }, bar, status)], [this.#dialog.key('Cancel', () => job.giveUp())]);
     return {
       /** @param {import('./files-job.js').Job} job */
       update: ({ progress, sentence }) => {
         if (progress !== null) bar.value = progress;
-        setWords(said, sentence ?? `${Math.round((progress ?? 0) * 100)} % done.`);
+        setWords(status, sentence ?? `${Math.round((progress ?? 0) * 100)} % done.`);
       },
     };
   }

@@ -1,4 +1,4 @@
-// The copy of a recording in the store: asked for at the server that has the recording, fetched at one that has none.
+// The copy of a recording in the store: requested from the server that has the recording, fetched by one that has none.
 
 import { request, sentenceOf } from '../control/request.js';
 import { addressOf } from './files-model.js';

@@ -59,7 +59,7 @@ export class FileTrash {
         this.#dialog.close();
         await this.#restore(row, name);
       }),
-      this.#dialog.item('trash', 'Delete for good', () => this.#askDestroy(row.id, `Delete ${name} for good?`, `${sizeWords(row.size_bytes)} are freed. This cannot be undone.`), 'asks first'))]);
+      this.#dialog.item('trash', 'Delete for good', () => this.#askDestroy(row.id, `Delete ${name} for good?`, `${sizeWords(row.size_bytes)} are freed. This cannot be undone.`), 'confirm first'))]);
   }
 
   /** All of the trash, after a question. @param {import('./files-layout.js').Total} total */

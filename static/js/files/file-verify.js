@@ -1,4 +1,4 @@
-// Whether a recording is as it was recorded: said only where the server has verified this very file.
+// Whether a recording is as it was recorded: shown only where the server has verified this very file.
 
 import { request, sentenceOf } from '../control/request.js';
 import { addressOf } from './files-model.js';

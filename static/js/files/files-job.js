@@ -1,4 +1,4 @@
-// What the server makes of a recording while the operator waits: asked for, followed, cancelled, and then fetched.
+// A job of the server on a recording while the operator waits: requested, followed, cancelled or fetched.
 
 import { keptAt } from '../core/kept-at.js';
 import { request, sentenceOf } from '../control/request.js';
@@ -33,7 +33,7 @@ export class FileJob {
     this.onChange = onChange;
   }
 
-  /** To its end. @returns {Promise<Job>} where it failed, its sentence says why; given up it is cancelled */
+  /** To its end. @returns {Promise<Job>} where it failed, its sentence has the reason; given up it is cancelled */
   async run() {
     try {
       const { job } = await request(this.path, { method: 'POST', body: this.body });

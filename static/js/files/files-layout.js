@@ -1,4 +1,4 @@
-// How recordings read in the list: their time, length, size and alarms in words. Pure functions, no DOM.
+// The texts of recordings in the list: their time, length, size and alarms. Pure functions, no DOM.
 
 import { missingWords, namesWords } from './missing-topics.js';
 import { duration, fixed, NOTHING } from '../core/format.js';
@@ -78,13 +78,13 @@ export function originWords(row, now_ms) {
   ].filter(Boolean).join(' · ');
 }
 
-const WORDS = /** @type {[Priority, string, string][]} */ ([['critical', 'critical alarm', 'critical alarms'], ['warning', 'warning', 'warnings'], ['advisory', 'advisory', 'advisories']]);
+const COUNT_NAMES = /** @type {[Priority, string, string][]} */ ([['critical', 'critical alarm', 'critical alarms'], ['warning', 'warning', 'warnings'], ['advisory', 'advisory', 'advisories']]);
 
-/** The counts that are not 0, most urgent first. @param {Recording['alarms']} alarms @returns {{priority: Priority, count: number, words: string}[]} */
+/** The counts that are not 0, most urgent first. @param {Recording['alarms']} alarms @returns {{priority: Priority, count: number, text: string}[]} */
 export function countsOf(alarms) {
-  return WORDS.flatMap(([priority, one, many]) => {
+  return COUNT_NAMES.flatMap(([priority, one, many]) => {
     const count = Object.entries(alarms ?? {}).reduce((sum, [name, some]) => sum + (priorityOf(name) === priority ? some : 0), 0);
-    return count > 0 ? [{ priority, count, words: `${count} ${count === 1 ? one : many}` }] : [];
+    return count > 0 ? [{ priority, count, text: `${count} ${count === 1 ? one : many}` }] : [];
   });
 }
 
@@ -100,7 +100,7 @@ export function byUrgency(raised) {
 /** "2 critical alarms, 1 warning", "no alarms"; "alarms not recorded" is not the same. @param {Recording['alarms']} alarms */
 export function alarmWords(alarms) {
   if (alarms === null) return 'alarms not recorded';
-  return countsOf(alarms).map(({ words }) => words).join(', ') || 'no alarms';
+  return countsOf(alarms).map(({ text }) => text).join(', ') || 'no alarms';
 }
 
 /** All that is known of a recording in one sentence. @param {Recording} row */
@@ -154,7 +154,7 @@ export function choiceOf(text) {
 
 /**
  * The query of a list.
- * @param {{text: string, choice: Choice, cursor?: string | null, limit: number}} wish
+ * @param {{text: string, choice: Choice, cursor?: string | null, limit: number}} search
  * @param {number} now_ms
  */
 export function queryOf({ text, choice, cursor, limit }, now_ms) {
@@ -198,13 +198,13 @@ export function pointsOf(line) {
  * @property {{topic: string, mb: number}[]} [too_large]
  * @property {number} [too_large_count]
  *
- * @typedef {{name: string, mark: string, length: string, size: string, lost: string, missing: string, isOn: boolean, isBad: boolean, order: boolean | null}} Live order: what a key asks for, true to record; null: no key
+ * @typedef {{name: string, mark: string, length: string, size: string, lost: string, missing: string, isOn: boolean, isBad: boolean, order: boolean | null}} Live order: what its key orders, true to record; null: no key
  */
 
 const NAMES = /** @type {Record<string, string>} */ ({ recording: 'Recording now', held: 'Recording held', saving: 'Being saved', stopped: 'Recording stopped', off: 'Not recording' });
 
 /**
- * What stands above the list of what was recorded: what is recorded now, or why nothing is. Null: nothing is to be said.
+ * The line above the list of recordings: what is recorded now, or why nothing is. Null: no line.
  * @param {Recorder | undefined} recorder
  * @param {{vehicle: string | null, isMonitoring: boolean, isSilent: boolean}} now
  * @returns {Live | null}

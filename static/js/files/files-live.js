@@ -1,4 +1,4 @@
-// What is recorded now, above the list: it counts, says why where nothing is recorded, and is begun and ended by hand.
+// What is recorded now, above the list: its length and size, or why nothing is recorded; it is begun and ended by hand.
 
 import { liveOf } from './files-layout.js';
 import { record } from '../shell/record-key.js';

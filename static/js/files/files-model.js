@@ -1,4 +1,4 @@
-// The recordings as the server lists them: asked for again while they are looked at, a page at a time, by what is wished for.
+// The recordings as the server lists them: requested again while they are in view, a page at a time, by the search.
 
 import { request, sentenceOf } from '../control/request.js';
 import { keptVehicle } from '../core/kept-at.js';
@@ -39,7 +39,7 @@ export class FilesModel {
   text = '';
   /** @type {Choice} */
   choice = { kind: 'all', value: '' };
-  /** Another wish makes the answers to older ones worthless. */
+  /** Counts the searches: an answer to an older search is dropped. */
   #turn = 0;
   #isAsking = false;
 
@@ -54,13 +54,13 @@ export class FilesModel {
 
   /**
    * Other recordings are wanted.
-   * @param {{text?: string, choice?: Choice, isTrash?: boolean}} wish
+   * @param {{text?: string, choice?: Choice, isTrash?: boolean}} search
    */
-  want(wish) {
-    Object.assign(this, wish);
+  want(search) {
+    Object.assign(this, search);
     this.#turn += 1;
     this.#isAsking = false;
-    if (wish.isTrash !== undefined) {
+    if (search.isTrash !== undefined) {
       this.rows = [];
       this.next = null;
       this.at_ms = null;
@@ -68,7 +68,7 @@ export class FilesModel {
     return this.refresh();
   }
 
-  /** Nothing is known of the recordings, and what is being asked for is none of them. */
+  /** Clears the list; the answer to a request under way is dropped. */
   forget() {
     this.#turn += 1;
     this.#isAsking = false;
@@ -84,7 +84,7 @@ export class FilesModel {
     await this.#ask(null, Math.min(MOST, Math.max(PAGE, this.rows.length)), (listing) => {
       const last = listing.recordings.at(-1);
       const beyond = listing.next && last ? this.rows.slice(this.rows.findIndex(({ id }) => id === last.id) + 1) : [];
-      const isLonger = this.rows.length > MOST && beyond.length > 0; // pages beyond the last that is asked for stay as they were
+      const isLonger = this.rows.length > MOST && beyond.length > 0; // pages beyond the last requested one stay as they were
       this.rows = isLonger ? [...listing.recordings, ...beyond] : listing.recordings;
       if (!isLonger) this.next = listing.next;
     });
@@ -153,9 +153,9 @@ export class FilesModel {
 
   /** @param {Recording} row @param {{title?: string, note?: string, weather?: string, tags?: string[]}} remarks @returns {Promise<Recording>} */
   async remark(row, remarks) {
-    const said = await request(addressOf(row.id), { method: 'PATCH', body: remarks });
+    const changed = await request(addressOf(row.id), { method: 'PATCH', body: remarks });
     await this.refresh();
-    return said;
+    return changed;
   }
 
   /** @param {string} id */

@@ -13,7 +13,7 @@ const MARKS = /** @type {Record<string, [string, string]>} */ ({ critical: ['al'
 const COLUMNS = /** @type {const} */ (['critical', 'warning']);
 const ICONS = /** @type {Record<string, [string, string]>} */ ({ critical: ['crit', 'c-crit'], warning: ['warn', 'c-warn'], advisory: ['info', 'sub'] });
 
-/** The way it went, or in words that nobody knows. @param {Recording} row */
+/** The track of the drive, or the text that it is not known. @param {Recording} row */
 export function thumbnail(row) {
   const { sketch } = row;
   if (!sketch) {
@@ -37,11 +37,11 @@ function counts(row) {
   const found = countsOf(row.alarms);
   if (!found.length) return [html('span', {}, alarmWords(row.alarms))];
   const none = COLUMNS.filter((priority) => !found.some((one) => one.priority === priority)).map((priority) => html('span', { class: 'dash', 'data-priority': priority, 'aria-hidden': 'true' }, NOTHING));
-  return [...none, ...found.map(({ priority, count, words: said }) => {
+  return [...none, ...found.map(({ priority, count, text }) => {
     const [glyph, kind] = ICONS[priority] ?? ['info', 'sub'];
     return html('span', { class: `mini ${kind}`, 'data-priority': priority }, icon(glyph, 's'),
-      ...(priority === 'advisory' ? words(said) // it stands in no column of its own
-        : [html('span', { class: 'n b', 'aria-hidden': 'true' }, String(count)), html('span', { class: 'unseen' }, said)]));
+      ...(priority === 'advisory' ? words(text) // it stands in no column of its own
+        : [html('span', { class: 'n b', 'aria-hidden': 'true' }, String(count)), html('span', { class: 'unseen' }, text)]));
   })];
 }
 

@@ -1,4 +1,4 @@
-// What can be done with a recording: a sheet of actions, and beneath each what it asks.
+// What can be done with a recording: a sheet of actions, and the questions of each.
 
 import { annotate, rename } from './file-annotations.js';
 import { FileDialog } from './file-dialog.js';
@@ -137,7 +137,7 @@ export class FileSheet {
       ...storeItem(this.#dialog, this.model, row, this.name, back),
       this.#dialog.item('edit', 'Rename', () => rename(this.#dialog, this.model, row)),
       this.#dialog.item('info', 'Note and tags', () => annotate(this.#dialog, this.model, row)),
-      this.#dialog.item('trash', 'Delete', () => this.#trash.askDelete(row, back), 'asks first'))]);
+      this.#dialog.item('trash', 'Delete', () => this.#trash.askDelete(row, back), 'confirm first'))]);
   }
 
   /** The drive's report as a page of its own, which can be printed and saved. */
@@ -218,9 +218,9 @@ export class FileSheet {
   async #share() {
     const { row } = this;
     const address = new URL(keptAt(addressOf(row.id, '/file.mcap')), location.href).href;
-    const said = html('p', { role: 'status' }, 'Getting ready to share.');
-    this.#dialog.show(`Share ${this.name}`, [said], []);
-    await share({ row, name: this.name, address, say: (sentence) => setWords(said, sentence), offer: (label, act) => this.#dialog.what.replaceChildren(html('div', { class: 'keys' }, this.#dialog.key(label, act, 'main'))),
+    const status = html('p', { role: 'status' }, 'Getting ready to share.');
+    this.#dialog.show(`Share ${this.name}`, [status], []);
+    await share({ row, name: this.name, address, say: (sentence) => setWords(status, sentence), offer: (label, act) => this.#dialog.what.replaceChildren(html('div', { class: 'keys' }, this.#dialog.key(label, act, 'main'))),
       link: () => {
         const box = /** @type {HTMLInputElement} */ (html('input', { type: 'text', readonly: true, value: address, 'aria-label': 'Link to the recording' }));
         this.#dialog.what.replaceChildren(html('div', { class: 'form-lines' }, box));

@@ -1,4 +1,4 @@
-// Mail in words: pure functions. Addresses apart, states, sizes, the link for the phone's own mail program.
+// The texts of mail: pure functions. Addresses apart, states, sizes, the link for the phone's own mail program.
 
 import { sizeWords } from './files-layout.js';
 import { counted, timeOfDay } from '../core/format.js';
@@ -38,7 +38,7 @@ export const FORMATS = /** @type {const} */ ([
   ['csv', 'CSV', 'a table for each signal'],
   ['html', 'Report', 'one page with plots and alarms'],
 ]);
-/** The ending and the kind of each, as a phone is told. */
+/** The ending and the kind of each, as a phone needs them. */
 export const KINDS = /** @type {Record<MailFormat, [string, string]>} */ ({
   mcap: ['mcap', 'application/octet-stream'], bag: ['bag', 'application/octet-stream'], csv: ['zip', 'application/zip'], html: ['html', 'text/html'],
 });
@@ -54,7 +54,7 @@ export function recipientsOf(typed) {
 }
 
 /**
- * What is plainly wrong with the addresses, before the server is asked; null: nothing.
+ * What is plainly wrong with the addresses, before anything is sent to the server; null: nothing.
  * @param {string[]} addresses
  */
 export function recipientProblem(addresses) {
@@ -80,10 +80,10 @@ export function sizeNote(bytes, limit_mb, tooLarge) {
 }
 
 /**
- * What stands in the outbox for one order: its state as a word and an icon, and all there is to say of it.
+ * The entry of one order in the outbox: its state as a label and an icon, and the details.
  * @param {Mail} mail
  * @param {number} now_ms
- * @returns {{word: string, icon: string, isBad: boolean, says: string}}
+ * @returns {{label: string, icon: string, isBad: boolean, detail: string}}
  */
 export function stateOf(mail, now_ms) {
   const share = mail.share === null ? '' : ` ${Math.round(mail.share * 100)} %`;
@@ -91,15 +91,15 @@ export function stateOf(mail, now_ms) {
   const parts = mail.parts.length > 1 ? `${sent} of ${mail.parts.length} parts sent. ` : '';
   switch (mail.state) {
     case 'queued': {
-      if (!mail.is_ready) return { word: `Preparing${share}`, icon: 'clock', isBad: false, says: '' };
+      if (!mail.is_ready) return { label: `Preparing${share}`, icon: 'clock', isBad: false, detail: '' };
       const next = Math.min(...mail.parts.map(({ state, next_ms }) => (state === 'queued' && next_ms !== null ? next_ms : Infinity)));
       const tries = next > now_ms && Number.isFinite(next) ? `${mail.said ? ' ' : ''}Tried again at ${timeOfDay(next)}.` : '';
-      return { word: mail.said ? 'Waiting' : 'Queued', icon: 'clock', isBad: false, says: `${parts}${sentence(mail.said)}${tries}` };
+      return { label: mail.said ? 'Waiting' : 'Queued', icon: 'clock', isBad: false, detail: `${parts}${sentence(mail.said)}${tries}` };
     }
-    case 'sending': return { word: `Sending${share}`, icon: 'mail', isBad: false, says: parts.trim() };
-    case 'sent': return { word: 'Sent', icon: 'ok', isBad: false, says: `${mail.parts.length > 1 ? `${counted(mail.parts.length, 'part')}. ` : ''}${sentence(mail.said)}` };
-    case 'failed': return { word: 'Failed', icon: 'warn', isBad: true, says: `${parts}${sentence(mail.said)}` };
-    default: return { word: 'Cancelled', icon: 'close', isBad: false, says: sentence(mail.said) };
+    case 'sending': return { label: `Sending${share}`, icon: 'mail', isBad: false, detail: parts.trim() };
+    case 'sent': return { label: 'Sent', icon: 'ok', isBad: false, detail: `${mail.parts.length > 1 ? `${counted(mail.parts.length, 'part')}. ` : ''}${sentence(mail.said)}` };
+    case 'failed': return { label: 'Failed', icon: 'warn', isBad: true, detail: `${parts}${sentence(mail.said)}` };
+    default: return { label: 'Cancelled', icon: 'close', isBad: false, detail: sentence(mail.said) };
   }
 }
 
@@ -120,11 +120,11 @@ export function aboutOf(mail) {
   return [what, format, mail.size_bytes === null ? '' : sizeWords(mail.size_bytes), way].filter(Boolean).join(' · ');
 }
 
-/** Who did not get it, and why, where that is not said already. @param {Mail} mail */
+/** Who did not get it, and why, where the reply of the order does not contain it. @param {Mail} mail */
 export function refusedOf(mail) {
   if (mail.to.length < 2) return [];
-  const found = new Map(mail.parts.flatMap(({ recipients }) => recipients.filter(({ state }) => state === 'refused').map(({ address, said }) => [address, said])));
-  return [...found].map(([address, said]) => `${address}: ${said}`).filter((line) => !mail.said.includes(line));
+  const found = new Map(mail.parts.flatMap(({ recipients }) => recipients.filter(({ state }) => state === 'refused').map(({ address, said: reply }) => [address, reply])));
+  return [...found].map(([address, reply]) => `${address}: ${reply}`).filter((line) => !mail.said.includes(line));
 }
 
 /**
@@ -146,7 +146,7 @@ export function pathOf(id, format) {
   return `/api/recordings/${encodeURIComponent(id)}/${format === 'mcap' ? 'file.mcap' : `export/${format}`}`;
 }
 
-/** @param {string} said */
-function sentence(said) {
-  return said === '' || /[.!?]$/.test(said) ? said : `${said}.`;
+/** @param {string} reply */
+function sentence(reply) {
+  return reply === '' || /[.!?]$/.test(reply) ? reply : `${reply}.`;
 }

@@ -32,7 +32,7 @@ const PORTS = SECURITY.map(([, , port]) => port);
 /**
  * @param {HTMLElement} place
  * @param {(sentence: string, title?: string) => void} say
- * @param {(words: string) => void} head says at the group's head what holds
+ * @param {(text: string) => void} head shows the state in the group's summary
  */
 export async function mount(place, say, head) {
   const at = keptAt('/api/mail');
@@ -46,15 +46,15 @@ class MailForm {
   #security = 'starttls';
   #isChanged = false;
 
-  /** @param {(sentence: string, title?: string) => void} say @param {(words: string) => void} head @param {string} at the address of the mail that it sets */
+  /** @param {(sentence: string, title?: string) => void} say @param {(text: string) => void} head @param {string} at the address of the mail that it sets */
   constructor(say, head, at) {
     this.at = at;
     this.head = head;
     const line = (/** @type {string} */ name, /** @type {import('../core/dom.js').Attributes} */ more = {}) => /** @type {HTMLInputElement} */ (html('input', { id: `mail-set-${name}`, 'data-mail-field': name, type: 'text', autocomplete: 'off', autocapitalize: 'off', autocorrect: 'off', spellcheck: 'false', ...more }));
-    const label = (/** @type {string} */ name, /** @type {string} */ words) => html('label', { for: `mail-set-${name}` }, words);
+    const label = (/** @type {string} */ name, /** @type {string} */ text) => html('label', { for: `mail-set-${name}` }, text);
     this.host = line('host', { maxlength: 253, placeholder: 'smtp.example.org', inputmode: 'url' });
     this.port = line('port', { maxlength: 5, inputmode: 'numeric', class: 'n' });
-    this.security = SECURITY.map(([name, words]) => html('button', { type: 'button', 'data-security': name, 'aria-pressed': 'false' }, words));
+    this.security = SECURITY.map(([name, text]) => html('button', { type: 'button', 'data-security': name, 'aria-pressed': 'false' }, text));
     this.user = line('user', { maxlength: 320, autocomplete: 'username', placeholder: 'none: no login' });
     this.password = line('password', { type: 'password', maxlength: 500, autocomplete: 'new-password', 'aria-describedby': 'mail-set-password-help' });
     this.sender = line('sender', { maxlength: 320, inputmode: 'email', placeholder: 'car@example.org' });
@@ -71,7 +71,7 @@ class MailForm {
     this.to = line('test', { maxlength: 320, inputmode: 'email', autocomplete: 'email', placeholder: 'you@example.org', 'aria-describedby': 'mail-set-test-help' });
     this.test = html('button', { type: 'button', class: 'key wide', 'data-f': 'mail-test' }, icon('mail'), 'Test');
     const outbox = html('button', { type: 'button', class: 'key wide', 'data-f': 'mail-outbox' }, icon('files'), 'Outbox');
-    const hint = (/** @type {string} */ id, /** @type {string} */ words) => html('p', { class: 'mail-hint', id: `mail-set-${id}-help` }, words);
+    const hint = (/** @type {string} */ id, /** @type {string} */ text) => html('p', { class: 'mail-hint', id: `mail-set-${id}-help` }, text);
     this.element = html('div', { class: 'mail-form mail-settings' },
       html('div', { class: 'two' }, html('div', {}, label('host', 'SMTP host'), this.host), html('div', {}, label('port', 'Port'), this.port)),
       html('span', { class: 'lab', id: 'mail-set-security' }, 'Encrypted by'), html('div', { class: 'seg', role: 'group', 'aria-labelledby': 'mail-set-security' }, ...this.security),
@@ -174,8 +174,8 @@ class MailForm {
     setText(this.good, 'Connecting to the mail server. This takes a few seconds.');
     const to = this.to.value.trim();
     try {
-      const { sentence, said } = await request(`${this.at}/test`, { method: 'POST', body: to ? { to } : {} });
-      setWords(this.good, said ? `${sentence} Server reply: ${said}` : sentence);
+      const { sentence, said: reply } = await request(`${this.at}/test`, { method: 'POST', body: to ? { to } : {} });
+      setWords(this.good, reply ? `${sentence} Server reply: ${reply}` : sentence);
     } catch (error) {
       setText(this.good, '');
       setWords(this.bad, sentenceOf(error));

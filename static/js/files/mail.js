@@ -140,7 +140,7 @@ class MailSheet {
     this.#draw();
   }
 
-  /** Another mail than the one that was asked for. */
+  /** Counts the requests: an answer for another mail is dropped. */
   #changed() {
     this.#key = newKey();
     this.#file = null;
@@ -191,7 +191,7 @@ class MailSheet {
     at.focus();
   }
 
-  /** The file where this phone hands such files over, else a mail with links. */
+  /** Shares the file where this phone can share such files, else opens a mail with links. */
   async #own() {
     setText(this.refused, '');
     if (this.#file) {

@@ -1,4 +1,4 @@
-// What of the car is not in the recording that is being made, in words.
+// The text of which topics of the car are not in the current recording.
 
 /**
  * Names, and how many more there are: "/a, /b and 7 more".

@@ -1,4 +1,4 @@
-// The outbox: every mail that was ordered, where it stands in the server's own words, and what can be done about it.
+// The outbox: every mail that was ordered, its state with the mail server's reply, and its keys.
 
 import { keptAt } from '../core/kept-at.js';
 import { request, sentenceOf } from '../control/request.js';
@@ -36,7 +36,7 @@ class Outbox {
   #shown = PAGE;
   /** @type {Map<number, {key: string, element: HTMLElement}>} */
   #drawn = new Map();
-  /** What is being asked for now: its keys are held. @type {Set<number>} */
+  /** The mails with a request under way: their keys are disabled. @type {Set<number>} */
   #busy = new Set();
 
   /** @param {Say} say @param {string} at its address */
@@ -116,8 +116,8 @@ class Outbox {
       html('div', { class: 't', dir: 'auto' }, mail.subject),
       html('p', { class: 'm', dir: 'auto' }, `to ${mail.to.join(', ')}`),
       html('p', { class: 'm' }, ...words(`${dayTime(mail.ordered_ms, now_ms)} · ${aboutOf(mail)}`)),
-      html('div', state.isBad ? { 'data-bad': true } : {}, html('p', { class: 'st' }, icon(state.icon), html('span', {}, ...words(state.word))),
-        html('p', { class: 'said' }, ...words(state.says)), ...refusedOf(mail).map((line) => html('p', { class: 'said' }, ...words(line)))),
+      html('div', state.isBad ? { 'data-bad': true } : {}, html('p', { class: 'st' }, icon(state.icon), html('span', {}, ...words(state.label))),
+        html('p', { class: 'said' }, ...words(state.detail)), ...refusedOf(mail).map((line) => html('p', { class: 'said' }, ...words(line)))),
       html('div', { class: 'pair' }, ...key(resend, 'resend'), ...key(cancel, 'cancel')));
   }
 

@@ -185,9 +185,9 @@ class DriveChart {
     const [from_s, to_s] = this.view;
     const { parts: { ranges, stage, state, held, now }, store } = this;
     ranges.forEach((key, i) => setAttribute(key, 'aria-pressed', String(this.scope.follows && this.scope.range_s === RANGES[i]?.[1])));
-    const words = stateWords(this.feed, this.view, this.scope.follows, store.replaying);
-    setWords(held, words);
-    show(state, words !== '');
+    const text = stateWords(this.feed, this.view, this.scope.follows, store.replaying);
+    setWords(held, text);
+    show(state, text !== '');
     show(now, !this.scope.follows && answer !== null && !this.store.replaying);
     setAttribute(state, 'data-held', !this.scope.follows && !this.store.replaying);
     setAttribute(stage, 'aria-valuemin', from_s.toFixed(1));

@@ -2,9 +2,9 @@
 
 import { ranked } from '../core/priority.js';
 
-/** A view that changes is asked for once it has rested so long [ms]. */
+/** A view that changes is requested once it has rested so long [ms]. */
 const REST_MS = 150;
-/** While the drive goes on, a view is asked for again when it has moved by a part of its width, but not more often than this [ms]. */
+/** While the drive goes on, a view is requested again when it has moved by a part of its width, but not more often than this [ms]. */
 const LEAST_MS = 1000;
 const MOST_MS = 10_000;
 const PART = 1 / 120;
@@ -76,7 +76,7 @@ export class DriveFeed {
     this.#wanted_ms = this.store.now();
   }
 
-  /** Called again and again: asks for what is due. */
+  /** Called with each state: requests what is due. */
   look() {
     const { store } = this;
     const { frame } = store;
@@ -122,10 +122,10 @@ export class DriveFeed {
     this.onNew();
   }
 
-  /** @param {Record<string, string | number>} asked @returns {Promise<Answer | null>} */
-  async #fetch(asked) {
+  /** @param {Record<string, string | number>} fields @returns {Promise<Answer | null>} */
+  async #fetch(fields) {
     const { frame } = this.store;
-    const query = new URLSearchParams(Object.entries(asked).map(([name, value]) => [name, typeof value === 'number' ? String(Number(value.toFixed(2))) : value]));
+    const query = new URLSearchParams(Object.entries(fields).map(([name, value]) => [name, typeof value === 'number' ? String(Number(value.toFixed(2))) : value]));
     if (frame?.vehicle) query.set('vehicle', frame.vehicle);
     if (frame?.replay) query.set('replay', frame.replay.token);
     this.#isAsking = true;
@@ -136,7 +136,7 @@ export class DriveFeed {
       ranked(found.marks);
       return found;
     } catch {
-      return null; // asked again; until then the chart says that it is not live
+      return null; // requested again; until then the chart says that it is not live
     } finally {
       this.#isAsking = false;
     }

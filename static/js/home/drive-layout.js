@@ -122,7 +122,7 @@ export function foundAt(trend, { from_s, step_s }, at_s) {
   return { kind: trend.none.some(inside) ? 'none' : 'unknown' };
 }
 
-/** What was found in words: a number, or two where the bucket has both. @param {Found} found @param {Spec} spec */
+/** The found value as text: a number, or two where the bucket has both. @param {Found} found @param {Spec} spec */
 export function foundWords(found, spec) {
   if (found.kind !== 'value') return { gap: 'no data', none: spec.name === 'distance' ? 'none in range' : 'no number', unknown: '–' }[found.kind];
   const [low, high] = [found.low, found.high].map((value) => (spec.isSigned ? signed : fixed)(shownIn(value, spec.unit).value, spec.digits));

@@ -7,7 +7,7 @@ import { shownIn } from '../core/units.js';
 import { clockWords, extentOf, lineOf, valueTicks } from './drive-layout.js';
 import { AXIS_PX, axisOf, BARE, INCRS_S, LOW_PX, PaneStack, plotSize } from './pane-stack.js';
 
-/** A pane that is lower has no room for words of two lines under its label [px]. */
+/** A pane that is lower has no room for a text of two lines under its label [px]. */
 const WORDS_PX = 72;
 /** Width of the value axes [px]. */
 const VALUES_PX = 38;
@@ -85,7 +85,7 @@ class Pane {
     this.plot.setData(/** @type {any} */ ([line.times_s.map((at_s) => begin_s + at_s), line.lowest.map(shown), line.highest.map(shown)]), false); // drawn with the view
   }
 
-  /** Too low for words of two lines beside it. */
+  /** Whether it is too low for a text of two lines beside it. */
   get isLow() {
     return this.plot.height < WORDS_PX;
   }

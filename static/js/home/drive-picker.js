@@ -18,7 +18,7 @@ import { shownIn } from '../core/units.js';
 
 /** @param {Chart} chart */
 export function openPicker({ seen, say, panes, head, store }) {
-  const says = html('p', { class: 'sub', role: 'status' }, `Up to ${MOST} signals`);
+  const note = html('p', { class: 'sub', role: 'status' }, `Up to ${MOST} signals`);
   const boxes = Object.entries(seen().answer?.offered ?? {}).map(([name, { label, unit, has_data }]) => {
     const box = /** @type {HTMLInputElement} */ (html('input', { type: 'checkbox', value: name }));
     box.checked = chosenSignals().includes(name);
@@ -28,13 +28,13 @@ export function openPicker({ seen, say, panes, head, store }) {
   const png = html('button', { type: 'button', class: 'key wide' }, icon('download'), 'Picture');
   const csv = html('button', { type: 'button', class: 'key wide' }, icon('download'), 'Table (CSV)');
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed trends-pick', 'aria-labelledby': 'trends-pick-title' },
-    html('div', { class: 'bd' }, html('h2', { id: 'trends-pick-title' }, 'Signals'), says),
+    html('div', { class: 'bd' }, html('h2', { id: 'trends-pick-title' }, 'Signals'), note),
     html('ul', { class: 'trends-list' }, ...boxes.map(({ row }) => row)),
     html('div', { class: 'keys' }, html('div', { class: 'pair' }, png, csv), html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
   const look = () => {
     const chosen = boxes.filter(({ box }) => box.checked);
     for (const { box } of boxes) setAttribute(box, 'disabled', box.checked ? chosen.length === 1 : chosen.length >= MOST);
-    setText(says, chosen.length >= MOST ? `${MOST} signals: take one away to add another` : `Up to ${MOST} signals`);
+    setText(note, chosen.length >= MOST ? `${MOST} signals: take one away to add another` : `Up to ${MOST} signals`);
   };
   const stops = [
     addSheet(sheet),

@@ -81,7 +81,7 @@ export function faceOf({ speed_max, acceleration_max_mps2, limit }) {
 }
 
 /**
- * The speed that is ordered now: an arc outside the band from it to the measured one, and its words where the limit's are not.
+ * The speed that is ordered now: an arc outside the band from it to the measured one, and its label where the limit's is not.
  * @param {number} ordered in one unit, as the others
  * @param {number | null} measured null: not known, so there is no arc
  * @param {number} speed_max
@@ -126,7 +126,7 @@ export function band(inner, outer, from, to) {
 function limitMark(degrees, limit) {
   const [x, y] = polar(226, degrees);
   const isLeft = degrees < 90;
-  const isTop = Math.abs(degrees - 90) < 26; // above the band there is no room: the words stand beside the wedge
+  const isTop = Math.abs(degrees - 90) < 26; // above the band there is no room: the label is beside the wedge
   return {
     line: ray(degrees, 170, 191),
     wedge: `M${at(191, degrees)}L${at(205, degrees - 4)}L${at(205, degrees + 4)}Z`,

@@ -105,11 +105,11 @@ class Gauge {
     const isBack = isSpeedKnown && speed_mps < 0 && digits.startsWith('−');
     setAttribute(unit, 'x', block.unitX);
     setText(unit, isSpeedKnown ? (isBack ? `${unitWord} back` : unitWord) : '');
-    const words = noteOf(speedInk, isSpeedKnown);
-    setText(note, words);
-    const said = [words, ...this.#drawWay(speedInk.ink)].filter(Boolean).join(', ');
-    show(why, said !== '');
-    setAttribute(why, 'aria-label', `Speed: ${said}. Show its source`);
+    const source = noteOf(speedInk, isSpeedKnown);
+    setText(note, source);
+    const text = [source, ...this.#drawWay(speedInk.ink)].filter(Boolean).join(', ');
+    show(why, text !== '');
+    setAttribute(why, 'aria-label', `Speed: ${text}. Show its source`);
     const isSpeedNow = isSpeedKnown && speedInk.ink !== 'stale';
     const isOrdered = this.#drawOrder(isSpeedNow ? speed_mps : null, scale);
     meter(speedMeter, isSpeedNow ? Math.abs(speedIn(speed_mps)) : null, speedIn(scale.speed_max_mps), `${digits} ${spokenSpeedUnit()}${isOrdered}`);
@@ -153,9 +153,9 @@ class Gauge {
     const mark = orderMark(ordered_mps, speed_mps, speed_max_mps, limit_mps);
     setAttribute(arc, 'd', mark.d);
     for (const [name, value] of /** @type {const} */ ([['x', mark.x], ['y', mark.y], ['text-anchor', mark.anchor]])) setAttribute(order, name, value);
-    const [words] = speedWords(ordered_mps);
-    setText(ordered, words);
-    return `, ordered ${words}`;
+    const [text] = speedWords(ordered_mps);
+    setText(ordered, text);
+    return `, ordered ${text}`;
   }
 }
 

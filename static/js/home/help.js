@@ -1,4 +1,4 @@
-// What is said on Home while no signal of the car has arrived: what is missing, and what would fill it.
+// The text on Home while no signal of the car has arrived: what is missing, and how to supply it.
 
 import { field, setWords, show } from '../core/dom.js';
 import { counted } from '../core/format.js';

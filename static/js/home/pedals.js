@@ -47,13 +47,13 @@ export function mount(root, store) {
       const percent = store.signal(name)?.value?.percent;
       const isKnown = typeof percent === 'number' && !isAbsent(ink);
       const isLive = isKnown && ink !== 'stale';
-      const words = name === 'steering' && isKnown ? steeringWords(percent) : { digits: isKnown ? fixed(percent, 0) : '–', side: '%' };
-      write(value, ink, words.digits, unit, words.side);
+      const shown = name === 'steering' && isKnown ? steeringWords(percent) : { digits: isKnown ? fixed(percent, 0) : '–', side: '%' };
+      write(value, ink, shown.digits, unit, shown.side);
       const shape = name === 'steering' ? steeringFill(isLive ? percent : 0) : pedalFill(isLive ? percent : 0);
       for (const [attribute, size] of Object.entries(shape)) setAttribute(fill, attribute, size.toFixed(1));
       setAttribute(fill, 'hidden', !isLive); // an empty frame is not a measured 0
       setAttribute(bar, 'aria-valuenow', isLive ? Math.round(percent) : 0);
-      setAttribute(bar, 'aria-valuetext', isLive ? `${words.digits} ${words.side}` : 'unknown');
+      setAttribute(bar, 'aria-valuetext', isLive ? `${shown.digits} ${shown.side}` : 'unknown');
     }
   }
 

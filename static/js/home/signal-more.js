@@ -41,12 +41,12 @@ export class CandidateFeed {
  * What else could carry a signal, a line each.
  * @param {Candidate[] | null} candidates null: not known
  * @param {string | null} now the topic that carries it
- * @returns {{topic: string, says: string}[]}
+ * @returns {{topic: string, detail: string}[]}
  */
 export function otherWords(candidates, now) {
   const others = (candidates ?? []).filter(({ topic }) => topic !== now);
-  const rows = others.slice(0, MOST_LISTED).map(({ topic, type, frame, why }) => ({ topic, says: [type, frame ? `frame ${frame}` : '', why ?? ''].filter(Boolean).join('\n') }));
-  return others.length > MOST_LISTED ? [...rows, { topic: `and ${others.length - MOST_LISTED} more`, says: '' }] : rows;
+  const rows = others.slice(0, MOST_LISTED).map(({ topic, type, frame, why }) => ({ topic, detail: [type, frame ? `frame ${frame}` : '', why ?? ''].filter(Boolean).join('\n') }));
+  return others.length > MOST_LISTED ? [...rows, { topic: `and ${others.length - MOST_LISTED} more`, detail: '' }] : rows;
 }
 
 export class SignalMore {
@@ -81,13 +81,13 @@ export class SignalMore {
     for (const one of this.units.children) setAttribute(one, 'aria-pressed', String(/** @type {HTMLElement} */ (one).dataset['unit'] === chosen));
   }
 
-  /** @param {[string, string][]} details @param {{topic: string, says: string}[]} others @param {{name: string, label: string}[]} choices */
+  /** @param {[string, string][]} details @param {{topic: string, detail: string}[]} others @param {{name: string, label: string}[]} choices */
   #fill(details, others, choices) {
     this.units.replaceChildren(...[{ name: '', label: 'as found' }, ...choices].map(({ name, label }) => this.#unitKey(name, label)));
     const rows = details.map(([term, text]) => /** @type {[string, HTMLElement]} */ ([term, html('dd', {}, ...words(text))]));
     if (choices.length) rows.push(['Published in', html('dd', {}, this.units)]);
     rows.push(['Choice', html('dd', {}, this.choice)]);
-    if (others.length) rows.push(['Others', html('dd', { class: 'others' }, ...others.map(({ topic, says }) => html('p', {}, html('b', {}, topic), ...(says ? ['\n', ...words(says)] : []))))]);
+    if (others.length) rows.push(['Others', html('dd', { class: 'others' }, ...others.map(({ topic, detail }) => html('p', {}, html('b', {}, topic), ...(detail ? ['\n', ...words(detail)] : []))))]);
     this.element.replaceChildren(...rows.flatMap(([term, description]) => [html('dt', {}, term), description]));
   }
 

@@ -10,7 +10,7 @@ import { CandidateFeed, SignalMore } from './signal-more.js';
 
 const LEVELS = ['OK', 'WARN', 'ERROR', 'STALE'];
 
-/** The headline of each signal's value, as a number with its unit or as a word. */
+/** The headline of each signal's value, as a number with its unit or as text. */
 const HEADLINES = /** @type {Record<string, (value: any) => [string, string]>} */ ({
   speed: (value) => speedWords(value.speed_mps),
   acceleration: (value) => [fixed(value.acceleration_mps2), 'm/s²'],
@@ -74,7 +74,7 @@ function rangeWords({ lowest, highest, unit = '' }) {
   return `${fixed(low.value, 2)} to ${fixed(high.value, 2)} ${low.unit}`.trim();
 }
 
-/** Where a signal comes from, in a word. @param {Signal} signal @param {import('../core/freshness.js').Ink} [ink] */
+/** Where a signal comes from, in short. @param {Signal} signal @param {import('../core/freshness.js').Ink} [ink] */
 export function kindWords({ type, topic, value }, ink = 'fresh') {
   if (ink === 'not_chosen') return 'press to choose';
   const source = value?.['source'];
@@ -97,7 +97,7 @@ function componentWords(components) {
 export function mount(root, store, { say, of }) {
   const summary = html('p', { class: 'note-line' });
   const table = html('div', { class: 'sigs' });
-  root.replaceChildren(html('div', { class: 'sig h' }, ...['Signal', 'Value', 'Hz', 'Age, s'].map((word) => html('span', {}, word))), table, summary);
+  root.replaceChildren(html('div', { class: 'sig h' }, ...['Signal', 'Value', 'Hz', 'Age, s'].map((label) => html('span', {}, label))), table, summary);
   const feed = new CandidateFeed(store);
   /** @type {Map<string, ReturnType<typeof row>>} */
   const rows = new Map();

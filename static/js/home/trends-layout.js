@@ -61,14 +61,14 @@ function upTo(wanted, ends) {
 const NO_NUMBER = Infinity;
 
 /**
- * The last minute of all signals, in rings that never grow. A step of which nothing was told holds NaN.
+ * The last minute of all signals, in rings that never grow. A step that was not received holds NaN.
  */
 export class Minute {
-  /** The newest step told, or −1. */
+  /** The newest step received, or −1. */
   last = -1;
   /** The first step since the car was dialled. */
   since = 0;
-  /** First step after which some were missed and are not asked for yet; null: none. @type {number | null} */
+  /** First step after which some were missed and are not requested yet; null: none. @type {number | null} */
   missed = null;
   /** The newest frame's moment, as a step and its part. */
   now = 0;
@@ -87,9 +87,9 @@ export class Minute {
   }
 
   /**
-   * Steps the server told, in a state or on demand.
+   * Takes the steps that the server sent, in a state or on demand.
    * @param {Frame} frame
-   * @param {boolean} [isAnswer] to what was asked: what it lacks is not to be had
+   * @param {boolean} [isAnswer] to a request: what it lacks is not available
    */
   take(frame, isAnswer = false) {
     if (frame.since > this.since && this.last >= 0) this.clear(); // another car was dialled
@@ -114,7 +114,7 @@ export class Minute {
     }
   }
 
-  /** Whatever lies between the newest step and this one is unknown until it is told. @param {number} end */
+  /** The steps between the newest one and this one are unknown until they are received. @param {number} end */
   #open(end) {
     if (end <= this.last) return;
     const from = Math.max(this.last + 1, end - SPAN + 1);
@@ -138,13 +138,13 @@ export class Minute {
     /** @type {Course} */
     const course = { times_s: [], lowest: [], highest: [], gaps: [], low: NaN, high: NaN, isEmpty: true };
     if (!ring) return course;
-    let heard = now - SPAN; // up to where something was heard
+    let received = now - SPAN; // up to where data was received
     for (let step = first; step <= this.last && step < now; step += 1) {
       const low = ring.lowest[step % SPAN] ?? NaN;
       if (Number.isNaN(low) || step <= this.last - SPAN) continue;
       const at_s = Math.min(0, (step + 0.5 - now) * STEP_S);
-      if (step - heard > gap_steps) course.gaps.push([Math.max(-SPAN * STEP_S, (heard - now) * STEP_S), (step - now) * STEP_S]);
-      if (step - heard > gap_steps || low === NO_NUMBER) cut(course);
+      if (step - received > gap_steps) course.gaps.push([Math.max(-SPAN * STEP_S, (received - now) * STEP_S), (step - now) * STEP_S]);
+      if (step - received > gap_steps || low === NO_NUMBER) cut(course);
       if (low !== NO_NUMBER) {
         const high = ring.highest[step % SPAN] ?? low;
         course.times_s.push(at_s);
@@ -154,10 +154,10 @@ export class Minute {
         course.high = course.isEmpty ? high : Math.max(course.high, high);
         course.isEmpty = false;
       }
-      heard = step + 1;
+      received = step + 1;
     }
-    // The step under way is not told yet, and the frame that tells it takes its time.
-    if (now - heard > gap_steps + 2) course.gaps.push([Math.max(-SPAN * STEP_S, (heard - now) * STEP_S), 0]);
+    // The step under way is not received yet: the frame with it has a delay.
+    if (now - received > gap_steps + 2) course.gaps.push([Math.max(-SPAN * STEP_S, (received - now) * STEP_S), 0]);
     return course;
   }
 }

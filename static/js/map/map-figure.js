@@ -34,7 +34,7 @@ const LETTER_PX = 7.6;
 const KEYS_PX = 70;
 /** Lower, the compass and the scale are one above the other [px]. */
 const LOW_PX = 120;
-/** A lower map hides words that have no clear place [px]. */
+/** A lower map hides labels that have no clear place [px]. */
 const HIDING_PX = 200;
 /** Half the side of a mark [px]. */
 const MARK_PX = 16;
@@ -81,9 +81,9 @@ export class Figure {
     over.append(this.picture);
   }
 
-  /** @param {string} words what a reader hears */
-  describe(words) {
-    setAttribute(this.picture, 'aria-label', words);
+  /** @param {string} text for a screen reader */
+  describe(text) {
+    setAttribute(this.picture, 'aria-label', text);
   }
 
   /** @param {Shown} shown */
@@ -201,16 +201,16 @@ export class Figure {
 
   /** Where the bar of the scale ends. */
   #scaleEnd_px = 0;
-  /** By keys, by a head, by words that stand already. @type {import('./map-layout.js').Box[]} */
+  /** By keys, by a head, by labels drawn already. @type {import('./map-layout.js').Box[]} */
   #taken = [];
 
-  /** @param {SVGElement} text @param {Size} size @param {Pixel | null} at @param {string} words @param {boolean} isAbove @param {number} room */
-  #drawName(text, size, at, words, isAbove, room) {
+  /** @param {SVGElement} text @param {Size} size @param {Pixel | null} at @param {string} name @param {boolean} isAbove @param {number} room */
+  #drawName(text, size, at, name, isAbove, room) {
     const isShown = at !== null && at[0] > -20 && at[0] < size.width + 20 && at[1] > -20 && at[1] < size.height + 20;
     shown(text, isShown);
     if (!at) return;
-    if (text.textContent !== words) text.textContent = words;
-    const half = (words.length * LETTER_PX) / 2 + 8;
+    if (text.textContent !== name) text.textContent = name;
+    const half = (name.length * LETTER_PX) / 2 + 8;
     const y = isAbove ? at[1] - room - 10 : at[1] + room + 20;
     const x = Math.min(size.width - KEYS_PX - half, Math.max(half, at[0]));
     const isBesideScale = x - half > this.#scaleEnd_px + 8;
@@ -313,8 +313,8 @@ function place(text, x, y) {
  * @param {string} [beneath]
  */
 function write(text, number, beneath = '') {
-  const words = `${number}|${beneath}`;
-  if (text.getAttribute('data-words') === words) return;
-  text.setAttribute('data-words', words);
+  const key = `${number}|${beneath}`;
+  if (text.getAttribute('data-words') === key) return;
+  text.setAttribute('data-words', key);
   text.replaceChildren(svg('tspan', { class: 'num' }, number), ...(beneath ? [svg('tspan', { class: 'beneath', x: 0, dy: 18 }, beneath)] : []));
 }

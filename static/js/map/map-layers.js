@@ -20,7 +20,7 @@ const LEAFLET = '../../vendor/leaflet.js';
 const SHIFT_PX = 64;
 /** Tiles are stretched between this and 1.42 times their size. */
 const LEAST_STRETCH = 0.7;
-/** A layer whose tiles are fetched is asked about so often while a tile of it is missing [ms]. */
+/** A layer whose tiles are fetched is queried so often while a tile of it is missing [ms]. */
 const ASK_EVERY_MS = 10_000;
 
 export class Ground {
@@ -49,7 +49,7 @@ export class Ground {
     root.append(this.tiles);
   }
 
-  /** Asks the server what there is, and fetches what draws it. */
+  /** Fetches the list of layers, and the code that draws them. */
   async load() {
     const answer = await fetch('/api/map');
     if (!answer.ok) throw new Error(`status ${answer.status}`);
@@ -74,7 +74,7 @@ export class Ground {
   async #tile(layers) {
     await Promise.all([import(LEAFLET), fetchStyle(new URL('../../vendor/leaflet.css', import.meta.url).href)]);
     const L = /** @type {typeof import('leaflet')} */ (/** @type {any} */ (globalThis).L);
-    // It moves nothing by itself: the view is this map's own, and Leaflet is told of it.
+    // It moves nothing by itself: the view is this map's own, and Leaflet is set to it.
     this.#map = L.map(this.tiles, {
       attributionControl: false, zoomControl: false, dragging: false, touchZoom: false, scrollWheelZoom: false, doubleClickZoom: false, boxZoom: false, keyboard: false,
       zoomAnimation: false, fadeAnimation: false, markerZoomAnimation: false, inertia: false, trackResize: false, maxZoom: 24,
@@ -108,11 +108,11 @@ export class Ground {
       }
       this.onChange();
       if (was === null && this.#problem === null) return; // there is no such tile
-      for (const tile of this.#missing) tile.src = String(tile.src); // fetched again; if it fails again, this is asked again
+      for (const tile of this.#missing) tile.src = String(tile.src); // fetched again; if it fails again, this is queried again
     }, Math.max(0, this.#asked_ms + ASK_EVERY_MS - performance.now()));
   }
 
-  /** What stands against fetching tiles, as the server said last. @returns {string | null} */
+  /** Why tiles cannot be fetched, as the server last stated. @returns {string | null} */
   get #problem() {
     return this.#layers.find(({ upstream }) => upstream?.problem)?.upstream?.problem ?? null;
   }
@@ -130,10 +130,10 @@ export class Ground {
   }
 
   /**
-   * Whose ground it is, and whether there is any here: plain words.
+   * The attribution of the ground, or why there is none here.
    * @param {View} view
    */
-  words(view) {
+  caption(view) {
     if (!this.isThere) return '';
     const names = [...new Set([...this.#layers, ...(this.#image ? [this.#image] : [])].map(({ attribution }) => attribution).filter(Boolean))].join(' · ');
     const problem = this.#missing.size ? this.#problem : null;

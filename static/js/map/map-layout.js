@@ -108,11 +108,11 @@ export function overlap(a, b) {
 }
 
 /**
- * Where words stand: in their place, or as near above or below it as they are clear of what is taken.
- * @param {Box} box of the words
+ * The place of a label: its own, or the nearest above or below it that is clear of what is taken.
+ * @param {Box} box of the label
  * @param {Box[]} taken
  * @param {number} height of the map [px]
- * @returns {number | null} top of the words; null: nowhere
+ * @returns {number | null} top of the label; null: nowhere
  */
 export function clearTop(box, taken, height) {
   const beside = taken.flatMap(({ top, height: high }) => [top - box.height - 1, top + high + 1]);

@@ -19,13 +19,13 @@ export class MapPanel {
   draw({ car, phone, apart }, isTooFar) {
     const { at } = this;
     this.#drawFixes(car, phone);
-    const lines = { 'car-says': car.says, 'phone-says': phone.says, 'map-says': isTooFar ? 'Car and phone are too far apart for one view.' : '' };
-    for (const [name, says] of Object.entries(lines)) {
-      setWords(at(name), says);
-      show(at(name), says !== '');
+    const lines = { 'car-says': car.message, 'phone-says': phone.message, 'map-says': isTooFar ? 'Car and phone are too far apart for one view.' : '' };
+    for (const [name, message] of Object.entries(lines)) {
+      setWords(at(name), message);
+      show(at(name), message !== '');
     }
-    show(at('says'), Boolean(car.says || phone.says || isTooFar));
-    this.#announce(`${car.says} ${phone.says}`.trim());
+    show(at('says'), Boolean(car.message || phone.message || isTooFar));
+    this.#announce(`${car.message} ${phone.message}`.trim());
     const [number, unit] = apart ? distanceWords(apart.distance_m) : ['–', ''];
     setText(at('apart'), number);
     setText(at('apart-unit'), unit);
@@ -52,12 +52,12 @@ export class MapPanel {
     drawAge(at('phone-age'), phone.age_s, phone.place ? phoneInk : null);
   }
 
-  /** Announces what is wrong once to a screen reader, not with every second of its age. @param {string} says */
-  #announce(says) {
-    const kind = says.replace(/\d+/g, '');
+  /** Announces what is wrong once to a screen reader, not with every second of its age. @param {string} message */
+  #announce(message) {
+    const kind = message.replace(/\d+/g, '');
     if (kind === this.#announced) return;
     this.#announced = kind;
-    setText(this.at('spoken'), says);
+    setText(this.at('spoken'), message);
   }
 
   #drawPhones() {

@@ -1,4 +1,4 @@
-// What the map says of the car and of the phone, and how much ink each deserves: pure functions of the newest frame.
+// The texts of the car and of the phone on the map, and the freshness of each: pure functions of the newest frame.
 
 import { bearing_deg, distance_m, placeOf } from '../core/geodesy.js';
 import { ellipseOf } from './map-layout.js';
@@ -19,7 +19,7 @@ import { age, distanceWords, fixed, heading } from '../core/format.js';
  * @property {number | null} heading_deg
  * @property {boolean} isHeadingLive
  * @property {string} label on the map
- * @property {string} says a sentence where something is to be said, else ""
+ * @property {string} message why it is not current, else ""
  *
  * @typedef {object} PhoneOnMap
  * @property {Place | null} place
@@ -27,7 +27,7 @@ import { age, distanceWords, fixed, heading } from '../core/format.js';
  * @property {number | null} age_s
  * @property {number | null} accuracy_m
  * @property {string} label
- * @property {string} says
+ * @property {string} message
  *
  * @typedef {{distance_m: number, bearing_deg: number, allowed_m: number | null}} Apart allowed_m: null where the server did not compare them
  */
@@ -51,8 +51,8 @@ export function carOf(frame, freshnessStyle) {
   const isLive = place !== null && (ink === 'fresh' || ink === 'ageing');
   const ellipse = hasFix ? ellipseOf(fix['covariance_m2'], fix['sigma_m']) : null;
   const turn = freshnessStyle('heading');
-  const said_deg = frame.signals['heading']?.value?.['heading_deg'];
-  const heading_deg = typeof said_deg === 'number' && Number.isFinite(said_deg) ? said_deg : null;
+  const measured_deg = frame.signals['heading']?.value?.['heading_deg'];
+  const heading_deg = typeof measured_deg === 'number' && Number.isFinite(measured_deg) ? measured_deg : null;
   const isHeadingLive = heading_deg !== null && (turn.ink === 'fresh' || turn.ink === 'ageing');
   const unknown = [...(ellipse ? [] : ['accuracy']), ...(heading_deg === null ? ['heading'] : [])];
   const known = [
@@ -64,12 +64,12 @@ export function carOf(frame, freshnessStyle) {
     place, isLive, ink, age_s, ellipse,
     heading_deg, isHeadingLive,
     label: isLive ? known : `Car STALE ${age(age_s)} s`,
-    says: carSays(ink, age_s, fix !== null && !hasFix),
+    message: carMessage(ink, age_s, fix !== null && !hasFix),
   };
 }
 
 /** @param {Freshness} ink @param {number | null} age_s @param {boolean} isLost */
-function carSays(ink, age_s, isLost) {
+function carMessage(ink, age_s, isLost) {
   if (ink === 'not_published') return 'The car publishes no position.';
   if (ink === 'no_value' || ink === 'not_measured') return 'The car’s messages hold no usable position.';
   if (ink === 'never') return 'No position received from the car yet.';
@@ -87,20 +87,20 @@ function carSays(ink, age_s, isLost) {
  */
 export function phoneOf(frame, lag_s, page = '') {
   const phone = frame.phone ?? null;
-  if (!phone) return { place: null, isLive: false, age_s: null, accuracy_m: null, label: '', says: 'No phone is sharing its position.' };
+  if (!phone) return { place: null, isLive: false, age_s: null, accuracy_m: null, label: '', message: 'No phone is sharing its position.' };
   const age_s = phone.age_s === null ? null : phone.age_s + lag_s;
   const place = placeOf(phone);
-  // A coarse fix is one of now all the same; every other reason says that there is none of now.
+  // A coarse fix is one of now all the same; every other reason means that there is none of now.
   const isLive = place !== null && (phone.used || phone.why === 'coarse') && age_s !== null && age_s <= PHONE_LIVES_S;
   const name = phone.count > 1 ? nameOf(phone, page) : 'Phone'; // among several each has its own
   const whose = phone.count > 1 && phone.label ? ` Compared with ${phone.label}, one of ${phone.count} phones.` : '';
-  let says = '';
-  if (phone.why_text) says = `${phone.why_text}.`;
-  else if (place && !isLive) says = `The phone’s newest fix is ${age(age_s)} s old.`;
+  let message = '';
+  if (phone.why_text) message = `${phone.why_text}.`;
+  else if (place && !isLive) message = `The phone’s newest fix is ${age(age_s)} s old.`;
   return {
     place, isLive, age_s, accuracy_m: phone.accuracy_m,
     label: isLive ? `${name} ±${metres(phone.accuracy_m ?? 0)}` : `${name} STALE ${age(age_s)} s`,
-    says: `${says}${whose}`.trim(),
+    message: `${message}${whose}`.trim(),
   };
 }
 
@@ -129,7 +129,7 @@ export function bearingWords(bearing) {
   return `${degrees} ${point}`;
 }
 
-/** What a reader hears for the picture. @param {CarShown} car @param {PhoneOnMap} phone @param {Apart | null} apart */
+/** The text of the picture for a screen reader. @param {CarShown} car @param {PhoneOnMap} phone @param {Apart | null} apart */
 export function pictureWords(car, phone, apart) {
   if (apart) return `Map: the car is ${distanceWords(apart.distance_m).join(' ')} from the phone, at ${bearingWords(apart.bearing_deg)} of it`;
   const seen = [car.isLive ? 'the car' : '', phone.isLive ? 'the phone' : ''].filter(Boolean);

@@ -1,4 +1,4 @@
-// The track on the page: asked for by number, whole when the page came late, and drawn as lines that end where the way is
+// The track on the page: requested by number, whole when the page came late, and drawn as lines that end where the way is
 // not known.
 
 import { offsetOf } from '../core/geodesy.js';
@@ -10,7 +10,7 @@ import { offsetOf } from '../core/geodesy.js';
 
 /** More points than this are thinned here too: every other one [points]. */
 export const MOST = 4000;
-/** Asked for at most so often [ms]; after a failure, so much later. */
+/** Requested at most so often [ms]; after a failure, so much later. */
 const EVERY_MS = 1000;
 const AGAIN_MS = 3000;
 /** A dot on the track each so many seconds. */
@@ -86,7 +86,7 @@ export function trackPaths(points, anchor) {
   return paths;
 }
 
-/** Asks the server for what the track lacks. */
+/** Fetches from the server what the track lacks. */
 export class TrackFeed {
   track = new Track();
   #isAsking = false;
@@ -118,7 +118,7 @@ export class TrackFeed {
     const answer = await fetch(`/api/track/points?after=${after}${whose}`);
     if (!answer.ok) throw new Error(`status ${answer.status}`);
     const { number, points } = await answer.json();
-    if (`${boot} ${number}` !== key) return; // another track began meanwhile: the next state says so
+    if (`${boot} ${number}` !== key) return; // another track began meanwhile: the next state has its number
     this.track.take(key, points);
     this.onChange();
   }

@@ -12,7 +12,7 @@ import { apartOf, carOf, phoneOf, pictureWords } from './map-text.js';
 import { othersOn } from '../phone/phones-layout.js';
 
 /**
- * @typedef {object} Known what the newest frame says of the positions
+ * @typedef {object} Known the positions of the newest frame
  * @property {import('./map-text.js').CarShown} car
  * @property {import('./map-text.js').PhoneOnMap} phone
  * @property {import('./map-text.js').Apart | null} apart
@@ -176,7 +176,7 @@ class MapTab {
     if (!this.known) return;
     show(at('none'), !map.isPlaced);
     this.panel.draw(this.known, map.isTooFar);
-    setText(at('by'), this.ground.words(map.aim));
+    setText(at('by'), this.ground.caption(map.aim));
     this.figure.describe(pictureWords(this.known.car, this.known.phone, this.known.apart));
   }
 

@@ -6,7 +6,7 @@ import { limitsOf } from '../core/round-trip.js';
 const A_DAY_MS = 86_400_000;
 
 /**
- * @typedef {{code?: string, detail?: string}} Refusal as the server words it
+ * @typedef {{code?: string, detail?: string}} Refusal as the server formulates it
  */
 
 export class Admission {

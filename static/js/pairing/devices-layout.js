@@ -1,4 +1,4 @@
-// The paired devices in words, as plain functions.
+// The texts of the paired devices, as pure functions.
 
 import { counted } from '../core/format.js';
 
@@ -21,9 +21,9 @@ export function seenWords({ seen_ms, sockets }, now_ms) {
 }
 
 /**
- * What the question before a removal says.
+ * The question before a removal.
  * @param {Device} device
- * @param {string} you id of the device that asks
+ * @param {string} you id of the device of this page
  * @param {Device[]} all
  * @returns {[string, string]}
  */

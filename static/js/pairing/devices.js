@@ -18,10 +18,10 @@ const ROLES = /** @type {const} */ ([['viewer', 'Viewer'], ['operator', 'Operato
 
 /**
  * @param {HTMLElement} place
- * @param {HTMLDetailsElement} group in which it lies: what is folded away asks nothing
+ * @param {HTMLDetailsElement} group in which it is: while folded it requests nothing
  * @param {import('../core/store.js').Store} store
  * @param {Say} say
- * @param {(words: string) => void} head says at the group's head what holds
+ * @param {(text: string) => void} head shows the state in the group's summary
  */
 export async function mount(place, group, store, say, head) {
   await styled('access');
@@ -40,7 +40,7 @@ class Devices {
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   #next;
 
-  /** @param {HTMLElement} place @param {HTMLDetailsElement} group @param {Say} say @param {(words: string) => void} head */
+  /** @param {HTMLElement} place @param {HTMLDetailsElement} group @param {Say} say @param {(text: string) => void} head */
   constructor(place, group, say, head) {
     this.group = group;
     this.say = say;
@@ -152,7 +152,7 @@ class Removal {
     });
   }
 
-  /** @param {Device} device @param {[string, string]} words */
+  /** @param {Device} device @param {[string, string]} question title and text */
   open(device, [title, text]) {
     this.#device = device;
     setText(this.title, title);
@@ -166,7 +166,7 @@ class Invitation {
   /** @type {'viewer' | 'operator'} */
   #role = 'viewer';
   #until_ms = 0;
-  #asked = 0;
+  #count = 0;
   /** @type {ReturnType<typeof setInterval> | undefined} */
   #ticking;
 
@@ -197,11 +197,11 @@ class Invitation {
     show(this.code, false);
     setText(this.pin, '');
     setText(this.state, 'Loading from the server…');
-    this.#asked += 1;
-    const mine = this.#asked;
+    this.#count += 1;
+    const mine = this.#count;
     try {
       const { pin, qr, expires_in_s } = await request('/api/devices/invite', { method: 'POST', body: { role } });
-      if (mine !== this.#asked) return;
+      if (mine !== this.#count) return;
       this.code.src = qr;
       show(this.code, true);
       setText(this.pin, pinShown(pin));
@@ -209,7 +209,7 @@ class Invitation {
       this.#tick();
       this.#ticking = setInterval(() => this.#tick(), 1000);
     } catch (error) {
-      if (mine === this.#asked) setWords(this.state, sentenceOf(error));
+      if (mine === this.#count) setWords(this.state, sentenceOf(error));
     }
   }
 

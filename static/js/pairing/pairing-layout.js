@@ -1,4 +1,4 @@
-// What the pairing screen says, as plain functions.
+// The texts of the pairing screen, as pure functions.
 
 import { counted } from '../core/format.js';
 
@@ -23,7 +23,7 @@ export function reasonWords({ code, detail }) {
 }
 
 /**
- * What came of a try, in words and whether to try again makes sense.
+ * The result of a try as text, and whether to try again makes sense.
  * @param {number} status of the answer; 0: none came
  * @param {{code?: string, detail?: string, wait_s?: number}} body
  * @returns {{sentence: string, wait_s: number, isLinkOver: boolean}}
@@ -41,7 +41,7 @@ export function triedWords(status, { code, detail, wait_s }) {
   return { sentence, wait_s: wait, isLinkOver: code === 'used' };
 }
 
-/** What the key says while one must wait. @param {number} left_s */
+/** The label of the key during the waiting time. @param {number} left_s */
 export function waitWords(left_s) {
   return `Wait ${counted(left_s, 'second')}`;
 }

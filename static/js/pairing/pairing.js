@@ -45,25 +45,25 @@ class PairingScreen {
     });
     onLink(() => {
       this.#token = linkToken();
-      setText(this.parts.says, '');
+      setText(this.parts.message, '');
       this.draw();
     });
   }
 
   /** @param {string} digits */
   #enter(digits) {
-    const { pin, says } = this.parts;
-    setText(says, '');
+    const { pin, message } = this.parts;
+    setText(message, '');
     if (pinShown(digits) !== pin.value) pin.value = pinShown(digits);
     this.draw();
   }
 
   async #pair() {
-    const { own, pin, says } = this.parts;
+    const { own, pin, message } = this.parts;
     const digits = digitsOf(pin.value);
     if (this.#isBusy || this.#waiting_s > 0) return;
     if (this.#token === null && digits.length < PIN_DIGITS) {
-      setText(says, `The PIN has ${PIN_DIGITS} digits.`);
+      setText(message, `The PIN has ${PIN_DIGITS} digits.`);
       pin.focus();
       return;
     }
@@ -79,9 +79,9 @@ class PairingScreen {
     if (isLinkOver) this.#token = null;
     this.#waitUntil_ms = performance.now() + wait_s * 1000;
     pin.value = '';
-    setWords(says, sentence);
+    setWords(message, sentence);
     this.draw();
-    says.scrollIntoView({ block: 'nearest' }); // on a small screen it is beneath the digits
+    message.scrollIntoView({ block: 'nearest' }); // on a small screen it is beneath the digits
   }
 
   /** How long the server accepts no PIN [s]. */
@@ -124,7 +124,7 @@ function build(root, why, name) {
   const pin = /** @type {HTMLInputElement} */ (html('input', {
     id: 'pair-pin', class: 'n', type: 'text', inputmode: 'numeric', autocomplete: 'one-time-code', pattern: '[0-9 ]*', maxlength: 12, enterkeyhint: 'go', placeholder: '––– –––', 'aria-describedby': 'pair-says', 'data-f': 'pair-pin',
   }));
-  const says = html('p', { class: 'says', id: 'pair-says', role: 'alert', 'data-f': 'pair-says' });
+  const message = html('p', { class: 'says', id: 'pair-says', role: 'alert', 'data-f': 'pair-says' });
   const go = html('button', { type: 'submit', class: 'main', 'data-f': 'pair-go' });
   const pad = html('div', { class: 'pad', role: 'group', 'aria-label': 'Digits' },
     ...['1', '2', '3', '4', '5', '6', '7', '8', '9'].map((digit) => html('button', { type: 'button', class: 'key n', 'data-digit': digit }, digit)),
@@ -135,8 +135,8 @@ function build(root, why, name) {
     html('div', { class: 'view' },
       html('div', { class: 'hero' }, html('h1', { tabindex: -1 }, 'Pair this device')), reason, where,
       html('div', { class: 'lab-row' }, html('label', { for: 'pair-name' }, 'Name of this device')), html('div', { class: 'field' }, own),
-      byPin, says),
+      byPin, message),
     html('div', { class: 'bottom' }, go));
   root.replaceChildren(html('header', { class: 'top' }, html('span', { class: 'link' }, 'catgraph')), form);
-  return { where, own, pin, says, go, pad, byPin, form };
+  return { where, own, pin, message, go, pad, byPin, form };
 }

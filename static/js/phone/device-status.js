@@ -17,7 +17,7 @@ export class DeviceStatus {
   /** @type {boolean | null} */
   charging = null;
   isApple = isApple(navigator.userAgent, navigator.maxTouchPoints);
-  /** A computer on a desk knows the call and has nothing that shakes. */
+  /** A desktop computer has the function and no vibration motor. */
   vibrates = typeof navigator.vibrate === 'function' && matchMedia('(pointer: coarse)').matches;
 
   constructor() {

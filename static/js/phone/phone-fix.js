@@ -9,7 +9,7 @@
 
 /** A position at most so often [ms]. */
 const FIX_EVERY_MS = 1000;
-/** A reason again after so long: the server takes a phone that says nothing for 5 s for lost [ms]. */
+/** A reason again after so long: the server considers a phone lost that sends nothing for 5 s [ms]. */
 const WHY_EVERY_MS = 3000;
 /** Without a fix for so long the phone waits for one; a single failure in between is none [ms]. */
 const NO_FIX_MS = 4000;
@@ -29,7 +29,7 @@ export class FixClock {
   #lags_ms = [];
 
   /**
-   * Note a fix stamped `stamp_ms` that came when the browser's wall clock said `wall_ms`.
+   * Note a fix stamped `stamp_ms` that came when the browser's wall clock showed `wall_ms`.
    * @param {number} stamp_ms
    * @param {number} wall_ms
    * @returns {number} its age when it came [ms], ≥ 0
@@ -53,7 +53,7 @@ export class PositionReporter {
   #clock = new FixClock();
   /** @type {{coords: Coords, stamp_ms: number, age_ms: number} | null} */
   #newest = null;
-  /** When the newest fix came; before there is one, when the first was asked for. */
+  /** When the newest fix came; before there is one, when the first was requested. */
   #heard_ms = -Infinity;
   #isNew = false;
   /** @type {Why | null} what stands until a fix comes */
@@ -63,7 +63,7 @@ export class PositionReporter {
   #sentWhy = null;
   isHidden = false;
 
-  /** Positions are asked for from now on. @param {number} now_ms */
+  /** Positions are requested from now on. @param {number} now_ms */
   begin(now_ms) {
     this.#heard_ms = now_ms;
     this.#failure = null;
@@ -124,7 +124,7 @@ export class PositionReporter {
     if ('fix' in report) this.#isNew = false;
   }
 
-  /** Nobody has heard anything: another connection. */
+  /** Nothing was sent yet: another connection. */
   forget() {
     this.#sent_ms = -Infinity;
     this.#sentWhy = null;

@@ -1,4 +1,4 @@
-// This phone's position: asked of the browser once the operator armed it, told to the server while a car is monitored.
+// This phone's position: requested from the browser once the operator armed it, sent to the server while a car is monitored.
 
 import { ownName } from '../control/own-name.js';
 import { PositionReporter, whyOf } from './phone-fix.js';
@@ -7,11 +7,11 @@ import { PositionReporter, whyOf } from './phone-fix.js';
 
 const ARMED = 'catgraph.armed';
 const OPTIONS = { enableHighAccuracy: true, maximumAge: 0, timeout: 10000 };
-/** A watch may say nothing while the phone lies still: it is asked again then [ms]. */
+/** A watch may report nothing while the phone does not move: it is started again then [ms]. */
 const NUDGE_MS = 2500;
 /** The tap comes before the car is dialled [ms]. */
 const DIALLING_MS = 15000;
-/** The server's time in a frame older than this says little of the way [ms]. */
+/** The server's time in a frame older than this tells little about the delay [ms]. */
 const ECHO_MS = 2000;
 
 /** Only then a position is wanted. */
@@ -47,7 +47,7 @@ export class Phone {
   #watch = null;
   #isNudged = false;
   #hasFix = false;
-  /** No receiver is expected of a computer on a desk. */
+  /** No receiver is expected of a desktop computer. */
   #isHandheld = matchMedia('(pointer: coarse)').matches;
 
   /** @param {import('../core/store.js').Store} store */
@@ -64,7 +64,7 @@ export class Phone {
     document.addEventListener('visibilitychange', () => this.#turn());
     window.addEventListener('pagehide', () => this.#leave());
     window.addEventListener('pageshow', look);
-    // Browsers tell beforehand only what was answered before; this asks nothing of anybody.
+    // Browsers report only an earlier decision here; this query shows no prompt.
     navigator.permissions?.query({ name: 'geolocation' }).then((permission) => {
       const note = () => this.#permitted(permission.state);
       note();
@@ -92,8 +92,8 @@ export class Phone {
     const was = this.#permission;
     this.#permission = state;
     if (state === 'granted') {
-      this.#isArmed = true; // said once for this server: a reload needs no tap
-      if (was !== null) this.#again(); // the watch ended with the permission, whatever it says
+      this.#isArmed = true; // armed once for this server: a reload needs no tap
+      if (was !== null) this.#again(); // the watch ended with the permission, whatever it reports
     } else if (was === 'granted') {
       this.#stop();
       this.#reporter.fail('denied');
@@ -115,7 +115,7 @@ export class Phone {
 
   /** @param {GeolocationPosition} found */
   #found({ coords, timestamp }) {
-    if (this.#watch === null) return; // an answer to what is not asked any more
+    if (this.#watch === null) return; // an answer to a request that no longer holds
     this.#isNudged = false;
     this.#hasFix = true;
     this.#reporter.fix(coords, timestamp, this.store.now(), Date.now());
@@ -154,14 +154,14 @@ export class Phone {
     if (!this.#isArmed || !frame || held_ms > ECHO_MS || !WATCHED.includes(store.heeded?.session.phase ?? '')) return;
     const report = this.#reporter.due(now_ms);
     if (!report) return;
-    const said = 'fix' in report ? { fix: { ...report.fix, heard_ms: frame.server.time_ms, held_s: held_ms / 1000 } } : report;
-    if (this.#send(said)) this.#reporter.sent(report, now_ms);
+    const message = 'fix' in report ? { fix: { ...report.fix, heard_ms: frame.server.time_ms, held_s: held_ms / 1000 } } : report;
+    if (this.#send(message)) this.#reporter.sent(report, now_ms);
   }
 
-  /** @param {object} said */
-  #send(said) {
+  /** @param {object} message */
+  #send(message) {
     if (this.store.isViewer) return false; // the car is compared with an operator's phone
-    return this.store.socket.send({ kind: 'position', id: 'position', phone: this.#name, handheld: this.#isHandheld, ...said });
+    return this.store.socket.send({ kind: 'position', id: 'position', phone: this.#name, handheld: this.#isHandheld, ...message });
   }
 
   /** In the background a phone gives no position; in front again its watch may be dead without saying so. */

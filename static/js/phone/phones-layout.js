@@ -1,4 +1,4 @@
-// What is said of each phone that shares its position, and which of them is compared with the car: pure functions.
+// The text of each phone that shares its position, and which of them is compared with the car: pure functions.
 
 import { placeOf } from '../core/geodesy.js';
 import { age, fixed } from '../core/format.js';
@@ -25,9 +25,9 @@ export function nameOf(phone, page) {
 export function phoneRow(phone, lag_s, page) {
   const age_s = phone.age_s === null ? null : phone.age_s + lag_s;
   const fix = phone.accuracy_m === null || age_s === null ? 'No GPS fix yet' : `Accurate to ${fixed(phone.accuracy_m, 0)} m, ${age(age_s)} s ago`;
-  const says = `${phone.why_text || fix}.`;
+  const text = `${phone.why_text || fix}.`;
   const tag = phone.chosen ? 'In the car' : phone.compared ? 'Used' : '';
-  return { id: phone.id, name: nameOf(phone, page), says, tag, isChosen: phone.chosen === true };
+  return { id: phone.id, name: nameOf(phone, page), text, tag, isChosen: phone.chosen === true };
 }
 
 /** In one line: how many phones, and which is compared. @param {State} frame @param {string} page */

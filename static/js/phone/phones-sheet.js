@@ -1,4 +1,4 @@
-// The sheet of all phones that share their position: why one has no position, and which of them rides in the car.
+// The sheet of all phones that share their position: why one has no position, and which of them is in the car.
 
 import { html, icon, setWords, words } from '../core/dom.js';
 import { phoneRow } from './phones-layout.js';
@@ -36,7 +36,7 @@ export function openPhones(store, say) {
     const focused = /** @type {HTMLElement | null} */ (document.activeElement)?.dataset['phone'];
     list.replaceChildren(...rows.map((row) => {
       const button = html('button', { type: 'button', 'aria-pressed': String(row.isChosen), 'data-phone': row.id }, icon('phone'),
-        html('span', {}, html('b', {}, ...words(row.name)), html('br'), html('span', { class: 'small sub' }, ...words(row.says))),
+        html('span', {}, html('b', {}, ...words(row.name)), html('br'), html('span', { class: 'small sub' }, ...words(row.text))),
         ...(row.tag ? [html('span', { class: 'tag' }, row.tag)] : []));
       button.addEventListener('click', () => void ride(row.isChosen ? null : row.id));
       return html('li', {}, button);

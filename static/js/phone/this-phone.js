@@ -1,10 +1,10 @@
-// The sheet that says what this phone can do: sound, screen, vibration, battery, network, position; and arms it.
+// The sheet of what this phone can do: sound, screen, vibration, battery, network, position; and arms it.
 
 import { html, icon, setWords, words } from '../core/dom.js';
 import { addSheet, openSheet } from '../shell/sheet.js';
 import { rowsOf, verdictOf } from './this-phone-layout.js';
 
-const SAID = { sounding: 'That was an alarm sound. If you did not hear it, turn the media volume up.', missing: 'This browser has no sound.', blocked: 'The phone blocks this page’s sound: touch the page, then try again.', busy: 'An alarm is already sounding.' };
+const RESULTS = { sounding: 'That was an alarm sound. If you did not hear it, turn the media volume up.', missing: 'This browser has no sound.', blocked: 'The phone blocks this page’s sound: touch the page, then try again.', busy: 'An alarm is already sounding.' };
 
 /**
  * @param {import('../core/store.js').Store} store
@@ -20,13 +20,13 @@ export function openThisPhone(store, arming, deviceStatus) {
     html('div', { class: 'bd' }, html('h2', { id: 'this-phone-title' }, 'This device'), verdict), html('div', { class: 'menu-list' }, list),
     html('div', { class: 'keys' }, html('div', { class: 'pair' }, test, arm), html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
   let shown = '';
-  let said = '';
+  let result = '';
 
   function factsNow() {
     const { alarmSound, arms } = arming;
     const mine = (store.frame?.phones ?? []).find((one) => one.id === store.page);
     return {
-      ...arms, sound: alarmSound.isInterrupted ? /** @type {const} */ ('interrupted') : arms.sound, positionSays: mine?.why_text ? `${mine.why_text}.` : '', rides: mine?.chosen === true,
+      ...arms, sound: alarmSound.isInterrupted ? /** @type {const} */ ('interrupted') : arms.sound, positionSays: mine?.why_text ? `${mine.why_text}.` : '', isInCar: mine?.chosen === true,
       vibrates: deviceStatus.vibrates, battery: deviceStatus.battery, charging: deviceStatus.charging, isOnline: deviceStatus.isOnline, network: deviceStatus.network, lag_s: store.lag_s,
       isApple: deviceStatus.isApple, isSecure: window.isSecureContext, isReplaying: store.replaying, key: store.seal.key,
     };
@@ -34,22 +34,22 @@ export function openThisPhone(store, arming, deviceStatus) {
 
   function draw() {
     const facts = factsNow();
-    setWords(verdict, said || verdictOf(facts).text);
+    setWords(verdict, result || verdictOf(facts).text);
     const rows = rowsOf(facts);
     const key = JSON.stringify(rows);
     if (key === shown) return;
     shown = key;
-    list.replaceChildren(...rows.map((row) => html('li', {}, icon(row.icon), html('span', {}, html('span', { class: 't' }, row.what), html('br'), html('span', { class: 'm' }, ...words(row.says))),
+    list.replaceChildren(...rows.map((row) => html('li', {}, icon(row.icon), html('span', {}, html('span', { class: 't' }, row.what), html('br'), html('span', { class: 'm' }, ...words(row.text))),
       html('span', { class: row.kind === 'plain' ? 'tag' : `tag ${row.kind}` }, ...(row.kind === 'plain' ? [icon('ok', 's')] : row.kind === 'warn' ? [icon('warn', 's')] : []), ...words(row.tag)))));
   }
 
   arm.addEventListener('click', () => {
-    said = '';
+    result = '';
     arming.ask();
     draw();
   });
   test.addEventListener('click', async () => {
-    said = SAID[await arming.alarmSound.test('medium')];
+    result = RESULTS[await arming.alarmSound.test('medium')];
     draw();
   });
   const stops = [store.on('draw', draw), store.on('tick', draw), addSheet(sheet)];

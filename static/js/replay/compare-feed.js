@@ -3,12 +3,12 @@
 import { lacks } from './compare-layout.js';
 import { ranked } from '../core/priority.js';
 
-/** A view that changes is asked for once it has rested so long [ms]. */
+/** A view that changes is requested once it has rested so long [ms]. */
 const REST_MS = 150;
-/** While a recording is still being read, it is asked for again so often [ms]. */
+/** While a recording is still being read, it is requested again so often [ms]. */
 const GROWS_MS = 1500;
 const OVERVIEW_MS = 5000;
-/** One that failed is asked for again so soon [ms]. */
+/** A failed request is repeated so soon [ms]. */
 const FAILED_MS = 3000;
 const BUCKETS = 500;
 const OVERVIEW_BUCKETS = 300;
@@ -44,7 +44,7 @@ export class SideFeed {
   }
 
   /**
-   * Called again and again: asks for what is due, one thing at a time.
+   * Called again and again: requests what is due, one thing at a time.
    * @param {string} token
    * @param {string[]} signals
    * @param {View} view on its own time line
@@ -87,11 +87,11 @@ export class SideFeed {
     return request(this.#token, { signals: 'speed', buckets: BUCKETS, from_s, to_s });
   }
 
-  /** @param {Record<string, string | number>} asked @param {(answer: Answer) => void} take */
-  async #fetch(asked, take) {
+  /** @param {Record<string, string | number>} fields @param {(answer: Answer) => void} take */
+  async #fetch(fields, take) {
     const token = this.#token;
     this.#isAsking = true;
-    const answer = await request(token, asked);
+    const answer = await request(token, fields);
     this.#isAsking = false;
     if (token !== this.#token) return;
     if (!answer) {
@@ -103,9 +103,9 @@ export class SideFeed {
   }
 }
 
-/** @param {string} token @param {Record<string, string | number>} asked @returns {Promise<Answer | null>} */
-async function request(token, asked) {
-  const query = new URLSearchParams(Object.entries(asked).map(([name, value]) => [name, typeof value === 'number' ? String(Number(value.toFixed(2))) : value]));
+/** @param {string} token @param {Record<string, string | number>} fields @returns {Promise<Answer | null>} */
+async function request(token, fields) {
+  const query = new URLSearchParams(Object.entries(fields).map(([name, value]) => [name, typeof value === 'number' ? String(Number(value.toFixed(2))) : value]));
   query.set('replay', token);
   try {
     const answer = await fetch(`/api/trends/drive?${query}`, { cache: 'no-store' });
@@ -114,6 +114,6 @@ async function request(token, asked) {
     ranked(found.marks);
     return found;
   } catch {
-    return null; // asked again
+    return null; // requested again
   }
 }

@@ -1,4 +1,4 @@
-// Two recordings on one time line: where each begins on it, what each is ordered, and in which words. Pure functions, no DOM.
+// Two recordings on one time line: where each begins on it, the commands to each, and the texts. Pure functions, no DOM.
 
 import { lineOf } from '../home/drive-layout.js';
 import { counted, duration, fixed } from '../core/format.js';
@@ -130,7 +130,7 @@ export function checkWords(checks) {
 }
 
 /**
- * Where a recording has nothing, on the time line: before it begins, after it ends, where no message came; with why in a word.
+ * Where a recording has nothing, on the time line: before it begins, after it ends, where no message came; with the reason as a short text.
  * @param {Answer | null} answer
  * @param {string} signal
  * @param {number} begin_s

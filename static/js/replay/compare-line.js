@@ -91,7 +91,7 @@ export class CompareLine {
   /**
    * Both lanes; again only where something changed.
    * @param {Record<Name, {overview: Answer | null, begin_s: number, length_s: number}>} sides
-   * @param {string} key by which they are told apart
+   * @param {string} key that distinguishes them
    */
   fill(sides, key) {
     const width = this.slider.clientWidth;

@@ -142,7 +142,7 @@ export class Pace {
     this.#order('b');
   }
 
-  /** The leader says where the time line has come to while it plays. @param {Name} name */
+  /** The leader determines the position of the time line while it plays. @param {Name} name */
   #follow(name) {
     const side = this.sides[name];
     if (!side || side !== this.#leader) return;

@@ -145,23 +145,23 @@ class Pane {
     g.font = `${13 * ratio}px ${getComputedStyle(this.host).fontFamily}`;
     g.textAlign = 'left';
     g.textBaseline = 'middle';
-    for (const { box: [left, top, width, height], words } of this.#holes(plot)) {
-      const said = [words, words.slice(0, 1)].find((one) => g.measureText(one).width + 12 * ratio <= width);
-      if (said === undefined) continue;
-      const long = g.measureText(said).width;
+    for (const { box: [left, top, width, height], text } of this.#holes(plot)) {
+      const shown = [text, text.slice(0, 1)].find((one) => g.measureText(one).width + 12 * ratio <= width);
+      if (shown === undefined) continue;
+      const long = g.measureText(shown).width;
       g.fillStyle = this.panes.palette.panel;
       g.fillRect(left + 4 * ratio, top + height / 2 - 9 * ratio, long + 8 * ratio, 18 * ratio);
       g.fillStyle = this.panes.palette.ink;
-      g.fillText(said, left + 8 * ratio, top + height / 2);
+      g.fillText(shown, left + 8 * ratio, top + height / 2);
     }
   }
 
-  /** What A lacks in the upper half, what B lacks in the lower. @param {uPlot} plot @returns {{box: [number, number, number, number], i: number, words: string}[]} */
+  /** What A lacks in the upper half, what B lacks in the lower. @param {uPlot} plot @returns {{box: [number, number, number, number], i: number, text: string}[]} */
   #holes(plot) {
     const scene = this.panes.sceneOf();
     const { bbox } = plot;
     const ratio = devicePixelRatio || 1;
-    /** @type {{box: [number, number, number, number], i: number, words: string}[]} */
+    /** @type {{box: [number, number, number, number], i: number, text: string}[]} */
     const found = [];
     if (!scene) return found;
     for (const [i, name] of NAMES.entries()) {
@@ -170,7 +170,7 @@ class Pane {
       for (const { from_s, to_s, why } of holesOf(answer, this.spec.name, begin_s, length_s)) {
         const [a, b] = [this.#x(plot, Math.max(from_s, scene.view[0])), this.#x(plot, Math.min(to_s, scene.view[1]))];
         if (!(b > a)) continue;
-        found.push({ box: [a, top, Math.max(b - a, 2 * ratio), height], i, words: `${name.toUpperCase()}: ${why}` });
+        found.push({ box: [a, top, Math.max(b - a, 2 * ratio), height], i, text: `${name.toUpperCase()}: ${why}` });
       }
     }
     return found;
@@ -257,7 +257,7 @@ class Pane {
         g.stroke();
         if (drawn.has(limit)) return;
         drawn.add(limit);
-        const words = `${name === 'b' ? 'B ' : ''}limit ${fixed(shownIn(limit, this.spec.unit).value, this.spec.digits)}`;
+        const label = `${name === 'b' ? 'B ' : ''}limit ${fixed(shownIn(limit, this.spec.unit).value, this.spec.digits)}`;
         g.font = `700 ${13 * ratio}px ${getComputedStyle(this.host).fontFamily}`;
         g.textAlign = 'right';
         g.textBaseline = y - bbox.top < 18 * ratio ? 'top' : 'bottom';
@@ -265,9 +265,9 @@ class Pane {
         g.setLineDash([]);
         g.lineWidth = 4 * ratio;
         g.strokeStyle = palette.panel;
-        g.strokeText(words, at[0] ?? 0, at[1] ?? 0);
+        g.strokeText(label, at[0] ?? 0, at[1] ?? 0);
         g.fillStyle = palette.you;
-        g.fillText(words, at[0] ?? 0, at[1] ?? 0);
+        g.fillText(label, at[0] ?? 0, at[1] ?? 0);
       });
     }
   }

@@ -10,7 +10,7 @@ export const STEPS = /** @type {const} */ ([['−1 s', -1], ['−0.1', -0.1], ['
 export function build() {
   const title = html('h2', { tabindex: -1 }, 'Compare');
   const seg = (/** @type {string} */ label, /** @type {HTMLElement[]} */ keys) => html('div', { class: 'seg', role: 'group', 'aria-label': label }, ...keys);
-  const key = (/** @type {string} */ words, kind = '') => html('button', { type: 'button', ...(kind ? { class: kind } : { 'aria-pressed': 'false' }) }, words);
+  const key = (/** @type {string} */ label, kind = '') => html('button', { type: 'button', ...(kind ? { class: kind } : { 'aria-pressed': 'false' }) }, label);
   const ranges = RANGES.map(([name]) => key(name));
   const aligns = { start: key('Same start'), clock: key('Clock'), motion: key('First motion'), alarm: key('Same alarm') };
   const steps = STEPS.map(([name, by_s]) => html('button', { type: 'button', class: 'key n', 'aria-label': `B ${Math.abs(by_s)} s ${by_s < 0 ? 'earlier' : 'later'}` }, name));

@@ -1,4 +1,4 @@
-// Two recordings beside each other: the one that is replayed and a second one, on one time line. Only the first one's band says what is live.
+// Two recordings beside each other: the one that is replayed and a second one, on one time line. Only the first one's band shows the live car.
 
 import { html, listen, need, setAttribute, setWords } from '../core/dom.js';
 import { chosenSignals } from '../home/drive-choice.js';
@@ -105,7 +105,7 @@ class Compare {
     return this.parts.element.checkVisibility();
   }
 
-  /** The first recording alone. @param {string} [why] said, where it ended by itself */
+  /** The first recording alone. @param {string} [why] shown, where it ended by itself */
   leave(why) {
     if (this.#isOver) return;
     const { store } = this;

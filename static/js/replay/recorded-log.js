@@ -18,8 +18,8 @@ import { jumpsOf, lengthOfJump } from './replay-jumps-layout.js';
  */
 export function recordedLines(line, { at_s, start_ms }) {
   const at_ms = start_ms + at_s * 1000;
-  const said = (/** @type {string} */ title, text = '') => ({ at_ms, icon: 'clock', kind: '', title, text, priority: null });
-  if (!line) return [said('The recording is being read')];
+  const notice = (/** @type {string} */ title, text = '') => ({ at_ms, icon: 'clock', kind: '', title, text, priority: null });
+  if (!line) return [notice('The recording is being read')];
   const begun = jumpsOf(line).filter((jump) => jump.at_s <= at_s);
   const lines = begun.flatMap((jump) => {
     const [icon, kind] = jump.kind === 'gap' ? ['link-off', ''] : MARKS[/** @type {keyof typeof MARKS} */ (jump.kind)] ?? ['info', ''];
@@ -28,8 +28,8 @@ export function recordedLines(line, { at_s, start_ms }) {
     if (end_s === null || end_s > at_s) return [began];
     return [began, { ...began, at_ms: start_ms + end_s * 1000, icon: 'ok', kind: '', title: `${jump.title}: ended`, text: `after ${lengthOfJump(jump, true)}`, priority: null }];
   }).sort((a, b) => b.at_ms - a.at_ms);
-  const left = line.marks_left_out ? [said(`${counted(line.marks_left_out, 'more alarm')} not listed`)] : [];
-  const unread = !line.is_done && at_s > line.done_s ? [said('Not read yet', `events after ${timeOfDay(start_ms + line.done_s * 1000)} are not listed`)] : [];
+  const left = line.marks_left_out ? [notice(`${counted(line.marks_left_out, 'more alarm')} not listed`)] : [];
+  const unread = !line.is_done && at_s > line.done_s ? [notice('Not read yet', `events after ${timeOfDay(start_ms + line.done_s * 1000)} are not listed`)] : [];
   return [...unread, ...left, ...lines];
 }
 

@@ -17,7 +17,7 @@ export class ReplayBand {
   #recording = html('span', { class: 'recording' });
   /** Opens the list of alarms. */
   moment = html('button', { type: 'button', class: 'replay-line', 'aria-haspopup': 'dialog', disabled: true }, html('span', { class: 'said' }, this.#mark, this.#text, this.#end), this.#count, icon('next', 's'));
-  /** Leads back to the live car, where it asks for the operator. */
+  /** Leads back to the live car, where it needs the operator. */
   live = html('button', { type: 'button', class: 'replay-live', hidden: true }, icon('bell', 's'), this.#liveText, this.#recording, html('span', { class: 'end' }, 'Back to live'));
   element = html('section', { class: 'replay-band', 'aria-label': 'Replay of a recording' },
     html('div', { class: 'replay-date' }, this.#files, this.#what, this.#time), this.moment, this.#calm, this.live);
@@ -46,7 +46,7 @@ export class ReplayBand {
     setWords(this.#count, countWords(line));
   }
 
-  /** What is live: in a line, or as a key where it asks for the operator. @param {import('../core/protocol-types.js').LiveSummary | null | undefined} live */
+  /** What is live: in a line, or as a key where it needs the operator. @param {import('../core/protocol-types.js').LiveSummary | null | undefined} live */
   drawLive(live) {
     const aside = asideOf(live);
     const { text, recording } = liveWords(live);

@@ -28,7 +28,7 @@ export function jumpsOf({ marks, gaps, flags, interventions }) {
 }
 
 /** What made somebody intervene, as it is read. @param {string | null} category */
-const reasonWords = (category) => CATEGORIES.find(([word]) => word === category)?.[1] ?? category ?? '';
+const reasonWords = (category) => CATEGORIES.find(([name]) => name === category)?.[1] ?? category ?? '';
 
 /** "3 alarms, 2 marks, 1 intervention". @param {Pick<Timeline, 'marks' | 'flags' | 'interventions'>} line */
 export function jumpWords({ marks, flags, interventions }) {
@@ -41,7 +41,7 @@ export function jumpAt({ at_s }) {
 }
 
 /**
- * "0.8 s", "12 s", "2:05 min"; what has no end yet is said so.
+ * "0.8 s", "12 s", "2:05 min"; or that it has no end yet.
  * @param {Pick<Jump, 'length_s'>} jump
  * @param {boolean} isDone whether all of the recording was read
  */

@@ -1,4 +1,4 @@
-// Where things stand on the time line of a replay, and in which words: pure functions, no DOM.
+// The positions on the time line of a replay, and its texts: pure functions, no DOM.
 
 import { byUrgency, titleOf } from '../alarms/alarm-layout.js';
 import { local } from '../core/decimal.js';
@@ -163,7 +163,7 @@ export function tapeWords({ at_s, length_s }) {
 }
 
 /**
- * What a reader says of the thumb: "4 minutes 6 seconds of 8 minutes 32 seconds".
+ * The text of the thumb for a screen reader: "4 minutes 6 seconds of 8 minutes 32 seconds".
  * @param {number} at_s
  * @param {number} length_s
  */
@@ -199,7 +199,7 @@ export function dateOf(at_ms) {
  */
 
 /**
- * What is said of the moment that is shown: first what is wrong with the replay itself, then what was not recorded, then
+ * The text of the moment that is shown: first what is wrong with the replay itself, then what was not recorded, then
  * the alarms.
  * @param {import('../core/protocol-types.js').State} frame a replay's
  * @returns {Moment}
@@ -226,7 +226,7 @@ export function momentOf(frame) {
 
 /**
  * The time line as far as the catalog knows it; null: it knows no length.
- * @param {import('../core/protocol-types.js').Recording} row that was asked for alone
+ * @param {import('../core/protocol-types.js').Recording} row that was requested alone
  * @returns {Timeline | null}
  */
 export function sketchOf({ length_s, speed_mps = [], raised = [], started_ms }) {
@@ -244,7 +244,7 @@ export function countWords(line) {
 }
 
 /**
- * What a live frame says for `asideOf` and `liveWords`, as a replay's frame has it.
+ * The parts of a live frame for `asideOf` and `liveWords`, as a replay's frame has it.
  * @param {import('../core/protocol-types.js').State} frame
  * @returns {import('../core/protocol-types.js').LiveSummary}
  */
@@ -253,7 +253,7 @@ export function summaryOf({ session, link, recording, control, reach, decelerate
 }
 
 /**
- * The live car in words, for one line: alarms that ask for nobody, and the recording.
+ * The live car in one line: alarms that need no operator, and the recording.
  * @param {import('../core/protocol-types.js').LiveSummary | null | undefined} live
  * @returns {{text: string, recording: string}}
  */

@@ -21,7 +21,7 @@ export class Scrubber {
   #at_s = 0;
   /** Where the finger is; null: nowhere. @type {number | null} */
   #finger_s = null;
-  /** A moment that was asked for and is not shown yet. @type {{at_s: number, since_ms: number} | null} */
+  /** A requested moment that is not shown yet. @type {{at_s: number, since_ms: number} | null} */
   #wanted = null;
   #isAsking = false;
   #isPlaying = false;
@@ -142,7 +142,7 @@ export class Scrubber {
     this.#seek(at_s);
   }
 
-  /** Play or pause; what was pressed counts until the server's state says so too. */
+  /** Play or pause; what was pressed counts until the server's state agrees. */
   toggle() {
     this.#order({ do: this.#isPlaying ? 'pause' : 'play' });
     this.#isPlaying = !this.#isPlaying;

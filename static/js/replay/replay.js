@@ -1,5 +1,5 @@
 // Replay: the page turned to a recording, and back. Whatever draws live draws this; here are its band, its ways in and out,
-// and what must be heard of the live car meanwhile.
+// and the alarms of the live car meanwhile.
 
 import { field, html, icon, listen, need, setAttribute, setText, setWords } from '../core/dom.js';
 import { ReplayBand, liveSheet } from './replay-band.js';
@@ -197,7 +197,7 @@ class Replay {
     if (line) this.#received(line);
   }
 
-  /** Back to live, with one tap. @param {string} [why] said, where the replay ended by itself */
+  /** Back to live, with one tap. @param {string} [why] shown, where the replay ended by itself */
   async leave(why) {
     if (this.#isLeaving) return;
     this.#isLeaving = true;
@@ -318,7 +318,7 @@ class Replay {
     this.scrubber.draw(frame);
   }
 
-  /** What is live and must be heard: a key on the band, and for what is critical and not acknowledged a dialog. */
+  /** What of the live car needs the operator: a key on the band, and for what is critical and not acknowledged a dialog. */
   #aside() {
     const { frame } = this.store;
     if (!frame) return;

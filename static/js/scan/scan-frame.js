@@ -8,7 +8,7 @@ const STEPS = 65000;
 const ANGLE_STEP_RAD = 0.005;
 const STOPPING_UNKNOWN = 65535;
 
-/** What a beam without a range says. */
+/** The value of a beam without a range. */
 export const NO_RETURN = 0;
 export const TOO_CLOSE = 65535;
 export const NOTHING_IN_RANGE = 65534;

@@ -7,7 +7,7 @@ import { PAINTER } from '../boot/trusted-types.js';
 
 /** Pixels of the canvas for one of CSS: 20 pictures a second are carried to the glass, and finer than this nobody sees. */
 const FINEST = 2;
-/** A thread that has not drawn for so long is asked once more for half of it, for this page may itself have been asleep. */
+/** A thread that has not drawn for so long gets half of it once more, for this page may itself have been asleep. */
 const PATIENCE_MS = 1000;
 
 /**
@@ -24,10 +24,10 @@ export class ScanGlass {
   #plot = null;
   /** @type {import('./scan-theme.js').Theme | null} */
   #theme = null;
-  /** Width and height [CSS px]: asked anew at each scan, they would have the whole page laid out first. */
+  /** Width and height [CSS px]: read at each scan, they would force a layout of the whole page. */
   #size = { width: 0, height: 0 };
   #watcher = new ResizeObserver(() => this.#measure());
-  /** What was asked for last. @type {(() => Wanted | null) | null} */
+  /** The last request. @type {(() => Wanted | null) | null} */
   #newest = null;
   #isDue = false;
   /** What is being drawn. @type {Shown | null} */
@@ -51,7 +51,7 @@ export class ScanGlass {
     clearTimeout(this.#timer);
   }
 
-  /** Another theme: asked for with the next picture. */
+  /** Another theme: requested with the next picture. */
   readTheme() {
     this.#theme = null;
   }
@@ -92,7 +92,7 @@ export class ScanGlass {
   }
 
   #drawn() {
-    if (!this.#painter) return; // said before the page took over
+    if (!this.#painter) return; // reported before the page took over
     clearTimeout(this.#timer);
     this.shown = this.#drawing ?? this.shown;
     this.#drawing = null;

@@ -3,7 +3,7 @@
 import { INVALID, NO_RETURN, NOTHING_IN_RANGE, TOO_CLOSE, bearingOf, rangeOf } from './scan-frame.js';
 import { bearing } from '../core/format.js';
 
-/** A hatched sector narrower than this is not named: the word would not fit [rad]. */
+/** A hatched sector narrower than this is not named: the label would not fit [rad]. */
 const NAMED_RAD = (6 * Math.PI) / 180;
 /** The plot reaches no nearer and no farther than this [m]. */
 export const REACH_M = { least: 4, most: 120, first: 20 };
@@ -91,7 +91,7 @@ export function unseenOf(scan) {
 }
 
 /**
- * Neighbouring beams that tell nothing, by what they say. Nothing in range is told by the sensor itself and is not hatched.
+ * Neighbouring beams without a usable range, grouped by their code. Nothing in range is a reading of the sensor and is not hatched.
  * @param {Scan} scan
  * @returns {Sector[]}
  */
@@ -146,7 +146,7 @@ export function codeWords(code) {
 }
 
 /**
- * The sectors worth a word, widest first, at most `count`.
+ * The sectors wide enough for a label, widest first, at most `count`.
  * @param {Sector[]} sectors
  * @param {number} count
  */
@@ -156,7 +156,7 @@ export function namedSectors(sectors, count) {
 }
 
 /**
- * The sectors worth a word as a reader says them: "no return from 55° right to 72° right".
+ * The text of these sectors for a screen reader: "no return from 55° right to 72° right".
  * @param {Sector[]} sectors
  * @param {number} count
  */

@@ -68,7 +68,7 @@ export class ScanMark {
   }
 
   /** "8.3 m, 14° left"; empty where nothing is marked. */
-  get words() {
+  get text() {
     if (!this.at) return '';
     const side = bearing(this.at.bearing_rad);
     return `${fixed(this.at.range_m)} m, ${side?.side === 'ahead' ? 'straight ahead' : `${side?.degrees} ${side?.side}`}`;

@@ -1,5 +1,5 @@
 // Draws the scan in a thread of its own: it is half of the work of the tab, and the page's thread has fingers to answer.
-// scan-glass.js is the page's side: it says what to draw, and asks for the next picture when one is drawn.
+// scan-glass.js is the page's side: it sends what to draw, and requests the next picture when one is drawn.
 
 import { ScanPlot } from './scan-plot.js';
 

@@ -19,7 +19,7 @@ const OTHER_TURNS = [-0.33, 0.72, -0.72, 1.1, -1.1];
  * @typedef {import('./scan-grid.js').Pen} Pen
  * @typedef {import('./scan-layout.js').Box} Box
  * @typedef {{x: number, y: number, way: number, text: string, where: Where}} Nearest
- * @typedef {[x: number, y: number, align: CanvasTextAlign, size: number, weight: number]} Where of words
+ * @typedef {[x: number, y: number, align: CanvasTextAlign, size: number, weight: number]} Where of a label
  *
  * @typedef {object} Around what is drawn beside the scan
  * @property {number} reach_m
@@ -45,9 +45,9 @@ export class ScanPlot {
   #colour = /** @type {any} */ ({});
   #font = '';
   #width = 0;
-  /** Where words stand already. @type {Box[]} */
+  /** The boxes of the labels drawn already. @type {Box[]} */
   #taken = [];
-  /** The returns, which words of a line and the rings' numbers keep clear of. @type {{scale: Scale, points: Float32Array} | null} */
+  /** The returns, which the labels of a line and the numbers of the rings keep clear of. @type {{scale: Scale, points: Float32Array} | null} */
   #dots = null;
   /** Where the number of a ring stood: it stays there while no return comes there. @type {Map<number, number>} */
   #turns = new Map();
@@ -78,7 +78,7 @@ export class ScanPlot {
     this.#hatch(g, scale, scan, sectors, width + height, dpr, theme.key);
     const points = pointsOf(scan, reach_m * 1.05, 1 / scale.k);
     this.#dots = { scale, points };
-    const nearest = this.#nearestAt(g, scale, scan, reach_m); // its room is kept by all other words
+    const nearest = this.#nearestAt(g, scale, scan, reach_m); // all other labels keep its room free
     if (corridor) this.#corridor(g, scale, corridor, reach_m, scan.judged.stopping_m, around.limit_m);
     this.#names(g, scale, scan, reach_m, sectors, width);
     this.#rings(g, scale, reach_m);
@@ -170,7 +170,7 @@ export class ScanPlot {
       const turns = [this.#turns.get(r) ?? RING_TURN, RING_TURN, ...OTHER_TURNS].filter((turn) => Math.abs(place(turn)[0] - this.#width / 2) < this.#width / 2 - 12);
       const index = this.#clear(g, String(r), turns.map((turn) => [...place(turn), 'center', 14, 400]), this.#colour.ink2);
       if (index >= 0) this.#turns.set(r, turns[index] ?? RING_TURN);
-      else this.#words(g, String(r), ...place(RING_TURN), this.#colour.ink2, 'center');
+      else this.#label(g, String(r), ...place(RING_TURN), this.#colour.ink2, 'center');
     }
   }
 
@@ -180,10 +180,10 @@ export class ScanPlot {
       const a = (sector.from_rad + sector.to_rad) / 2;
       if (Math.cos(a) < 0) continue; // behind: not in the picture
       const aside = Math.abs(Math.sin(a));
-      // As far out as the edge allows, so that the word stands where its sector is wide.
+      // As far out as the edge allows, so that the label is where its sector is wide.
       const r = Math.min(reach_m * 0.36, aside > 0.05 ? (cx - 44) / (k * aside) : reach_m);
       const [x, y] = at(r * Math.cos(a) + x_m, r * Math.sin(a) + y_m);
-      this.#words(g, codeWords(sector.code), Math.min(width - 42, Math.max(42, x)), y, this.#colour.ink, 'center', 14, 700);
+      this.#label(g, codeWords(sector.code), Math.min(width - 42, Math.max(42, x)), y, this.#colour.ink, 'center', 14, 700);
     }
   }
 
@@ -195,7 +195,7 @@ export class ScanPlot {
     g.fill();
   }
 
-  /** What the obstacle check found, and on which side its words stand. @param {Pen} g @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {number} reach_m @returns {Nearest | null} */
+  /** What the obstacle check found, and on which side its label is. @param {Pen} g @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {number} reach_m @returns {Nearest | null} */
   #nearestAt(g, { at }, scan, reach_m) {
     const { beam, gap_m } = scan.judged;
     const range_m = beam === null ? null : rangeOf(scan, beam);
@@ -219,7 +219,7 @@ export class ScanPlot {
     this.#write(g, text, this.#plate(g, text, ...where), this.#colour.ink);
   }
 
-  /** Its words stand under the plot: here they would hide other returns. @param {Pen} g @param {Scale} scale @param {NonNullable<Around['mark']>} mark */
+  /** Its text is under the plot: here it would hide other returns. @param {Pen} g @param {Scale} scale @param {NonNullable<Around['mark']>} mark */
   #mark(g, { at }, mark) {
     if (!mark.isSeen) g.setLineDash([4, 4]);
     this.#ring(g, ...at(mark.x_m, mark.y_m), this.#colour.you);
@@ -258,14 +258,15 @@ export class ScanPlot {
     g.stroke();
   }
 
-  /** Words where nothing else is written, a line higher or lower; else not. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {string} css @param {CanvasTextAlign} [align] @param {number} [size] @param {number} [weight] */
-  #words(g, text, x, y, css, align = 'left', size = 14, weight = 400) {
+  /** Draws a label where nothing else is written, a line higher or lower; else not. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {string} css @param {CanvasTextAlign} [align] @param {number} [size] @param {number} [weight] */
+  #label(g, text, x, y, css, align = 'left', size = 14, weight = 400) {
     const plate = clearOf(this.#taken, this.#plate(g, text, x, y, align, size, weight));
     if (!plate) return;
     this.#taken.push(plate);
     this.#write(g, text, plate, css);
   }
 
+<<<<<<< HEAD
   /** Words in the first place where they cover neither words nor a return; else not: the numbers beside the plot have them. @param {Pen} g @param {string} text @param {Where[]} places @param {string} css @returns {number} which place; -1: none */
   #clear(g, text, places, css) {
     if (!this.#dots) return -1;
@@ -274,9 +275,20 @@ export class ScanPlot {
     this.#taken.push(box);
     this.#write(g, text, box, css);
     return index;
+=======
+  /** Draws the label of a line beside it, in the first place where it covers neither a label nor a return; else not: the numbers beside the plot have them. @param {Pen} g @param {string} text @param {[CanvasTextAlign, number][]} places @param {number} y @param {string} css @param {number} weight */
+  #beside(g, text, places, y, css, weight) {
+    for (const [align, x] of places) {
+      const plate = clearOf(this.#taken, this.#plate(g, text, x, y, align, 14, weight));
+      if (!plate || !this.#dots || coversAny(plate, this.#dots.points, this.#dots.scale)) continue;
+      this.#taken.push(plate);
+      this.#write(g, text, plate, css);
+      return;
+    }
+>>>>>>> l5
   }
 
-  /** The plate of these words. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {CanvasTextAlign} align @param {number} size @param {number} weight @returns {Box} */
+  /** The plate of a text. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {CanvasTextAlign} align @param {number} size @param {number} weight @returns {Box} */
   #plate(g, text, x, y, align, size, weight) {
     g.font = `${weight} ${size}px ${this.#font}`;
     const width = g.measureText(text).width + 8;
@@ -284,7 +296,7 @@ export class ScanPlot {
     return { left, top: y - size * 0.72, width, height: size * 1.44 };
   }
 
-  /** Words on their plate, which has the panel's colour, in the font that measured them. @param {Pen} g @param {string} text @param {Box} plate @param {string} css */
+  /** Draws a text on its plate, which has the panel's colour, in the font that measured it. @param {Pen} g @param {string} text @param {Box} plate @param {string} css */
   #write(g, text, { left, top, width, height }, css) {
     g.textAlign = 'left';
     g.textBaseline = 'middle';

@@ -67,7 +67,7 @@ export class ScanReadout {
     const { mark, store } = this;
     if (!mark.at) return '';
     const old_s = (store.now() - mark.seen_ms) / 1000 + (store.scans.newest?.age_s ?? 0);
-    return `Marked: ${mark.words}, ${mark.isSeen ? '' : 'not seen for '}${age(old_s, 2)} s${mark.isSeen ? ' ago' : ''}`;
+    return `Marked: ${mark.text}, ${mark.isSeen ? '' : 'not seen for '}${age(old_s, 2)} s${mark.isSeen ? ' ago' : ''}`;
   }
 
   /** Describes the plot to screen readers. @param {Scan | null} scan null: there is none of now @param {string} missing */
@@ -98,13 +98,13 @@ export class ScanReadout {
     const side = mark.at ? bearing(mark.at.bearing_rad) : null;
     const degrees = mark.at ? Math.round((-mark.at.bearing_rad * 180) / Math.PI) : 0;
     setAttribute(at('aim'), 'aria-valuenow', Math.max(-90, Math.min(90, degrees)));
-    setAttribute(at('aim'), 'aria-valuetext', side ? mark.words : instead || 'no return marked');
-    setText(at('said'), side ? mark.words : instead);
+    setAttribute(at('aim'), 'aria-valuetext', side ? mark.text : instead || 'no return marked');
+    setText(at('said'), side ? mark.text : instead);
   }
 }
 
 /**
- * Freshness and age of the scan that is shown: it came in its own frame, whatever the state says of a newer one.
+ * Freshness and age of the scan that is shown: it came in its own frame, whatever the state has about a newer one.
  * @param {import('../core/store.js').Store} store
  * @param {import('./scan-glass.js').Shown | null} shown null: none is drawn yet, and the newest will be
  */

@@ -32,9 +32,9 @@ export async function fontsOfStyles() {
   for (const sheet of document.styleSheets) {
     for (const rule of sheet.cssRules) {
       if (!(rule instanceof CSSFontFaceRule)) continue;
-      const said = (/** @type {string} */ name) => rule.style.getPropertyValue(name).replaceAll('"', '');
-      const [, address] = /url\(([^)]+)\)/.exec(said('src')) ?? [];
-      if (address) found.push(fetched(said('font-family'), said('font-weight'), new URL(address, sheet.href ?? location.href)));
+      const valueOf = (/** @type {string} */ name) => rule.style.getPropertyValue(name).replaceAll('"', '');
+      const [, address] = /url\(([^)]+)\)/.exec(valueOf('src')) ?? [];
+      if (address) found.push(fetched(valueOf('font-family'), valueOf('font-weight'), new URL(address, sheet.href ?? location.href)));
     }
   }
   return (await Promise.all(found)).flat();
@@ -46,6 +46,6 @@ async function fetched(family, weight, address) {
     const answer = await fetch(address);
     return answer.ok ? [{ family, weight, bytes: await answer.arrayBuffer() }] : [];
   } catch {
-    return []; // out of reach: the words are drawn in the system's own font
+    return []; // not accessible: text is drawn in the system's own font
   }
 }

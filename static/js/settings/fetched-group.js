@@ -3,7 +3,7 @@
 import { html, icon, listen, setText, show } from '../core/dom.js';
 import { found } from './settings-layout.js';
 
-/** @typedef {(place: HTMLElement, group: HTMLDetailsElement, head: (words: string) => void) => Promise<unknown>} Fill `head` says at the group's head what holds */
+/** @typedef {(place: HTMLElement, group: HTMLDetailsElement, head: (text: string) => void) => Promise<unknown>} Fill `head` shows the state in the group's summary */
 
 export class FetchedGroup {
   #isOpenedBySearch = false;
@@ -32,7 +32,7 @@ export class FetchedGroup {
     this.stop = listen(this.group, 'toggle', () => { if (this.group.open) this.#load(); });
   }
 
-  /** Shows it where a search asks for it; how many there are. @param {string} query */
+  /** Shows it where a search matches; returns how many there are. @param {string} query */
   filter(query) {
     const { group } = this;
     const isHit = this.isThere && found(query, this.names);
@@ -63,7 +63,7 @@ export class FetchedGroup {
     const isMine = () => turn === this.#turn;
     const place = html('div', {}, html('p', { class: 'state', role: 'status' }, 'Loading from the server…'));
     this.place.replaceChildren(place);
-    this.fill(place, this.group, (words) => { if (isMine()) setText(this.state, words); }).catch(() => {
+    this.fill(place, this.group, (text) => { if (isMine()) setText(this.state, text); }).catch(() => {
       if (isMine()) this.#isLoaded = false;
       place.replaceChildren(html('p', { class: 'state', role: 'status' }, 'It could not be loaded: the server does not answer. Close this group and open it again.'));
     });

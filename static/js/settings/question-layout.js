@@ -1,4 +1,4 @@
-// What is asked of the operator in control, and how: pure functions of the questions of the newest frame.
+// The questions to the operator in control: pure functions of the newest frame.
 
 import { counted } from '../core/format.js';
 
@@ -22,7 +22,7 @@ export function mayAnswer({ isViewer, page, control, replaying = false }) {
 }
 
 /**
- * Of what a question is asked: a car, or a recording of it, whose questions are others.
+ * The subject of a question: a car, or a recording of it, whose questions are others.
  * @param {{vehicle: string, frame?: {replay?: {id: string}} | null}} store
  */
 export function placeOf({ vehicle, frame }) {
@@ -30,7 +30,7 @@ export function placeOf({ vehicle, frame }) {
 }
 
 /**
- * A question of a car keeps its key when options come and go: what was put off once is not asked again.
+ * A question of a car keeps its key when options come and go: what was put off once is not shown again.
  * @param {string} vehicle
  * @param {Question} question
  */
@@ -39,14 +39,14 @@ export function keyOf(vehicle, { signal, kind }) {
 }
 
 /**
- * Which question is asked with a card, and which were put off.
+ * The questions with a card, and those that were put off.
  * @param {string} vehicle
  * @param {Question[]} questions that stand, the most urgent first
  * @param {ReadonlySet<string>} later keys of those put off
  */
 export function dealt(vehicle, questions, later) {
   const isLater = (/** @type {Question} */ one) => later.has(keyOf(vehicle, one));
-  return { asked: questions.filter((one) => !isLater(one)), waiting: questions.filter(isLater) };
+  return { open: questions.filter((one) => !isLater(one)), waiting: questions.filter(isLater) };
 }
 
 /** The change of settings that answers. @param {Question} question @param {string} value of an option @returns {Choices} */

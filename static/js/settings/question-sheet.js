@@ -1,4 +1,4 @@
-// The sheet that asks: the question, its options as large keys, and for lasers what each of them sees now.
+// The sheet of a question: its text, its options as large keys, and for lasers what each of them sees now.
 
 import { html, setText, setWords, show } from '../core/dom.js';
 import { Meant } from '../core/meant.js';
@@ -58,17 +58,17 @@ class QuestionSheet {
     this.model = settingsOf(store);
     this.which = keyOf(placeOf(store), question);
     this.label = store.signal(question.signal)?.label ?? question.signal;
-    this.asks = html('span');
-    this.heading = html('h2', { id: 'question-title', tabindex: '-1' }, this.asks);
+    this.text = html('span');
+    this.heading = html('h2', { id: 'question-title', tabindex: '-1' }, this.text);
     this.list = html('ul', { class: 'menu-list' });
     this.bad = html('p', { class: 'bad', role: 'alert' });
     this.rest = html('p', { class: 'sub' });
-    const words = html('p', { class: 'sub', id: 'question-words' });
-    setWords(words, meanwhileWords(question, this.label));
+    const effect = html('p', { class: 'sub', id: 'question-words' });
+    setWords(effect, meanwhileWords(question, this.label));
     const close = html('button', { type: 'button', class: 'key', 'data-f': 'no' }, does.later ? 'Later' : 'Close');
     const next = html('button', { type: 'button', class: 'key', 'data-f': 'next' }, 'Next question');
     this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed pick-sheet question-sheet', id: 'sheet-question', 'aria-labelledby': 'question-title', 'aria-describedby': 'question-words' },
-      html('div', { class: 'bd' }, this.heading, words, this.bad), this.list,
+      html('div', { class: 'bd' }, this.heading, effect, this.bad), this.list,
       html('div', { class: 'keys' }, this.rest, does.next ? html('div', { class: 'pair' }, close, next) : close)));
     this.meant = new Meant(this.sheet);
     const stops = [addSheet(this.sheet), store.on('draw', () => this.#look())];
@@ -104,7 +104,7 @@ class QuestionSheet {
     if (key === this.#drawn) return;
     this.#drawn = key;
     this.question = question;
-    setWords(this.asks, question.words);
+    setWords(this.text, question.words);
     setWords(this.rest, restWords(question));
     this.#options.clear();
     this.list.replaceChildren(...question.options.map((option) => html('li', {}, this.#key(option))));

@@ -1,4 +1,4 @@
-// What is asked of the operator in control: a card under the strip until it is answered or put off, then a line that stays.
+// The questions to the operator in control: a card under the strip until it is answered or put off, then a line that stays.
 // It stands in the flow of the page, so that it covers neither a value nor an alarm nor the slow-down.
 
 import { html, icon, need, setAttribute, setWords, show } from '../core/dom.js';
@@ -29,7 +29,7 @@ export async function mount(monitor, store, say) {
 
 class Questions {
   #later = new Set(recalled());
-  #asked = '';
+  #shown = '';
 
   /** @param {HTMLElement} monitor @param {Store} store @param {(sentence: string, title?: string) => void} say */
   constructor(monitor, store, say) {
@@ -46,8 +46,8 @@ class Questions {
     this.element = html('section', { class: 'questions', 'aria-label': 'Questions' }, this.card, this.line, this.others);
     this.meant = new Meant(this.card);
     need(monitor, ':scope > .under').append(this.element);
-    this.choose.addEventListener('click', (event) => this.meant.by(event) && void this.#open(this.#now().asked[0]));
-    this.later.addEventListener('click', (event) => this.meant.by(event) && this.#putOff(this.#now().asked[0]));
+    this.choose.addEventListener('click', (event) => this.meant.by(event) && void this.#open(this.#now().open[0]));
+    this.later.addEventListener('click', (event) => this.meant.by(event) && this.#putOff(this.#now().open[0]));
     this.line.addEventListener('click', () => void this.#open(this.#now().waiting[0]));
   }
 
@@ -59,20 +59,20 @@ class Questions {
 
   draw() {
     const { store } = this;
-    const { questions, asked, waiting } = this.#now();
+    const { questions, open, waiting } = this.#now();
     const may = mayAnswer(store);
-    const [first] = asked;
+    const [first] = open;
     show(this.card, may && first !== undefined);
     show(this.line, may && waiting.length > 0);
     show(this.others, !may && questions.length > 0);
     const label = (/** @type {string} */ signal) => store.signal(signal)?.label ?? signal;
     if (may && first) {
       const key = keyOf(placeOf(store), first);
-      if (key !== this.#asked) this.meant.moved();
-      this.#asked = key;
+      if (key !== this.#shown) this.meant.moved();
+      this.#shown = key;
       setWords(this.title, first.words);
-      setWords(this.more, `${meanwhileWords(first, label(first.signal))}${asked.length > 1 ? ` ${asked.length} questions.` : ''}`);
-    } else this.#asked = '';
+      setWords(this.more, `${meanwhileWords(first, label(first.signal))}${open.length > 1 ? ` ${open.length} questions.` : ''}`);
+    } else this.#shown = '';
     if (may) setWords(this.lineWords, waitingWords(waiting, label));
     else setWords(this.others, `${questions.map(({ words }) => words).join(' ')} The operator in control answers.`);
     setAttribute(document.documentElement, 'data-asks', may && first !== undefined);
@@ -86,7 +86,7 @@ class Questions {
     this.draw();
   }
 
-  /** Should it be asked again one day, it is asked with a card. @param {Question} question */
+  /** If it comes again one day, it is shown with a card. @param {Question} question */
   #answered(question) {
     if (this.#later.delete(keyOf(placeOf(this.store), question))) remember([...this.#later]);
   }
@@ -94,12 +94,12 @@ class Questions {
   /** @param {Question | undefined} question */
   async #open(question) {
     if (!question) return;
-    const { asked, questions } = this.#now();
+    const { open, questions } = this.#now();
     const next = questions[(questions.indexOf(question) + 1) % questions.length];
     try {
       (await import('./question-sheet.js')).openQuestion(this.store, question, {
         say: this.say,
-        later: asked.includes(question) ? () => this.#putOff(question) : null,
+        later: open.includes(question) ? () => this.#putOff(question) : null,
         next: next === question ? null : () => void this.#open(this.#same(next)),
         answered: () => this.#answered(question),
       });
@@ -130,6 +130,6 @@ function remember(keys) {
   try {
     localStorage.setItem(STORED, JSON.stringify(keys));
   } catch {
-    // without storage it is asked again when the page is opened again
+    // without storage it is shown again when the page is opened again
   }
 }

@@ -56,7 +56,7 @@ export class SettingsFileKeys {
     setAttribute(this.resetKey, 'disabled', this.model.resetLines.length === 0);
   }
 
-  /** Shows what a search asks for; how many there are. @param {string} query */
+  /** Shows what a search matches; returns how many there are. @param {string} query */
   filter(query) {
     const isCar = found(query, ['kind of car profile', this.model.body?.profile.title]);
     const isFile = found(query, ['all settings export import reset defaults toml file']);
@@ -75,14 +75,14 @@ export class SettingsFileKeys {
     if (!body) return;
     setWords(field(sheet, 'refused'), '');
     const options = [
-      { name: 'auto', title: 'As recognised', says: `now ${body.profile.recognised}` },
-      ...body.profiles.map(({ name, title }) => ({ name, title, says: '' })),
+      { name: 'auto', title: 'As recognised', detail: `now ${body.profile.recognised}` },
+      ...body.profiles.map(({ name, title }) => ({ name, title, detail: '' })),
     ];
-    field(sheet, 'list').replaceChildren(...options.map(({ name, title, says }) => {
+    field(sheet, 'list').replaceChildren(...options.map(({ name, title, detail }) => {
       const isChosen = body.profile.chosen === name;
       const mark = icon('ok');
       show(mark, isChosen);
-      const key = html('button', { type: 'button', 'aria-pressed': String(isChosen) }, html('span', { class: 'tx' }, html('b', {}, title), html('small', {}, says)), mark);
+      const key = html('button', { type: 'button', 'aria-pressed': String(isChosen) }, html('span', { class: 'tx' }, html('b', {}, title), html('small', {}, detail)), mark);
       key.addEventListener('click', async () => {
         const outcome = await this.model.set({ profile: name });
         if (outcome.ok) closeSheet(sheet);

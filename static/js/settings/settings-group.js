@@ -27,7 +27,7 @@ export class SettingsGroup {
     this.element.addEventListener('toggle', () => this.draw()); // not empty until the next state comes
   }
 
-  /** Shows what a search asks for; how many there are. @param {string} query */
+  /** Shows what a search matches; returns how many there are. @param {string} query */
   filter(query) {
     const hits = this.rows.filter((row) => found(query, row.texts));
     for (const row of this.rows) show(row.element, hits.includes(row));

@@ -1,4 +1,4 @@
-// Settings as numbers and words: pure functions. What may be set, how a slider maps it, how it is read and typed.
+// Settings as numbers and text: pure functions. What may be set, how a slider maps it, how it is displayed and typed.
 
 import { shownIn, wireOf } from '../core/units.js';
 import { isInDoubt, local, markOf } from '../core/decimal.js';
@@ -125,13 +125,13 @@ export function groupsOf(schema) {
 }
 
 /**
- * Does every word of the search stand somewhere in these texts?
+ * Whether each term of the search occurs in one of these texts.
  * @param {string} query
  * @param {(string | null | undefined)[]} texts
  */
 export function found(query, texts) {
   const all = plain(texts.filter(Boolean).join(' '));
-  return plain(query).split(/\s+/).every((word) => all.includes(word));
+  return plain(query).split(/\s+/).every((term) => all.includes(term));
 }
 
 /**

@@ -1,4 +1,4 @@
-// The settings of one vehicle as this page knows them: what is in force, what was asked for and is not confirmed yet, how to take it back.
+// The settings of one vehicle on this page: what is in force, what was requested and is not confirmed yet, how to take it back.
 
 import { maybe } from '../core/outcome.js';
 import { DEFAULTS, changeLines, changeTo } from './settings-layout.js';
@@ -44,7 +44,7 @@ export class SettingsModel {
   #fetched = '';
   /** @type {Promise<void> | null} */
   #loading = null;
-  /** The last change that was asked for, answered or not. @type {Promise<void>} */
+  /** The last change that was requested, answered or not. @type {Promise<void>} */
   #last = Promise.resolve();
   #tried_ms = -Infinity;
   #boot = '';
@@ -57,7 +57,7 @@ export class SettingsModel {
     store.on('switch', () => this.#forget());
   }
 
-  /** Another car is shown: nothing of the one before is asked of it, shown for it or taken back. */
+  /** Another car is shown: nothing of the one before is requested of it, shown for it or taken back. */
   #forget() {
     this.body = this.problem = this.#undo = null;
     this.#pending.clear();
@@ -82,7 +82,7 @@ export class SettingsModel {
     return store.replaying ? store.judgedBy : { topics: body?.topics ?? {}, units: body?.units ?? {} };
   }
 
-  /** What was asked for and is not confirmed. @param {string} name */
+  /** The requested value that is not confirmed. @param {string} name */
   pending(name) {
     return this.#pending.get(name)?.value ?? null;
   }
@@ -131,19 +131,19 @@ export class SettingsModel {
   set(change, of = '') {
     if (this.store.replaying && !change.values) return judgeBy(change);
     /** @type {Map<string, Pending>} */
-    const wishes = new Map();
+    const changes = new Map();
     for (const [name, wanted] of Object.entries(change.values ?? {})) {
       const value = wanted ?? this.body?.defaults[name];
-      if (value !== undefined) wishes.set(name, { value, version: null });
+      if (value !== undefined) changes.set(name, { value, version: null });
     }
-    for (const [name, wish] of wishes) this.#pending.set(name, wish);
+    for (const [name, pending] of changes) this.#pending.set(name, pending);
     // One after the other: the next names the version that this one makes.
     const { vehicle } = this.store;
     const outcome = this.#last.then(() => this.#set(change, of, vehicle));
     this.#last = outcome.then(({ ok }) => {
-      for (const [name, wish] of wishes) {
-        wish.version = this.#seen;
-        if (!ok && this.#pending.get(name) === wish) this.#pending.delete(name);
+      for (const [name, pending] of changes) {
+        pending.version = this.#seen;
+        if (!ok && this.#pending.get(name) === pending) this.#pending.delete(name);
       }
     });
     return this.#last.then(() => outcome);
@@ -232,7 +232,7 @@ export class SettingsModel {
     return this.body ? this.set(changeTo(this.body, DEFAULTS)) : { ok: false, reason: GONE };
   }
 
-  /** A change in words. @param {Change} change */
+  /** A change as text. @param {Change} change */
   lines(change) {
     return this.body ? changeLines(this.body, change, (signal) => this.store.signal(signal)?.label ?? signal) : [];
   }
@@ -289,7 +289,7 @@ async function answered(path, options = {}) {
   throw new Refusal(typeof problem?.detail === 'string' ? problem.detail : `The server answers ${answer.status}.`);
 }
 
-/** What the server says in its own words. */
+/** The server's own message. */
 class Refusal extends Error {}
 
 /** @param {unknown} error */

@@ -13,17 +13,17 @@ import { SPECS } from '../home/trends-layout.js';
 
 /** A value at rest for so long is meant, though the finger still lies on it [ms]. */
 const REST_MS = 400;
-/** A confirmation that takes longer is said in words [ms]. */
+/** A confirmation that takes longer is shown as text [ms]. */
 const LONG_MS = 1000;
 const KEYS = /** @type {Record<string, number>} */ ({ ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 });
 
 /** A row; `draw` is called as often as the page draws, `texts` is what a search looks at. */
 export class SettingsRow {
-  /** What the hand holds and the server was not asked for yet, in SI. @type {number | null} */
+  /** The value under the finger that is not requested yet, in SI. @type {number | null} */
   #moving = null;
   /** What was in force when the hand took it. @type {number | null} */
   #from = null;
-  /** What this page asked for last, which may come in force while the hand moves on. @type {number | null} */
+  /** The last value requested by this page, which may come in force while the slider is still moved. @type {number | null} */
   #sent = null;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   #rest;
@@ -41,7 +41,7 @@ export class SettingsRow {
     this.field = field;
     this.texts = [field.title, field.description, field.heading, field.unit, speedUnit(), name];
     const id = `set-${name.replaceAll('.', '-')}`;
-    this.says = html('p', { class: 'says', role: 'status', hidden: true });
+    this.message = html('p', { class: 'says', role: 'status', hidden: true });
     this.yet = html('p', { class: 'yet', hidden: true }, 'Not confirmed by the server yet.');
     this.isSwitch = field.unit === SWITCH;
     const help = field.description ? html('p', { class: 'help', id: `${id}-help` }, ...words(field.description)) : '';
@@ -62,7 +62,7 @@ export class SettingsRow {
     this.range = html('div', { class: 'range' }, html('span', { class: 'line' }), html('span', { class: 'on' }), html('span', { class: 'tick' }), this.low, this.high, this.usual, this.slider);
     this.element = html('div', { class: 'set', 'data-setting': name },
       html('div', { class: 'row' }, html('label', { class: 't', for: id }, field.title), ...(this.isSwitch ? [this.toggle] : [this.number, this.unit])),
-      help, ...(this.isSwitch ? [] : [this.range]), this.yet, this.says);
+      help, ...(this.isSwitch ? [] : [this.range]), this.yet, this.message);
     const spec = SPECS.find(({ limit }) => limit === name);
     this.trace = spec ? new SettingsTrace(model.store, spec) : null;
     if (this.trace) this.range.before(this.trace.element);
@@ -103,7 +103,7 @@ export class SettingsRow {
     this.#move(event.key === 'Home' ? this.field.minimum : event.key === 'End' ? this.field.maximum : stepped(now, steps ?? 0, this.field));
   }
 
-  /** The hand moves it: it is shown as not confirmed, and asked for once it rests. @param {number} value */
+  /** The operator moves it: it is shown as not confirmed, and requested once it rests. @param {number} value */
   #move(value) {
     if (!this.model.isOpen) return;
     if (this.#moving === null) this.#from = this.model.inForce(this.name);
@@ -142,8 +142,8 @@ export class SettingsRow {
 
   /** @param {string} sentence */
   #say(sentence) {
-    setWords(this.says, sentence);
-    show(this.says, sentence !== '');
+    setWords(this.message, sentence);
+    show(this.message, sentence !== '');
     setAttribute(this.element, 'data-refused', sentence !== '');
   }
 

@@ -9,7 +9,7 @@ import { age, fixed, NOTHING } from '../core/format.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').SignalState<any>} Signal
- * @typedef {{topic: string, says: string, icon: 'ok' | 'warn' | 'unknown', rate: string}} Shown
+ * @typedef {{topic: string, detail: string, icon: 'ok' | 'warn' | 'unknown', rate: string}} Shown
  */
 
 /**
@@ -17,22 +17,22 @@ import { age, fixed, NOTHING } from '../core/format.js';
  * @param {Signal} signal
  * @param {string | undefined} picked by the operator
  * @param {boolean} isLive
- * @param {boolean} [isAsked] the operator is asked which topic it is
+ * @param {boolean} [isOpen] there is an open question which topic it is
  * @returns {Shown}
  */
-export function topicWords(signal, picked, isLive, isAsked = false) {
+export function topicWords(signal, picked, isLive, isOpen = false) {
   const kind = signal.type?.split('/').at(-1);
   const label = signal.label.toLowerCase();
-  if (isAsked && !signal.value) return { topic: signal.label, says: 'not chosen: press to choose', icon: 'warn', rate: NOTHING };
+  if (isOpen && !signal.value) return { topic: signal.label, detail: 'not chosen: press to choose', icon: 'warn', rate: NOTHING };
   if (!signal.topic) {
     const source = typeof signal.value?.['source'] === 'string' ? `from ${signal.value['source']}` : 'not published';
     return picked
-      ? { topic: picked, says: `${label} · chosen by you, but not published`, icon: 'warn', rate: NOTHING }
-      : { topic: signal.label, says: signal.value ? source : 'not published', icon: signal.value ? 'ok' : 'unknown', rate: NOTHING };
+      ? { topic: picked, detail: `${label} · chosen by you, but not published`, icon: 'warn', rate: NOTHING }
+      : { topic: signal.label, detail: signal.value ? source : 'not published', icon: signal.value ? 'ok' : 'unknown', rate: NOTHING };
   }
   if (signal.freshness === 'not_published' && signal.note) {
-    const says = `${label} · ${picked ? `chosen by you, ${signal.note}` : signal.note}`;
-    return { topic: signal.topic, says, icon: picked ? 'warn' : 'unknown', rate: NOTHING };
+    const detail = `${label} · ${picked ? `chosen by you, ${signal.note}` : signal.note}`;
+    return { topic: signal.topic, detail, icon: picked ? 'warn' : 'unknown', rate: NOTHING };
   }
   const facts = [
     `${label} · ${kind ?? 'type unknown'}${picked ? ' · chosen by you' : ''}`,
@@ -42,7 +42,7 @@ export function topicWords(signal, picked, isLive, isAsked = false) {
   ];
   const isWell = !signal.note && !signal.rejected && (signal.freshness === 'fresh' || signal.freshness === 'ageing');
   return {
-    topic: signal.topic, says: facts.filter(Boolean).join('\n'), icon: !isLive || signal.freshness === 'not_measured' ? 'unknown' : isWell ? 'ok' : 'warn',
+    topic: signal.topic, detail: facts.filter(Boolean).join('\n'), icon: !isLive || signal.freshness === 'not_measured' ? 'unknown' : isWell ? 'ok' : 'warn',
     rate: isLive ? fixed(signal.rate_hz) : NOTHING,
   };
 }
@@ -71,14 +71,14 @@ export class SettingsTopics {
   row(name) {
     const mark = icon('ok');
     const topic = html('span', { class: 'p' });
-    const says = html('span', { class: 'm' });
+    const detail = html('span', { class: 'm' });
     const rate = html('span', { class: 'n' });
     const unit = html('span', { class: 'u' }, 'Hz');
-    const key = html('button', { type: 'button', class: 'topic', 'data-signal': name }, mark, topic, says, html('span', { class: 'r' }, rate, unit));
+    const key = html('button', { type: 'button', class: 'topic', 'data-signal': name }, mark, topic, detail, html('span', { class: 'r' }, rate, unit));
     key.addEventListener('click', () => openTopicPicker(this.store, this.model, name));
     const element = html('li', {}, key);
     this.list.append(element);
-    return { element, mark, topic, says, rate, unit };
+    return { element, mark, topic, detail, rate, unit };
   }
 
   draw() {
@@ -90,7 +90,7 @@ export class SettingsTopics {
       this.rows.set(name, at);
       const shown = topicWords(signal, this.model.body?.topics[name], isLive, this.store.ink(name).ink === 'not_chosen');
       setText(at.topic, shown.topic);
-      setWords(at.says, shown.says);
+      setWords(at.detail, shown.detail);
       setIcon(at.mark, shown.icon);
       setAttribute(at.mark, 'class', shown.icon === 'warn' ? 'i c-warn' : shown.icon === 'unknown' ? 'i dashed' : 'i');
       setText(at.rate, shown.rate);
@@ -103,7 +103,7 @@ export class SettingsTopics {
     this.#countThem(frame, isLive);
   }
 
-  /** Shows what a search asks for; how many there are. @param {string} query */
+  /** Shows what a search matches; returns how many there are. @param {string} query */
   filter(query) {
     this.#query = query;
     let hits = 0;

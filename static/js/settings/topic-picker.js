@@ -6,7 +6,7 @@ import { counted } from '../core/format.js';
 
 /**
  * @typedef {import('./settings-model.js').Candidate} Candidate
- * @typedef {{topic: string | null, title: string, says: string, isChosen: boolean}} Option
+ * @typedef {{topic: string | null, title: string, detail: string, isChosen: boolean}} Option
  */
 
 /**
@@ -19,14 +19,14 @@ import { counted } from '../core/format.js';
 export function optionsOf(candidates, now, picked) {
   const gone = picked !== undefined && !candidates?.some(({ topic }) => topic === picked);
   return [
-    { topic: null, title: 'Choose automatically', says: picked === undefined ? (now ? `now ${now}` : 'no match now') : 'by type, publisher, namespace, frame and name', isChosen: picked === undefined },
-    ...(gone ? [{ topic: picked, title: picked, says: candidates ? 'chosen, but not published with a matching type' : 'picked', isChosen: true }] : []),
-    ...(candidates ?? []).map((one) => ({ topic: one.topic, title: one.topic, says: saysOf(one, one.topic === now), isChosen: one.topic === picked })),
+    { topic: null, title: 'Choose automatically', detail: picked === undefined ? (now ? `now ${now}` : 'no match now') : 'by type, publisher, namespace, frame and name', isChosen: picked === undefined },
+    ...(gone ? [{ topic: picked, title: picked, detail: candidates ? 'chosen, but not published with a matching type' : 'picked', isChosen: true }] : []),
+    ...(candidates ?? []).map((one) => ({ topic: one.topic, title: one.topic, detail: detailOf(one, one.topic === now), isChosen: one.topic === picked })),
   ];
 }
 
 /** Type, frame and what speaks for a candidate. @param {Candidate} candidate @param {boolean} isNow it carries the signal now */
-function saysOf({ type, frame, why }, isNow) {
+function detailOf({ type, frame, why }, isNow) {
   return [type, isNow ? 'now' : '', frame ? `frame ${frame}` : '', why ?? ''].filter(Boolean).join(' · ');
 }
 
@@ -47,26 +47,26 @@ export async function openTopicPicker(store, model, signal) {
   openSheet(sheet);
   /** @type {Candidate[] | null} */
   let candidates = null;
-  let words;
+  let text;
   try {
     if (!model.body && !store.replaying) await model.load();
     const known = (await model.candidates()).candidates;
     candidates = known?.[signal] ?? null;
-    words = candidates === null ? 'The bridge does not list the car’s topics.' : candidates.length
+    text = candidates === null ? 'The bridge does not list the car’s topics.' : candidates.length
       ? `${counted(candidates.length, 'topic')} of the car match this signal.` : 'No topic of the car has a type that matches this signal.';
   } catch {
-    words = 'The topics could not be loaded: the server does not answer.';
+    text = 'The topics could not be loaded: the server does not answer.';
   }
-  if (sheet.dataset['signal'] !== signal) return; // another signal was asked for meanwhile
-  setWords(field(sheet, 'words'), words);
+  if (sheet.dataset['signal'] !== signal) return; // another signal was requested meanwhile
+  setWords(field(sheet, 'words'), text);
   const options = optionsOf(candidates, store.signal(signal)?.topic ?? null, model.chosen.topics[signal]);
   list.replaceChildren(...options.map((option) => html('li', {}, key(option))));
 
   /** @param {Option} option */
-  function key({ topic, title, says, isChosen }) {
+  function key({ topic, title, detail, isChosen }) {
     const mark = icon('ok');
     show(mark, isChosen);
-    const button = html('button', { type: 'button', 'aria-pressed': String(isChosen) }, html('span', { class: 'tx' }, html('b', {}, title), html('small', {}, says)), mark);
+    const button = html('button', { type: 'button', 'aria-pressed': String(isChosen) }, html('span', { class: 'tx' }, html('b', {}, title), html('small', {}, detail)), mark);
     button.addEventListener('click', async () => {
       setWords(field(sheet, 'refused'), '');
       const outcome = await model.set({ topics: { [signal]: topic } });

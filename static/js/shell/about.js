@@ -20,18 +20,18 @@ async function ask() {
 export function mountLicense(root) {
   const own = text('catgraph: Apache License 2.0', '/static/license.txt', 'The full text could not be loaded; it is in the project’s file LICENSE.');
   const list = html('ul', { class: 'parts' });
-  const says = html('p', { role: 'status' }, 'Loading the list…');
+  const status = html('p', { role: 'status' }, 'Loading the list…');
   root.replaceChildren(html('div', { class: 'prose' },
     html('p', {}, html('b', {}, 'catgraph is free software under the Apache License, version 2.0.'), ' It comes without any warranty.'),
     html('p', {}, 'Its numerals and icons have the same licence.')), own,
-  html('div', { class: 'sec' }, html('span', {}, 'Third-party parts')), html('div', { class: 'prose' }, says), list);
+  html('div', { class: 'sec' }, html('span', {}, 'Third-party parts')), html('div', { class: 'prose' }, status), list);
   let isShown = true;
   ask().then(({ parts }) => {
     if (!isShown) return;
     const [page, server] = ['page', 'server'].map((where) => parts.filter((part) => part.where === where).length);
-    setText(says, `${page} in the page, ${server} in the server. Press one for its licence.`);
+    setText(status, `${page} in the page, ${server} in the server. Press one for its licence.`);
     list.replaceChildren(...parts.map((part) => html('li', {}, text(`${part.name} ${part.version}: ${part.license}`, `/api/notices/${encodeURIComponent(part.name)}`, 'The text could not be loaded. Close and open it to try again.'))));
-  }, () => { if (isShown) setText(says, 'The server did not send the list. Go back and try again.'); });
+  }, () => { if (isShown) setText(status, 'The server did not send the list. Go back and try again.'); });
   return () => {
     isShown = false;
     root.replaceChildren();

@@ -11,7 +11,7 @@ import { field, listen, need, setAttribute, setIcon, setText } from '../core/dom
  */
 export function mount(root, store, router) {
   const pause = field(root, 'pause');
-  const word = field(root, 'pause-word');
+  const label = field(root, 'pause-word');
   const mark = need(pause, '.i');
   const stopSheet = /** @type {HTMLDialogElement} */ (need(document, '#sheet-stop'));
 
@@ -35,7 +35,7 @@ export function mount(root, store, router) {
 
   function draw() {
     const isPaused = store.frame?.session.paused === true;
-    setText(word, isPaused ? 'Resume' : 'Pause');
+    setText(label, isPaused ? 'Resume' : 'Pause');
     setAttribute(pause, 'aria-label', isPaused ? 'Resume monitoring' : 'Pause monitoring');
     setAttribute(pause, 'class', isPaused ? 'key solid' : 'key');
     setAttribute(mark, 'class', isPaused ? 'i fill' : 'i');

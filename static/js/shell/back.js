@@ -45,7 +45,7 @@ class Back {
   #canReturn = false;
   /** The entry that was shown when all was at rest last is one of this module. */
   #isGuarded = false;
-  /** A screen or a board lay over the page, when all was at rest last: a screen hears of Back before this module. */
+  /** Whether a screen or a board covered the page before: a screen receives Back before this module. */
   #wasCovered = false;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   #timer;

@@ -91,7 +91,7 @@ function rowOf(car, time_ms, lag_s, page) {
   const since_s = car.age_s === null ? null : car.age_s + lag_s;
   if (car.off && !summary) {
     return {
-      name, rank: 0, needs: false, icon: 'info', kind: '', isFilled: false, worst: null, chain: null, text: `Off on purpose: said by ${car.off.by}`,
+      name, rank: 0, needs: false, icon: 'info', kind: '', isFilled: false, worst: null, chain: null, text: `Off on purpose: set by ${car.off.by}`,
       speed: { ink: 'never', value_mps: null }, age: since_s === null ? '–' : `${age(since_s)} s`, operator: '?', recording: '?',
     };
   }
@@ -135,11 +135,11 @@ function stateOf({ phase, paused, planned_stop, waiting }, worst, for_s) {
   }
   const { priority, state, title, active } = worst;
   const isAsking = state === 'UNACKED' || state === 'RTN_UNACKED';
-  const words = !active ? titleOf(worst) : isAsking ? `${title}, ${age(for_s)} s` : `${title}, acknowledged`;
+  const text = !active ? titleOf(worst) : isAsking ? `${title}, ${age(for_s)} s` : `${title}, acknowledged`;
   const more = waiting > 1 ? ` +${waiting - 1}` : '';
   return {
     rank: isAsking ? (active ? 60 : 35) + 10 * (RANK[priority] - 1) : 25 + RANK[priority],
-    needs: isAsking && priority !== 'advisory', icon: ICONS[priority], kind: KIND[priority], isFilled: isAsking && active, text: `${words}${more}`,
+    needs: isAsking && priority !== 'advisory', icon: ICONS[priority], kind: KIND[priority], isFilled: isAsking && active, text: `${text}${more}`,
   };
 }
 
@@ -168,7 +168,7 @@ export function askingOf(rows, shown, left) {
 
 /**
  * The other cars whose next alarm this phone would announce. A car announces its worst alarm only: while that one is critical,
- * unacknowledged and without sound here, a lesser one would not be heard.
+ * unacknowledged and without sound here, a lesser one would not be announced.
  * @param {CarRow[]} rows
  * @param {string} shown
  * @param {Set<string>} left
@@ -198,7 +198,7 @@ export function alone(frame) {
   if (!frame) return null;
   const { session, link, signals, control, recording, decelerate, server } = frame;
   const standing = byUrgency(frame.alarms.filter(({ state }) => state !== 'SHELVED'));
-  const asks = (/** @type {{state: string}} */ { state }) => state === 'UNACKED' || state === 'RTN_UNACKED';
+  const isOpen = (/** @type {{state: string}} */ { state }) => state === 'UNACKED' || state === 'RTN_UNACKED';
   const speed = signals.speed;
   return {
     kind: 'cars', time_ms: server.time_ms,
@@ -207,7 +207,7 @@ export function alone(frame) {
       summary: {
         phase: session.phase, paused: session.paused,
         link: { cut: link.cut, bridge_age_s: link.bridge_age_s, car_age_s: link.car_age_s, trying_for_s: link.trying_for_s, connected_for_s: session.connected_for_s },
-        worst: standing.find(asks) ?? standing[0] ?? null, waiting: standing.filter(asks).length,
+        worst: standing.find(isOpen) ?? standing[0] ?? null, waiting: standing.filter(isOpen).length,
         speed: { value_mps: speed?.value?.speed_mps ?? null, freshness: speed?.freshness ?? 'never', age_s: speed?.age_s ?? null, horizon_s: speed?.horizon_s ?? null },
         holder: control.holder, page: control.page ?? null, recording: recording.state, recording_for_s: recording.for_s, slow_down: decelerate.state,
       },

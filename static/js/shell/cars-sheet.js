@@ -26,13 +26,13 @@ export function openCars(store, { rows, open, openControl, openDuty }) {
   const unit = html('span', { class: 'u' });
   const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close', 'data-f': 'no' }, icon('close'));
   const list = html('ul', { class: 'cars' });
-  const words = html('p', { class: 'sub small' });
+  const effect = html('p', { class: 'sub small' });
   const control = html('button', { type: 'button', class: 'key wide', 'data-f': 'cars-control' }, icon('operator'), html('span'));
   const duty = html('button', { type: 'button', class: 'key wide', 'data-f': 'cars-duty' }, icon('operator'), html('span'));
   const fleet = html('a', { class: 'pick-link', href: '/fleet', 'data-f': 'cars-fleet' }, 'Fleet: what needs a person');
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-cars', 'aria-labelledby': 'cars-title' },
     html('div', { class: 'cars-head' }, html('h2', { id: 'cars-title' }, 'Cars'), html('span', { class: 'speed' }, speed, unit), close),
-    list, fleet, html('div', { class: 'keys' }, duty, control, words)));
+    list, fleet, html('div', { class: 'keys' }, duty, control, effect)));
   /** @type {Map<string, CarItem>} */
   const items = new Map();
 
@@ -58,7 +58,7 @@ export function openCars(store, { rows, open, openControl, openDuty }) {
     setText(/** @type {Element} */ (duty.lastElementChild), dutyWords(store.duty));
     show(duty, store.duty !== null && !store.isViewer);
     show(fleet, now.length > 1);
-    setWords(words, now.length > 1 ? `Opening another car moves the slide to it and arms nothing. Control of ${store.vehicle} is given up.` : 'The server watches one car.');
+    setWords(effect, now.length > 1 ? `Opening another car moves the slide to it and arms nothing. Control of ${store.vehicle} is given up.` : 'The server watches one car.');
   }
 
   control.addEventListener('click', () => {

@@ -115,10 +115,10 @@ class ConnectScreen {
   }
 
   #drawComplaint() {
-    const says = field(this.root, 'says');
+    const message = field(this.root, 'says');
     const sentence = this.#complaint || heldWords(this.store.frame?.session.held ?? null);
-    setWords(says, sentence);
-    show(says, sentence !== '');
+    setWords(message, sentence);
+    show(message, sentence !== '');
   }
 
   openHistory() {
@@ -178,22 +178,22 @@ class ConnectScreen {
       .../** @type {const} */ (['sound', 'screen', 'position']).map((what) => [what, armWords(what, arms[what])]),
       ['slowdown', connectRow(store.frame?.decelerate, store.isMonitoring)],
     ]);
-    for (const [what, words] of rows) {
-      drawTag(field(root, what), words.tag, words.kind);
-      setText(field(root, `${what}-cost`), words.cost);
+    for (const [what, arm] of rows) {
+      drawTag(field(root, what), arm.tag, arm.kind);
+      setText(field(root, `${what}-cost`), arm.cost);
     }
   }
 }
 
 /**
  * @param {HTMLElement} element
- * @param {string} word
+ * @param {string} text
  * @param {'plain' | 'warn' | 'unk'} kind
  */
-function drawTag(element, word, kind) {
-  const key = `${kind} ${word}`;
+function drawTag(element, text, kind) {
+  const key = `${kind} ${text}`;
   if (element.dataset['key'] === key) return;
   element.dataset['key'] = key;
   element.className = kind === 'plain' ? 'tag' : `tag ${kind}`;
-  element.replaceChildren(...(kind === 'plain' ? [icon('ok', 's')] : kind === 'warn' ? [icon('warn', 's')] : []), word);
+  element.replaceChildren(...(kind === 'plain' ? [icon('ok', 's')] : kind === 'warn' ? [icon('warn', 's')] : []), text);
 }

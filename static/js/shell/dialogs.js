@@ -35,7 +35,7 @@ const LOST_AFTER_S = 4;
 export function dialogOf({ frame, isSilent, silence_s, isChoosing, isAnswered }) {
   if (!frame) return null;
   const { phase, paused } = frame.session;
-  if (frame.replay && !isSilent) return null; // what asked then asks nobody now; what is live asks through replay.js
+  if (frame.replay && !isSilent) return null; // its alarms are past; alarms of the live car come through replay.js
   const isWatching = phase === 'monitoring' || phase === 'lost';
   if (isSilent) return isWatching && !isChoosing && !isAnswered && silence_s > LOST_AFTER_S ? { kind: 'lost', alarm: null } : null;
   if (phase === 'failed') return isChoosing || isAnswered ? null : { kind: 'failed', alarm: layOut(frame.alarms).dialog };
@@ -114,7 +114,7 @@ class Dialogs {
     this.router = router;
   }
 
-  /** Whether a press was meant for what this dialog says now. @param {HTMLElement} sheet @returns {Meant} */
+  /** Whether a press was meant for what this dialog shows now. @param {HTMLElement} sheet @returns {Meant} */
   meant(sheet) {
     const had = this.#meant.get(sheet);
     if (had) return had;
@@ -206,7 +206,7 @@ export function headKey({ id, occurrence }) {
   return `${id} ${occurrence}`;
 }
 
-/** The alarm that stands in the head of its pane, as headKey says it; null: none does. @param {HTMLElement} monitor */
+/** The alarm that stands in the head of its pane, as headKey names it; null: none does. @param {HTMLElement} monitor */
 export function alarmInHead(monitor) {
   return /** @type {HTMLElement | null} */ (monitor.querySelector('[data-slot="alarm"] > [open]'))?.dataset['alarm'] ?? null;
 }
@@ -289,16 +289,16 @@ export function linkWords(kind, view, frame) {
   const tried = link && link.attempts > 0 ? `Tried ${times(link.attempts)} in ${age(link.trying_for_s)} s.` : '';
   if (kind === 'failed') return [view.sentence, '', [link?.problem?.hint, tried].filter(Boolean).join(' ')];
   if (kind === 'mute') {
-    const heard = link ? `${link.topics_heard} of ${link.topics_subscribed} topics sent data.` : '';
-    return [view.sentence, heard, view.detail];
+    const received = link ? `${link.topics_heard} of ${link.topics_subscribed} topics sent data.` : '';
+    return [view.sentence, received, view.detail];
   }
-  const isOld = view.cut === 0 || view.isUnserved; // what the frame says was then
+  const isOld = view.cut === 0 || view.isUnserved; // the frame's data is of then
   const again = view.cut !== 1 || view.isUnserved ? view.detail : `The server is running and dials again${link?.attempts ? `; ${counted(link.attempts, 'try', 'tries')} so far` : ''}.`;
   return [view.sentence, again, `The car may still be moving: watch the car.${isOld || !frame ? '' : savedWords(frame.recording)}`];
 }
 
 /**
- * What became of the recording when the link was lost: said only once it is on the disk and in the list.
+ * What became of the recording when the link was lost: stated only once it is on the disk and in the list.
  * @param {import('../core/protocol-types.js').RecordingState} recording
  */
 export function savedWords({ state, saved }) {

@@ -24,7 +24,7 @@ const COMMANDS = /** @type {const} */ ({
 export class FleetActs {
   /** Items of floods that show their cars. @type {Set<string>} */
   unfolded = new Set();
-  /** Lost cars whose sound was silenced here, until they are heard again. @type {Set<string>} */
+  /** Lost cars whose sound was silenced here, until data comes again. @type {Set<string>} */
   hushed = new Set();
   /** What is shown has changed here. */
   onChange = () => {};
@@ -64,7 +64,7 @@ export class FleetActs {
   }
 
   /**
-   * A person says of a car that nobody hears that it is off on purpose, or that it is not.
+   * An operator marks a silent car as off on purpose, or takes the mark back.
    * @param {'off' | 'on'} act
    * @param {string} name
    * @param {HTMLElement} key

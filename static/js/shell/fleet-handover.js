@@ -1,4 +1,4 @@
-// "Hand over": the people who announce the alarms of a car; one of them is asked, and it is assigned to this page until they accept.
+// "Hand over": the people who announce the alarms of a car; it is offered to one of them, and stays assigned to this page until they accept.
 
 import { addSheet, closeSheet, openSheet } from './sheet.js';
 import { html, icon } from '../core/dom.js';
@@ -25,9 +25,9 @@ export function peopleOf(cars, names, page) {
 export function openHandover(name, people, choose) {
   const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close', 'data-f': 'no' }, icon('close'));
   const list = html('ul', { class: 'menu-list', 'data-f': 'people' });
-  const words = people.length ? 'It is assigned to you until they accept.' : 'Nobody else announces the alarms of this car now.';
+  const effect = people.length ? 'It is assigned to you until they accept.' : 'Nobody else announces the alarms of this car now.';
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-hand', 'aria-labelledby': 'hand-title' },
-    html('div', { class: 'hand-head' }, html('h2', { id: 'hand-title' }, `Hand over ${name}`), close), list, html('p', { class: 'bd small sub' }, words)));
+    html('div', { class: 'hand-head' }, html('h2', { id: 'hand-title' }, `Hand over ${name}`), close), list, html('p', { class: 'bd small sub' }, effect)));
   for (const person of people) {
     const key = html('button', { type: 'button', 'data-page': person.page }, icon('operator'), html('span', {}, person.name));
     key.addEventListener('click', () => {

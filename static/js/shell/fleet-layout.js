@@ -36,7 +36,7 @@ import { speedWords } from '../core/units.js';
  * @property {number} raised_s for so long
  * @property {boolean} isUnassigned
  * @property {boolean} [isUnowned] who has acknowledged an alarm of it is off duty
- * @property {boolean} [isOff] a person said that it is off on purpose: it is in no count
+ * @property {boolean} [isOff] a person marked it as off on purpose: it is in no count
  * @property {import('../core/protocol-types.js').Sound} sound of an alarm that nobody has, or of a car that fell silent
  *
  * @typedef {object} Seen what the queue is made of
@@ -87,8 +87,8 @@ export function itemsOf(seen) {
     const now_ms = clock_ms === undefined ? seen.now_ms : clock_ms + 1000 * (ageOf(car, seen.lag_s) ?? 0);
     const item = isLost(car, seen.lag_s) ? lostItem(car, seen) : itemOf(car.name, /** @type {CarSummary} */ (car.summary), { ...seen, now_ms });
     if (item) items.push(item);
-    const asked = isLost(car, seen.lag_s) ? null : requestItem(car.name, /** @type {CarSummary} */ (car.summary), ageOf(car, seen.lag_s) ?? 0);
-    if (asked) items.push(asked);
+    const request = isLost(car, seen.lag_s) ? null : requestItem(car.name, /** @type {CarSummary} */ (car.summary), ageOf(car, seen.lag_s) ?? 0);
+    if (request) items.push(request);
   }
   return items.sort(byOrder);
 }
@@ -121,10 +121,10 @@ function itemOf(name, summary, seen) {
   const timer = timerOf(attention, seen.now_ms, seen.kept.get(name)?.timer_s ?? ESCALATES_S);
   const isUnassigned = attention !== undefined && !attention?.assigned;
   const more = summary.waiting > 1 ? `, ${counted(summary.waiting - 1, 'more alarm')}` : '';
-  const said = isCut ? lastWords(summary.speed.value_mps, summary.link.car_age_s ?? summary.link.bridge_age_s, seen) : worst?.text ?? '';
+  const text = isCut ? lastWords(summary.speed.value_mps, summary.link.car_age_s ?? summary.link.bridge_age_s, seen) : worst?.text ?? '';
   return {
     key: name, cars: [name], name, icon: isCut ? 'link-off' : worst ? ICONS[worst.priority] : 'info', kind: worst ? KIND[worst.priority] : 'warn',
-    isFilled: Boolean(worst?.active && isAsking), title: worst ? titleOf(worst) : 'Needs a person', detail: [`${said}${more}`.replace(/^, /, ''), unownedWords(summary)].filter(Boolean).join('; '),
+    isFilled: Boolean(worst?.active && isAsking), title: worst ? titleOf(worst) : 'Needs a person', detail: [`${text}${more}`.replace(/^, /, ''), unownedWords(summary)].filter(Boolean).join('; '),
     since_s: Math.max(0, (seen.now_ms - since_ms) / 1000),
     who: whoOf(summary, seen.page), next: nextOf(summary, seen.now_ms), timer, keys: keysOf(summary, seen),
     order: [...stepOf(summary, seen), -(worst ? RANK[worst.priority] : 0), raised_s],
@@ -133,13 +133,13 @@ function itemOf(name, summary, seen) {
   };
 }
 
-/** For how long nothing was heard of a car [s]; null: it was never heard. @param {ListedCar} car @param {Seen} seen */
+/** For how long nothing was received of a car [s]; null: nothing ever was. @param {ListedCar} car @param {Seen} seen */
 export function silenceOf(car, seen) {
   const kept = seen.kept.get(car.name);
   return ageOf(car, seen.lag_s) ?? (kept ? (seen.page_ms - kept.at_ms) / 1000 : null);
 }
 
-/** A car of which nothing is known now: who has it is not known either. One that was never heard is only listed. @param {ListedCar} car @param {Seen} seen @returns {Item | null} */
+/** A car of which nothing is known now: who has it is not known either. A car without any data so far is only listed. @param {ListedCar} car @param {Seen} seen @returns {Item | null} */
 function lostItem(car, seen) {
   const kept = seen.kept.get(car.name);
   const since_s = silenceOf(car, seen);
@@ -156,11 +156,11 @@ function lostItem(car, seen) {
   };
 }
 
-/** A car that is off on purpose, as a person said: it needs nobody until it is heard again. @param {string} name @param {import('../core/protocol-types.js').OffOnPurpose} off @param {number | null} since_s @param {Seen} seen @returns {Item} */
+/** A car that is off on purpose, marked so by a person: it needs nobody until its data comes again. @param {string} name @param {import('../core/protocol-types.js').OffOnPurpose} off @param {number | null} since_s @param {Seen} seen @returns {Item} */
 function offItem(name, { by, since_ms }, since_s, seen) {
   return {
     key: name, cars: [name], name, icon: 'info', kind: '', isFilled: false, title: 'Off on purpose', detail: lastWords(null, since_s, seen), since_s: Math.max(0, (seen.now_ms - since_ms) / 1000),
-    who: { text: `said by ${by} at ${timeOfDay(since_ms)}`, is: 'other' }, next: 'until data comes', timer: null, keys: [key('on')],
+    who: { text: `set by ${by} at ${timeOfDay(since_ms)}`, is: 'other' }, next: 'until data comes', timer: null, keys: [key('on')],
     order: [9, 0, 0, 0], cause: '', raised_s: 0, isUnassigned: false, isOff: true, sound: 'none',
   };
 }
@@ -199,7 +199,7 @@ function timerOf(attention, now_ms, timer_s) {
 function nextOf({ attention }, now_ms) {
   if (!attention) return '';
   const { offered } = attention;
-  return supervisorWords(attention, now_ms) || (offered ? `asked for ${duration((now_ms - offered.since_ms) / 1000)}` : 'no timer');
+  return supervisorWords(attention, now_ms) || (offered ? `offered for ${duration((now_ms - offered.since_ms) / 1000)}` : 'no timer');
 }
 
 /** @param {CarSummary} summary @param {string} page @returns {Who} */
@@ -207,12 +207,12 @@ function whoOf({ attention, worst }, page) {
   if (attention === undefined) return { text: 'not known who has it', is: 'unknown' };
   const assigned = attention?.assigned;
   const offered = attention?.offered;
-  if (offered?.page === page) return { text: `${offered.by} asks you to take over`, is: 'other' };
-  const asks = offered ? `. ${offered.name} is asked` : '';
-  if (!assigned) return { text: `unassigned${asks}`, is: 'nobody' };
+  if (offered?.page === page) return { text: `offered to you by ${offered.by}`, is: 'other' };
+  const offer = offered ? `, offered to ${offered.name}` : '';
+  if (!assigned) return { text: `unassigned${offer}`, is: 'nobody' };
   const isAcknowledged = worst?.state === 'ACKED';
   const isYou = assigned.page === page;
-  return { text: `assigned to ${isYou ? 'you' : assigned.name}${isAcknowledged && !asks ? ', acknowledged' : ''}${asks}`, is: isYou ? 'you' : 'other' };
+  return { text: `assigned to ${isYou ? 'you' : assigned.name}${isAcknowledged && !offer ? ', acknowledged' : ''}${offer}`, is: isYou ? 'you' : 'other' };
 }
 
 /** Escalated first, then by the time left; a question to this page before what nobody has, then what somebody has. @param {CarSummary} summary @param {Seen} seen @returns {[number, number]} */

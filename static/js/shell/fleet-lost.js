@@ -8,7 +8,7 @@ import { field, html, setText, setWords, show } from '../core/dom.js';
 import { age, counted, timeOfDay } from '../core/format.js';
 
 /**
- * @typedef {'server' | 'cars' | null} Lost server: it does not answer · cars: it answers, and has heard of no car
+ * @typedef {'server' | 'cars' | null} Lost server: it does not answer · cars: it answers, and has data of no car
  * @typedef {{lost: Lost, silence_s: number, heard_ms: number | null, cars: number, unserved: string}} LostView
  */
 
@@ -34,14 +34,14 @@ export function lostWords({ lost, heard_ms, cars, unserved }) {
 export class LostPanel {
   #own = '';
 
-  /** @param {HTMLElement} root @param {(name: string, key: HTMLElement) => void} off a person says that a car is off on purpose */
+  /** @param {HTMLElement} root @param {(name: string, key: HTMLElement) => void} off marks a car as off on purpose */
   constructor(root, off) {
     this.off = off;
     this.root = field(root, 'lost');
     this.title = field(root, 'lost-title');
     this.age = field(root, 'lost-age');
     this.chain = field(root, 'lost-chain');
-    this.words = field(root, 'lost-words');
+    this.text = field(root, 'lost-words');
     this.what = field(root, 'lost-what');
     this.ownWords = field(root, 'lost-own');
     this.own = field(root, 'own');
@@ -54,8 +54,8 @@ export class LostPanel {
     setText(this.title, view.lost === 'server' ? 'Server lost' : 'No data from any car');
     setText(this.age, view.silence_s === Infinity ? '' : `${age(view.silence_s)} s`);
     drawBigChain(this.chain, lostChain(view));
-    const [words, what] = lostWords(view);
-    setWords(this.words, words);
+    const [text, what] = lostWords(view);
+    setWords(this.text, text);
     setWords(this.what, what);
     show(this.ownWords, names.length > 0);
     const may = view.lost === 'cars' ? silent : [];

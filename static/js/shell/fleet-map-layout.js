@@ -134,7 +134,7 @@ function overlaps(a, b) {
 }
 
 /**
- * What the head of the map says.
+ * The text in the head of the map.
  * @param {number} cars
  * @param {Dot[]} dots
  * @param {string[]} without

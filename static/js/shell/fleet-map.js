@@ -47,14 +47,14 @@ export class FleetMap {
    * @param {import('./fleet-layout.js').Seen} seen
    * @param {Map<string, 'crit' | 'warn' | ''>} kinds
    * @param {Set<string>} floods cars in a flood
-   * @param {string} then what the head says where all of it is of then
+   * @param {string} then the text of the head where all positions are old
    */
   draw(seen, kinds, floods, then) {
     const { dots, far, without, from } = dotsOf(seen, kinds, floods, this.#from);
     this.#from = from;
-    const words = mapWords(seen.cars?.cars.length ?? 0, dots, without, far);
-    setWords(this.head, then || words);
-    setAttribute(this.root, 'aria-label', `Map of all cars: ${then || words}`);
+    const text = mapWords(seen.cars?.cars.length ?? 0, dots, without, far);
+    setWords(this.head, then || text);
+    setAttribute(this.root, 'aria-label', `Map of all cars: ${then || text}`);
     const { width, height } = this;
     if (width < 40 || height < 40) return; // out of sight
     const size = `${width} ${height}`;

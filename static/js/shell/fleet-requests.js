@@ -1,4 +1,4 @@
-// Who is called next for an item, and who asks for control of a car that another has: pure functions for the attention queue.
+// Who is called next for an item, and requests for control of a car that another has: pure functions for the attention queue.
 
 import { counted, duration, sinceTime } from '../core/format.js';
 
@@ -26,7 +26,7 @@ export function unownedWords({ unowned }) {
 }
 
 /**
- * Somebody asks for control of a car and is not answered yet; by silence they get it.
+ * A request for control of a car that is not answered yet; without an answer it is granted.
  * @param {string} name
  * @param {CarSummary} summary
  * @param {number} age_s of the summary
@@ -36,9 +36,9 @@ export function requestItem(name, { requests, holder }, age_s) {
   const [first, ...more] = requests ?? [];
   if (!first || !holder) return null;
   const left_s = Math.max(0, Math.ceil(first.left_s - age_s));
-  const others = more.length ? `. ${counted(more.length, 'other asks', 'others ask')} too` : '';
+  const others = more.length ? `. ${counted(more.length, 'other request', 'other requests')}` : '';
   return {
-    key: `${name} control`, cars: [name], name, icon: 'info', kind: '', isFilled: false, title: `${first.name} asks for control`,
+    key: `${name} control`, cars: [name], name, icon: 'info', kind: '', isFilled: false, title: `${first.name} requests control`,
     detail: `Granted in ${left_s} s unless ${holder} keeps it${others}`, since_s: null, who: { text: `${holder} is in control`, is: 'other' }, next: '', timer: null,
     keys: [{ act: 'open', label: 'Open', isMain: true }], order: [3, 0, 0, -left_s], cause: '', raised_s: 0, isUnassigned: false, sound: 'none',
   };

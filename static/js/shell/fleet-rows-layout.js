@@ -27,7 +27,7 @@ import { age, counted, fixed, timeOfDay } from '../core/format.js';
  * @property {boolean} isRecording
  * @property {{ink: Freshness, text: string}} energy
  * @property {string} age in seconds; a dash where it is not connected
- * @property {boolean} isQuiet nothing asks for a person
+ * @property {boolean} isQuiet nothing needs a person
  * @property {boolean} isStopped it is in a planned stop, which can be ended here
  *
  * @typedef {{kind: 'crit' | 'warn' | '', icon: string, text: string, end: string, more: string, isFilled: boolean}} Line more: left out where there is no room
@@ -162,7 +162,7 @@ export function rowsAPage(count, height_px, row_px, below_px) {
 /**
  * The fixed place of each car, and what stands there.
  * @param {Row[]} rows
- * @returns {{name: string, label: string, kind: 'crit' | 'warn' | 'lost' | '', isDriving: boolean, says: string}[]}
+ * @returns {{name: string, label: string, kind: 'crit' | 'warn' | 'lost' | '', isDriving: boolean, title: string}[]}
  */
 export function placesOf(rows) {
   const sorted = [...rows].sort((a, b) => natural(a.name, b.name));
@@ -170,11 +170,11 @@ export function placesOf(rows) {
   return sorted.map((row, i) => {
     const kind = row.isLost || (row.isAsking && row.icon === 'link-off') ? 'lost' : row.isAsking ? row.kind : '';
     const state = row.isLost ? 'no data' : row.text === '–' ? row.mode : row.text;
-    return { name: row.name, label: labels[i] ?? row.name, kind, isDriving: row.mode === 'driving', says: `${row.name}, ${state}` };
+    return { name: row.name, label: labels[i] ?? row.name, kind, isDriving: row.mode === 'driving', title: `${row.name}, ${state}` };
   });
 }
 
-/** Numbers alone where all names are one word and a number. @param {string[]} names */
+/** Numbers alone where all names are one term and a number. @param {string[]} names */
 export function labelsOf(names) {
   const parts = names.map((name) => /^(\D*)(\d{1,4})$/.exec(name));
   if (names.length > 1 && parts.every((part) => part && part[1] === parts[0]?.[1])) return parts.map((part) => part?.[2] ?? '');

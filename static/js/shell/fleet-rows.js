@@ -159,7 +159,7 @@ export class Places {
       setText(cell.label, place.label);
       setAttribute(cell.link, 'data-kind', place.kind || null);
       setAttribute(cell.link, 'data-drives', place.isDriving);
-      setAttribute(cell.link, 'aria-label', place.says);
+      setAttribute(cell.link, 'aria-label', place.title);
       show(cell.mark, place.kind !== '');
       if (place.kind) setIcon(cell.mark, place.kind === 'lost' ? 'link-off' : place.kind);
       return cell.element;

@@ -28,13 +28,13 @@ export class FleetStore {
   events = [];
   /** @type {import('../core/protocol-types.js').Hello['who'] | null} */
   who = null;
-  /** Who is on duty at this device; null: the server has not told. @type {import('../core/protocol-types.js').Duty | null} */
+  /** Who is on duty at this device; null: not received yet. @type {import('../core/protocol-types.js').Duty | null} */
   duty = null;
   /** Wall clock of the newest list. @type {number | null} */
   heard_ms = null;
   /** The server greeted this page after the newest list came: it answers, and has no list. */
   isAnswering = false;
-  /** Why the server has nothing of the cars, in its words. */
+  /** Why the server has nothing of the cars, in its own text. */
   unserved = '';
   deadMan = new DeadMan();
   #cars_ms = -Infinity;
@@ -72,7 +72,7 @@ export class FleetStore {
     this.self = self;
     this.socket = new PageSocket({
       opened: () => void (this.sync.hasGreeted = false),
-      text: (text, at_ms) => this.#emitter.guard(() => this.#heard(text, at_ms)),
+      text: (text, at_ms) => this.#emitter.guard(() => this.#received(text, at_ms)),
       bytes: () => {},
       closed: () => this.#emitter.guard(() => this.#requests.broke()),
     }, dial);
@@ -156,7 +156,7 @@ export class FleetStore {
   }
 
   /** @param {string} text @param {number} [at_ms] when it came */
-  #heard(text, at_ms = this.now()) {
+  #received(text, at_ms = this.now()) {
     this.#woke(); // a phone that wakes may read what came before the page looks at the time
     const message = readMessage(text);
     if (!message) return undefined;

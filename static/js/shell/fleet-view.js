@@ -20,13 +20,13 @@ import { age, timeOfDay } from '../core/format.js';
 const NONE = 'No car is listed yet. A car is listed here once this server is started with it (--vehicle NAME=ws://ADDRESS), or once its agent has connected to the broker.';
 /** Two columns and pages; else everything is in one column that scrolls. */
 const WIDE = '(width >= 47.5em) and (height >= 35em)';
-const DESK = '(width >= 75em)';
+const DESKTOP = '(width >= 75em)';
 
 export class FleetView {
   /** Items of one car each. @type {Item[]} */
   items = [];
   #wide = matchMedia(WIDE);
-  #desk = matchMedia(DESK);
+  #desktop = matchMedia(DESKTOP);
 
   /**
    * @param {HTMLElement} root
@@ -99,11 +99,11 @@ export class FleetView {
     const seen = this.#seen();
     const listed = seen.cars?.cars ?? [];
     for (const car of listed) if (!isLost(car, seen.lag_s)) this.acts.hushed.delete(car.name);
-    const wanted = listed.filter(({ off }) => !off); // whether those that are off on purpose are heard says nothing
+    const wanted = listed.filter(({ off }) => !off); // silence of cars that are off on purpose is no sign of a lost link
     const isNothingHeard = wanted.length > 0 && wanted.every((car) => isLost(car, seen.lag_s));
     const lost = store.isSilent ? (store.isAnswering ? 'cars' : 'server') : isNothingHeard ? 'cars' : null;
     const ages = listed.map((car) => silenceOf(car, seen)).filter((one) => one !== null);
-    const silence_s = store.isSilent ? store.silence_s : Math.min(...ages); // infinite where no car was ever heard
+    const silence_s = store.isSilent ? store.silence_s : Math.min(...ages); // infinite where no car ever sent data
     const troubles = [...new Set(listed.map((car) => car.trouble).filter(Boolean))];
     const unserved = store.unserved || (troubles.length <= 2 ? troubles.join(' ') : '');
     const heard_ms = store.heard_ms === null || silence_s === Infinity ? null : Date.now() - silence_s * 1000;
@@ -152,8 +152,8 @@ export class FleetView {
   #drawBar(view, count) {
     const { bar, store } = this;
     const isKnown = store.cars !== null || view.lost !== null;
-    const word = view.lost ? 'Lost' : isKnown ? 'Live' : 'Waiting';
-    setText(bar.word, word);
+    const state = view.lost ? 'Lost' : isKnown ? 'Live' : 'Waiting';
+    setText(bar.word, state);
     setText(bar.age, isKnown ? age(view.lost ? view.silence_s : store.lag_s) : '');
     setText(bar.unit, isKnown ? ' s' : '');
     drawChain(bar.chain, view.lost ? lostChain(view) : { ...lostChain(view), cut: isKnown ? null : 0 });
@@ -183,8 +183,8 @@ export class FleetView {
     if (!this.#wide.matches) return Math.max(1, count * 2); // a phone scrolls
     const { clientHeight } = this.floor;
     const isMany = count >= MANY;
-    const queue = this.#desk.matches ? 0 : need(this.root, '[data-f="queue"]').offsetHeight;
-    const [row, below] = this.#desk.matches ? [isMany ? 28 : 40, isMany ? 270 : 260] : [isMany ? 40 : 44, isMany ? 290 : 250];
+    const queue = this.#desktop.matches ? 0 : need(this.root, '[data-f="queue"]').offsetHeight;
+    const [row, below] = this.#desktop.matches ? [isMany ? 28 : 40, isMany ? 270 : 260] : [isMany ? 40 : 44, isMany ? 290 : 250];
     return rowsAPage(count * 2, clientHeight - queue - 80, row, below);
   }
 

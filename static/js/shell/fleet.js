@@ -17,7 +17,7 @@ import { Undrawn } from './undrawn.js';
 import { loudest } from './fleet-layout.js';
 import { field, listen, need } from '../core/dom.js';
 
-/** Where nothing is heard of any car for longer, it is told aloud [s]. */
+/** A silence of all cars longer than this is announced by sound [s]. */
 const LOUD_S = 4;
 
 /** @type {(() => void)[]} */

@@ -1,4 +1,4 @@
-// "Install" in the menu: the browser's own offer where it has one, on an iPhone the words how, else nothing.
+// "Install" in the menu: the browser's own offer where it has one, on an iPhone the instructions, else nothing.
 
 import { field, listen, need, show } from '../core/dom.js';
 import { addSheet, closeSheet, openSheet } from './sheet.js';
@@ -40,17 +40,17 @@ export function mount(say) {
       }
       return openSheet(sheet);
     }
-    const asked = offer;
-    offer = null; // it can be asked once
+    const prompt = offer;
+    offer = null; // it can be shown once
     draw();
-    const { outcome } = (await asked?.prompt().catch(() => null)) ?? { outcome: 'failed' };
+    const { outcome } = (await prompt?.prompt().catch(() => null)) ?? { outcome: 'failed' };
     if (outcome === 'failed') say('The browser showed no prompt. Its menu may offer “Install” too.', 'Not installed');
   }
 
   draw();
   const stops = [
     listen(window, 'beforeinstallprompt', (event) => {
-      event.preventDefault(); // it asks when the operator wants it, not over the instruments
+      event.preventDefault(); // it is shown when the operator wants it, not over the instruments
       offer = /** @type {Offer} */ (event);
       draw();
     }),

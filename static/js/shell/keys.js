@@ -7,7 +7,7 @@ import { styled } from '../core/style-sheet.js';
 
 /**
  * @typedef {'acknowledge' | 'silence' | 'mark' | 'tab' | 'help' | 'watch' | 'play' | 'step'} Act
- * @typedef {{keys: string[], shown: string, act: Act, does: string, isElsewhere?: boolean}} Key isElsewhere: the replay obeys it itself
+ * @typedef {{keys: string[], shown: string, act: Act, does: string, isElsewhere?: boolean}} Key isElsewhere: the replay handles it itself
  */
 
 /** @type {readonly Key[]} */
@@ -30,7 +30,7 @@ const READ_MS = 1000;
 const OWN_KEYS = '.view > .sheet, input, select, textarea, [contenteditable], [role="slider"], [role="application"]';
 
 /**
- * What a key asks for; null where it is not one of ours, or belongs to what has the focus.
+ * The action of a key; null where it is not one of ours, or belongs to what has the focus.
  * @param {{key: string, ctrlKey: boolean, metaKey: boolean, altKey: boolean, defaultPrevented: boolean, repeat: boolean}} event
  * @param {{isTaken: boolean, isOn: boolean, isTouch?: boolean}} page isTaken: a field, a slider or a dialog has the keys
  * @returns {Key | null}
@@ -63,8 +63,8 @@ export function mount(monitor, store, tabs, say) {
 }
 
 class PageKeys {
-  /** What each answering key would answer, and since when that is in sight. @type {Record<'acknowledge' | 'silence', {asks: string, since_ms: number}>} */
-  #seen = { acknowledge: { asks: '', since_ms: 0 }, silence: { asks: '', since_ms: 0 } };
+  /** What each answering key would answer, and since when that is in sight. @type {Record<'acknowledge' | 'silence', {alarm: string, since_ms: number}>} */
+  #seen = { acknowledge: { alarm: '', since_ms: 0 }, silence: { alarm: '', since_ms: 0 } };
   #isOn = recall();
 
   /** @param {HTMLElement} monitor @param {import('../core/store.js').Store} store @param {import('./tabs.js').Tabs} tabs @param {(sentence: string, title?: string) => void} say */
@@ -90,12 +90,12 @@ class PageKeys {
     } else if (act === 'acknowledge' || act === 'silence') this.#answer(act);
   }
 
-  /** Notes since when what asks is in sight. */
+  /** Notes since when the alarm that needs an answer is in sight. */
   look() {
     for (const act of /** @type {const} */ (['acknowledge', 'silence'])) {
-      const asks = this.#keyFor(act)?.getAttribute('aria-label') ?? '';
-      const alarm = asks && `${asks} ${this.store.frame?.alarms.map(({ id, occurrence, state }) => `${id} ${occurrence} ${state}`).join()}`;
-      if (alarm !== this.#seen[act].asks) this.#seen[act] = { asks: alarm, since_ms: this.store.now() };
+      const label = this.#keyFor(act)?.getAttribute('aria-label') ?? '';
+      const alarm = label && `${label} ${this.store.frame?.alarms.map(({ id, occurrence, state }) => `${id} ${occurrence} ${state}`).join()}`;
+      if (alarm !== this.#seen[act].alarm) this.#seen[act] = { alarm, since_ms: this.store.now() };
     }
   }
 

@@ -10,7 +10,7 @@ import { field, setText, show } from '../core/dom.js';
  * @template Module
  * @typedef {object} Tab
  * @property {string} what is named where it cannot be fetched
- * @property {string} state the field of the panel that says so; `none-words` stands in the field `none`, which is hidden otherwise
+ * @property {string} state the field of the panel for this text; `none-words` stands in the field `none`, which is hidden otherwise
  * @property {() => boolean} isShown
  * @property {() => Promise<Module>} fetch
  * @property {(module: Module) => Content} mount

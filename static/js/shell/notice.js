@@ -1,4 +1,4 @@
-// A word of the page itself: something was refused, a blind time is over. It goes by itself, and takes no place of an alarm.
+// A notice of the page itself: something was refused, a blind time is over. It closes by itself, and takes no place of an alarm.
 
 import { html, icon, mirror, need, words } from '../core/dom.js';
 import { isMaybe } from '../core/outcome.js';

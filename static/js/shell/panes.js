@@ -74,7 +74,7 @@ class Panes {
     if (innerWidth >= 1800 * scale()) this.dress ??= styled('wall'); // as in wall.css
     const heads = headsOf(frame);
     const covered = veilOf(this.store);
-    for (const { name, element } of this.heads) setWords(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // of a covered pane nothing is said
+    for (const { name, element } of this.heads) setWords(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // a covered pane has no text
     this.log.draw();
     this.signals.draw(() => signalLines(frame.signals));
     const { head, lines } = peopleLines(store.isSilent ? null : frame.replay ? frame.live?.reach : frame.reach, store.control, store.page);

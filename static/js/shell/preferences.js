@@ -18,7 +18,7 @@ export function openPreferences() {
 }
 
 /**
- * What is said after a trial of a sound: plainly, where this phone cannot sound.
+ * The message after a trial of a sound; it names why this phone cannot sound.
  * @param {Awaited<ReturnType<AlarmSound['test']>>} result
  * @param {Loud} sound
  */
@@ -40,7 +40,7 @@ export function mount(alarmSound) {
     ...keys('unitKey', speedUnit, (unit) => chooseSpeedUnit(/** @type {import('../core/units.js').SpeedUnit} */ (unit))),
     ...keys('handKey', () => root.dataset['hand'] ?? 'right', (hand) => keep('hand', hand, 'right')),
   ];
-  const says = field(sheet(), 'sound-says');
+  const message = field(sheet(), 'sound-says');
   const draw = () => {
     for (const { key, value, now } of choices) key.setAttribute('aria-pressed', String(value === now()));
   };
@@ -52,9 +52,9 @@ export function mount(alarmSound) {
     })),
     ...all('soundKey').map((key) => listen(key, 'click', async () => {
       const sound = /** @type {Loud} */ (key.dataset['soundKey']);
-      setText(says, trialWords(await alarmSound.test(sound), sound));
+      setText(message, trialWords(await alarmSound.test(sound), sound));
     })),
-    listen(sheet(), 'close', () => setText(says, '')),
+    listen(sheet(), 'close', () => setText(message, '')),
   ];
   return () => stops.forEach((stop) => stop());
 }

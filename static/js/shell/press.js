@@ -5,7 +5,7 @@ import { listen, show } from '../core/dom.js';
 
 /** How long after the finger is lifted a browser may take until its click comes. */
 const CLICK_WITHIN_MS = 400;
-/** A finger that is down for longer was lifted where no browser says so: the note of the sound must not wait for it. */
+/** A finger that is down for longer was lifted without an event of the browser: the note of the sound must not wait for it. */
 const LONGEST_PRESS_MS = 12_000;
 
 const ACTS = 'button, a[href], input, select, textarea, summary, label, [role="slider"]';

@@ -1,4 +1,4 @@
-// Starting and ending the recording by hand. While the car moves, or may move, ending it asks once.
+// Starting and ending the recording by hand. While the car moves, or may move, ending it needs a confirmation.
 
 import { addSheet, closeSheet, openSheet } from './sheet.js';
 import { html, icon, listen, words } from '../core/dom.js';
@@ -8,7 +8,7 @@ import { speedWords } from '../core/units.js';
 const MOVES_ABOVE_MPS = 0.3;
 
 /**
- * Why ending the recording is asked for, as a sentence; null: the car stands.
+ * Why ending the recording needs a confirmation; null: the car stands.
  * @param {{ink: string, value_mps: number | null}} speed
  */
 export function askedBecause({ ink, value_mps }) {
@@ -32,7 +32,7 @@ export function record(on, store, say) {
       html('p', { id: 'record-words' }, ...words(`${why} What it does from now on would not be recorded.`))),
     html('div', { class: 'keys' }, yes, html('button', { type: 'button', class: 'key', 'data-f': 'no', autofocus: true }, 'Keep recording'))));
   const take = addSheet(sheet);
-  const offSwitch = store.on('switch', () => closeSheet(sheet)); // it was asked of the car before
+  const offSwitch = store.on('switch', () => closeSheet(sheet)); // it was about the car before
   listen(sheet, 'close', () => {
     offSwitch();
     take();

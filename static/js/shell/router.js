@@ -1,4 +1,4 @@
-// Which screen is in front, and what the operator's wishes do to it.
+// Which screen is in front, and how the operator's choices change it.
 
 import { need, setAttribute, show } from '../core/dom.js';
 

@@ -77,7 +77,7 @@ export class Screens {
           this.#again();
         });
       }),
-      listen(window, 'catgraph-units', () => this.#again()), // what it told stands there in the unit of before
+      listen(window, 'catgraph-units', () => this.#again()), // its texts still have the unit of before
       listen(document, 'keydown', (event) => {
         if (event.key === 'Escape' && this.open && !document.querySelector('dialog:modal')) this.show(null);
       }),

@@ -1,4 +1,4 @@
-// Opens and closes the sheets the operator asked for. Alarms take precedence: see dialogs.js.
+// Opens and closes the sheets the operator opened. Alarms take precedence: see dialogs.js.
 
 import { field, listen, need, setAttribute } from '../core/dom.js';
 import { styled } from '../core/style-sheet.js';
@@ -18,17 +18,17 @@ export function openSheet(sheet) {
   void styled('drawers'); // again where it failed
   sheet.show();
   setAttribute(need(document, '#monitor'), 'data-sheet', sheet.id);
-  sheet.addEventListener('close', () => setAttribute(need(document, '#monitor'), 'data-sheet', asked()?.id), { once: true });
+  sheet.addEventListener('close', () => setAttribute(need(document, '#monitor'), 'data-sheet', openedSheet()?.id), { once: true });
 }
 
 /** @returns {NodeListOf<HTMLDialogElement>} */
 const sheetsOpen = () => document.querySelectorAll('dialog[open]');
 
 /** The sheet that stands in the view. */
-const asked = () => [...sheetsOpen()].find((sheet) => isAsked(sheet) && sheet.closest('.view'));
+const openedSheet = () => [...sheetsOpen()].find((sheet) => isAsked(sheet) && sheet.closest('.view'));
 
 /** Closes what stands in the view, by hand. */
-export const leaveSheet = () => cancel(asked());
+export const leaveSheet = () => cancel(openedSheet());
 
 /** Whether a dialog stands over the page that no sheet may cover: an alarm, a broken link. */
 export function mustWait() {
@@ -46,11 +46,11 @@ export function closeSheet(sheet) {
 }
 
 /** Sheets opened by the operator, which give way to an alarm. */
-const ASKED = ['sheet-menu', 'sheet-history', 'sheet-shelve', 'sheet-stop', 'sheet-preferences', 'sheet-topic', 'sheet-profile', 'sheet-reset'];
+const OPENED = ['sheet-menu', 'sheet-history', 'sheet-shelve', 'sheet-stop', 'sheet-preferences', 'sheet-topic', 'sheet-profile', 'sheet-reset'];
 
 /** @param {HTMLDialogElement} sheet */
 export function isAsked(sheet) {
-  return (sheet.dataset['asked'] !== undefined || ASKED.includes(sheet.id)) && sheet.dataset['docked'] === undefined; // what is docked covers nothing
+  return (sheet.dataset['asked'] !== undefined || OPENED.includes(sheet.id)) && sheet.dataset['docked'] === undefined; // what is docked covers nothing
 }
 
 /** Closes what stands in the view when it is left: by Escape, by another tab or screen, by a press beside it where it is no drawer. */
@@ -59,15 +59,15 @@ export function mountSheets() {
   const seen = new MutationObserver(leaveSheet);
   seen.observe(monitor, { attributeFilter: ['hidden', 'data-front', 'data-over'] });
   const stops = [
-    ...ASKED.map((id) => mountSheet(/** @type {HTMLDialogElement} */ (need(document, `#${id}`)))),
+    ...OPENED.map((id) => mountSheet(/** @type {HTMLDialogElement} */ (need(document, `#${id}`)))),
     listen(document, 'keydown', (event) => {
-      const sheet = event.key === 'Escape' && !document.querySelector('dialog:modal') ? asked() : undefined;
+      const sheet = event.key === 'Escape' && !document.querySelector('dialog:modal') ? openedSheet() : undefined;
       if (!sheet) return;
       event.stopPropagation(); // it closes nothing else
       cancel(sheet);
     }, { capture: true }),
     listen(need(monitor, '.view'), 'click', (event) => {
-      if (isFloor() || !asked() || event.target.closest('dialog')) return;
+      if (isFloor() || !openedSheet() || event.target.closest('dialog')) return;
       event.stopPropagation();
       leaveSheet();
     }, { capture: true }),

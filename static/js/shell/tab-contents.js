@@ -15,7 +15,7 @@ import { LazyTab } from './lazy-tab.js';
  *
  * @typedef {object} Row
  * @property {() => Promise<TabModule>} fetch
- * @property {string} [state] the field that says that it could not be fetched, where it is not NAME-state
+ * @property {string} [state] the field that shows that it could not be fetched, where it is not NAME-state
  * @property {boolean} [isNear] fetch it as soon as an edge of it is seen, for example in a swipe
  */
 

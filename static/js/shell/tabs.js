@@ -42,7 +42,7 @@ export function tabsInSight(tabs, index, hasPanes) {
   return tabs.filter((tab, i) => i === index || (tab.wide === 'pane' && (front.wide === 'pane' || tab === tabs[0]))).map(({ name }) => name);
 }
 
-/** The tabs; `onFront` hears which is in front, from the start on. */
+/** The tabs; `onFront` receives which is in front, from the start on. */
 export class Tabs {
   #front = -1;
   #isPlaced = false;
@@ -69,7 +69,7 @@ export class Tabs {
       listen(this.pager, 'wheel', () => this.#unfold(), { passive: true }),
       listen(window, 'hashchange', () => this.#linked()),
       listen(floorQuery(), 'change', () => this.#relaid()),
-      listen(window, 'resize', () => root.hidden || this.place()), // a page that begins is told of its size: nothing is shown yet
+      listen(window, 'resize', () => root.hidden || this.place()), // a page that begins gets this event too: nothing is shown yet
     ];
     this.#bring(this.#laid(this.index));
     this.#fold();

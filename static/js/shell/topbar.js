@@ -1,4 +1,4 @@
-// The top bar: the chain with its word and age, the recorder and its key in the menu. Which car, and who is in control: cars.js, control.js.
+// The top bar: the chain with its state and age, the recorder and its key in the menu. Which car, and who is in control: cars.js, control.js.
 
 import { drawChain } from './chain.js';
 import { field, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
@@ -62,13 +62,13 @@ export function mount(root, store, say) {
     setText(keyWords, order === false ? 'End the recording' : 'Start recording');
   }
 
-  function obey() {
+  function press() {
     closeSheet(menu);
     const on = order;
     if (on !== null) import('./record-key.js').then(({ record }) => record(on, store, say)).catch(() => say('It could not be loaded from the server. Try again.', 'Nothing was changed'));
   }
 
   if (store.frame) draw(); // before the first frame it is not shown
-  const stops = [store.on('draw', draw), listen(key, 'click', obey)];
+  const stops = [store.on('draw', draw), listen(key, 'click', press)];
   return () => stops.forEach((stop) => stop());
 }

@@ -1,4 +1,4 @@
-// What a page shows and sounds that cannot draw. Its words stand in the page from the beginning, and a CSS animation uncovers them
+// What a page shows and sounds that cannot draw. Its text is in the page from the beginning, and a CSS animation uncovers them
 // 2 s after the last completed drawing (frame.css), whatever becomes of the scripts. This script is sooner and names the alarms.
 // It uses as little of the browser as it can, and of everything several kinds: each line must be expected to throw.
 
@@ -9,9 +9,9 @@ const MOST_NAMED = 3;
 
 export class Undrawn {
   #isShown = false;
-  #said = '';
+  #text = '';
   /** @type {any} the place of the alarms' names */
-  #words = null;
+  #place = null;
   /** @type {any} */
   #key = null;
   #title = '';
@@ -25,7 +25,7 @@ export class Undrawn {
     this.sound = sound;
     this.root = /** @type {any} */ (document.documentElement);
     const named = /** @type {any} */ (globalThis); // an element with an id is a property of its window, which needs no function
-    any([() => { this.#words = document.getElementById('undrawn-alarms'); }, () => { this.#words = named['undrawn-alarms']; }]);
+    any([() => { this.#place = document.getElementById('undrawn-alarms'); }, () => { this.#place = named['undrawn-alarms']; }]);
     any([() => { this.#key = document.getElementById('undrawn-reload'); }, () => { this.#key = named['undrawn-reload']; }]);
   }
 
@@ -51,7 +51,7 @@ export class Undrawn {
   hide() {
     if (!this.#isShown) return;
     this.#isShown = false;
-    this.#said = '';
+    this.#text = '';
     attempt(() => { delete this.root.dataset.undrawn; });
     attempt(() => { this.root.removeAttribute('data-undrawn'); });
     attempt(() => { if (this.root.className === 'undrawn-now') this.root.className = ''; });
@@ -62,9 +62,9 @@ export class Undrawn {
 
   #name() {
     const text = namesOf(this.frameOf());
-    if (text === this.#said) return;
-    this.#said = text;
-    const place = this.#words;
+    if (text === this.#text) return;
+    this.#text = text;
+    const place = this.#place;
     any([
       () => proven(() => { place.firstChild.data = text; }, () => place.firstChild.data === text),
       () => { place.firstChild.nodeValue = text; },
@@ -84,7 +84,7 @@ function closeSheets() {
 }
 
 /**
- * The alarms in words, by nothing but loops: those that stand, then those that have returned, which are called so.
+ * The alarms as text, with nothing but loops: those that stand, then those that have returned, which are called so.
  * @param {State | null} frame
  */
 export function namesOf(frame) {

@@ -25,7 +25,7 @@ export function thenWords(frame) {
 }
 
 /**
- * Does the veil stand? Where the server lives, it covers the values of a car that fell silent; before the first word of a
+ * Whether the veil is shown. Where the server runs, it covers the values of a car that fell silent; before the first message of a
  * car there is nothing to cover, but the empty instruments must not look like instruments.
  * @param {import('../core/store.js').Store} store
  */

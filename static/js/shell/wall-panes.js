@@ -61,7 +61,7 @@ export class Lines {
     this.observer.observe(list);
   }
 
-  /** @param {() => Line[]} lines asked for only where there is room */
+  /** @param {() => Line[]} lines requested only where there is room */
   draw(lines) {
     if (!this.#lines) return;
     const shown = lines().slice(0, this.#lines);

@@ -37,17 +37,17 @@ export class OrderSteps {
       setText(row.label, label);
       setWords(row.value, value);
     });
-    const words = orderWords(order, this.store.isSilent ? 0 : this.store.lag_s);
-    setAttribute(this.steps, 'data-kind', words.kind || null);
-    setWords(this.line, this.store.vehicles.length > 1 ? `${this.store.vehicle}: ${words.text}` : words.text);
+    const line = orderWords(order, this.store.isSilent ? 0 : this.store.lag_s);
+    setAttribute(this.steps, 'data-kind', line.kind || null);
+    setWords(this.line, this.store.vehicles.length > 1 ? `${this.store.vehicle}: ${line.text}` : line.text);
   }
 
   /** Announces each change of the order once. @param {SlowOrder | null} order */
   #announce(order) {
-    const words = !order ? (this.#announced ? RELEASED : '')
+    const text = !order ? (this.#announced ? RELEASED : '')
       : order.stands ? orderWords(order, 0).text : order.confirmed === null ? 'Slow-down ordered.' : order.confirmed ? 'The car slows: confirmed.' : orderWords(order, 0).text;
-    if (words === this.#announced) return;
-    setText(this.live, words);
-    this.#announced = words;
+    if (text === this.#announced) return;
+    setText(this.live, text);
+    this.#announced = text;
   }
 }

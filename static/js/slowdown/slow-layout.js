@@ -1,4 +1,4 @@
-// The slow-down as words: what its slide, the strip, the steps, the count-down and the sheets say in each state. Pure functions.
+// The texts of the slow-down: of its slide, the strip, the steps, the count-down and the sheets in each state. Pure functions.
 
 import { speedWords } from '../core/units.js';
 import { age, fixed, timeOfDay } from '../core/format.js';
@@ -22,7 +22,7 @@ import { age, fixed, timeOfDay } from '../core/format.js';
 /** The unmistakable sentence, the same wherever it stands. */
 export const NOT_CONFIRMED = 'NOT CONFIRMED – use the physical stop';
 const AID = 'An aid, not an emergency stop: Wi-Fi and the bridge are in its path. The safety driver stops the car.';
-/** A guard that says nothing for so long is one that cannot be counted on [s]; it speaks at least twice a second. */
+/** A guard that sends nothing for so long cannot be relied on [s]; it reports at least twice a second. */
 const GUARD_HEARD_S = 2;
 /** A longer reason does not fit the slide; the sheet behind it gives it whole [characters]. */
 const BRIEF = 44;
@@ -42,7 +42,7 @@ export function seenOf(store, car = store.vehicle) {
 /** A car's name in a sentence; '' where the operator gave it none, so that the server calls it "car". @param {string} name */
 export const nameOf = (name) => (name === 'car' ? '' : name);
 
-/** The one word of its state. @param {Seen} seen */
+/** Its state as one term. @param {Seen} seen */
 export function stateWord({ now, isSilent }) {
   if (isSilent || !now) return 'NOT KNOWN';
   const order = orderOf(now);
@@ -71,10 +71,10 @@ export function holdOf(now) {
 /**
  * The slide.
  * @param {Seen} seen
- * @param {boolean} [isAsked] it stands in the sheet of an alarm, from which nothing is armed
- * @returns {{kind: 'off' | 'armed' | 'go', title: string, why: string, label: string}} off: pressed, it says why, or arms
+ * @param {boolean} [isInAlarm] it is in the sheet of an alarm, from which nothing is armed
+ * @returns {{kind: 'off' | 'armed' | 'go', title: string, why: string, label: string}} off: pressed, it shows why, or arms
  */
-export function slideOf(seen, isAsked = false) {
+export function slideOf(seen, isInAlarm = false) {
   const { now, isSilent, isViewer } = seen;
   /** @param {string} title @param {string} why */
   const off = (title, why) => ({ kind: /** @type {const} */ ('off'), title, why, label: `${title}: ${why}` });
@@ -88,7 +88,7 @@ export function slideOf(seen, isAsked = false) {
     if (isViewer) return off('Slow-down armed', 'not for viewers');
     return { kind: 'armed', title: 'Slide to slow', why: seen.car || 'the car', label: `Slide to slow ${seen.vehicle || 'the car'}. With a keyboard hold Enter for 1 second` };
   }
-  if (now.state === 'not_armed') return isAsked && !isViewer ? off('Acknowledge first', 'then arm it') : off('Slow-down not armed', isViewer ? 'not for viewers' : 'press to arm');
+  if (now.state === 'not_armed') return isInAlarm && !isViewer ? off('Acknowledge first', 'then arm it') : off('Slow-down not armed', isViewer ? 'not for viewers' : 'press to arm');
   const why = bare(now.why ?? 'not available');
   return off('Slow-down off', why.length > BRIEF ? 'press for the reason' : why);
 }
@@ -218,7 +218,7 @@ export function keepWords(state) {
  * The sheet behind the slide: how it stands, what will be commanded, and what this page may do.
  * @param {Seen} seen
  * @param {number} lag_s
- * @returns {{title: string, text: string, facts: [string, string, boolean][], aid: string, guard: string, isGuarded: boolean, act: 'arm' | 'disarm' | 'ask' | null, says: string}} of a fact: name, value, whether it is a warning
+ * @returns {{title: string, text: string, facts: [string, string, boolean][], aid: string, guard: string, isGuarded: boolean, act: 'arm' | 'disarm' | 'ask' | null, message: string}} of a fact: name, value, whether it is a warning
  */
 export function sheetOf(seen, lag_s) {
   const { now, isSilent, isViewer, isReplay, mayControl, holder } = seen;
@@ -232,9 +232,9 @@ export function sheetOf(seen, lag_s) {
     ['Slows at', `${fixed(now.deceleration_mps2 ?? null)} m/s²`, false],
     rivalsOf(now.rivals),
   ] : [];
-  if (isSilent || !now) return { ...plain, title: 'Slow-down unknown', text: 'The server does not answer.', facts: [], act: null, says: '' };
-  if (isReplay) return { ...plain, title: 'As it was recorded', text: 'A recording is shown: nothing is sent to the car.', facts, act: null, says: '' };
-  if (now.state === 'not_available') return { ...plain, title: 'Slow-down not available', text: now.why ?? 'The server sent no reason.', facts, act: null, says: '' };
+  if (isSilent || !now) return { ...plain, title: 'Slow-down unknown', text: 'The server does not answer.', facts: [], act: null, message: '' };
+  if (isReplay) return { ...plain, title: 'As it was recorded', text: 'A recording is shown: nothing is sent to the car.', facts, act: null, message: '' };
+  if (now.state === 'not_available') return { ...plain, title: 'Slow-down not available', text: now.why ?? 'The server sent no reason.', facts, act: null, message: '' };
   const isArmed = now.state === 'armed' || order !== null;
   const by = now.armed_by ? `Armed by ${now.armed_by}.` : '';
   const car = seen.vehicle || 'The car';
@@ -242,10 +242,10 @@ export function sheetOf(seen, lag_s) {
   const text = order ? orderWords(order, lag_s).text
     : isArmed ? `${by} Any operator can slow the car: slide to the end and let go.`.trim()
       : 'When armed, one slide slows the car. The steering angle is held, and speed 0 is commanded until the car is released.';
-  if (order) return { ...plain, title, text, facts, act: null, says: '' };
-  if (isViewer) return { ...plain, title, text, facts, act: null, says: 'This device is paired as a viewer: it can watch but not make changes.' };
-  if (!mayControl) return { ...plain, title, text, facts, act: 'ask', says: `${holder ?? 'Another'} is in control and can ${isArmed ? 'disarm' : 'arm'} it.` };
-  return { ...plain, title, text, facts, act: isArmed ? 'disarm' : 'arm', says: '' };
+  if (order) return { ...plain, title, text, facts, act: null, message: '' };
+  if (isViewer) return { ...plain, title, text, facts, act: null, message: 'This device is paired as a viewer: it can watch but not make changes.' };
+  if (!mayControl) return { ...plain, title, text, facts, act: 'ask', message: `${holder ?? 'Another'} is in control and can ${isArmed ? 'disarm' : 'arm'} it.` };
+  return { ...plain, title, text, facts, act: isArmed ? 'disarm' : 'arm', message: '' };
 }
 
 /** @param {string[] | null | undefined} rivals @returns {[string, string, boolean]} */

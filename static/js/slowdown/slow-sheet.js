@@ -19,17 +19,17 @@ export function openSlow(store, control) {
   const facts = html('dl', { class: 'facts' });
   const guard = html('p', { 'data-f': 'guard' });
   const aid = html('p', { class: 'sub' });
-  const says = html('p', { class: 'bad', role: 'status', 'data-f': 'says' });
+  const message = html('p', { class: 'bad', role: 'status', 'data-f': 'says' });
   const keys = html('div', { class: 'keys' });
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-slow', 'aria-labelledby': 'slow-title', 'aria-describedby': 'slow-words' },
-    html('div', { class: 'bd' }, html('h2', { id: 'slow-title' }, mark, title), html('div', { id: 'slow-words' }, text, guard, aid)), facts, html('div', { class: 'bd' }, says), keys,
+    html('div', { class: 'bd' }, html('h2', { id: 'slow-title' }, mark, title), html('div', { id: 'slow-words' }, text, guard, aid)), facts, html('div', { class: 'bd' }, message), keys,
     html('div', { class: 'keys' }, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
   const { vehicle } = store;
   let shown = '';
   let refused = '';
 
   /** @param {'arm' | 'disarm' | 'ask'} act */
-  async function obey(act) {
+  async function send(act) {
     const answer = act === 'ask' ? await store.ask('control', { do: 'request' }) : await store.ask(act, { vehicle: vehicle || null });
     refused = answer.ok ? '' : (answer.reason ?? 'Refused.');
     if (answer.ok && act === 'ask') refused = 'Requested: control is granted within 10 s unless it is refused. Then arm it.';
@@ -44,7 +44,7 @@ export function openSlow(store, control) {
     setWords(guard, seen.guard);
     guard.toggleAttribute('data-bad', !seen.isGuarded);
     setText(aid, seen.aid);
-    setWords(says, refused || seen.says);
+    setWords(message, refused || seen.message);
     const key = JSON.stringify([seen.facts, seen.act]);
     if (key === shown) return;
     shown = key;
@@ -57,7 +57,7 @@ export function openSlow(store, control) {
     if (act === null) return;
     const [label, kind] = KEYS[act];
     const button = html('button', { type: 'button', class: kind, 'data-act': act }, label);
-    button.addEventListener('click', () => void obey(act));
+    button.addEventListener('click', () => void send(act));
     keys.replaceChildren(button);
   }
 

@@ -23,14 +23,14 @@ export class SlowSlides {
     this.redraw = draw;
     this.slides = [.../** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('.slide[data-f="slow"]'))].map((slide) => {
       const sheet = slide.closest('dialog');
-      const says = sheet && field(sheet, 'slow-says');
+      const message = sheet && field(sheet, 'slow-says');
       /** Shows a sentence where it is readable: an alarm's sheet covers the notices. @type {Explain} */
       const explain = (sentence, title) => {
-        if (!says || !sheet?.open) return say(sentence, title);
-        show(says, true);
-        setWords(says, `${title}: ${sentence}`);
+        if (!message || !sheet?.open) return say(sentence, title);
+        show(message, true);
+        setWords(message, `${title}: ${sentence}`);
       };
-      if (says) sheet.addEventListener('close', () => show(says, false));
+      if (message) sheet.addEventListener('close', () => show(message, false));
       return new SlideKey(slide, {
         press: () => (sheet ? explain(this.#whyOff(), 'Not slowed') : openSheet()),
         order: (at_ms, vehicle) => void this.#order(at_ms, vehicle, explain),
@@ -62,12 +62,12 @@ export class SlowSlides {
     if (!store.frame) return;
     const ago_s = (performance.now() - at_ms) / 1000;
     this.#sending_ms = store.now() + ANSWER_MS;
-    const asked = store.ask('slow_down', {
+    const reply = store.ask('slow_down', {
       vehicle: vehicle || null,
       pressed_ago_s: ago_s >= 0 && ago_s < 60 ? ago_s : 0, // old browsers count the time of events from another moment
     }, ANSWER_MS);
     this.redraw();
-    const answer = await asked;
+    const answer = await reply;
     if (!answer.ok) {
       this.#sending_ms = -Infinity;
       const [what, ofOther] = answer.outcome === 'unknown' ? ['Not known whether slowed', `${vehicle}: Not known whether slowed`] : ['NOT slowed', `${vehicle} NOT slowed`];

@@ -31,8 +31,8 @@ export function mount(root, store, control, say, shortOf) {
     const { now } = seen;
     for (const name of names) setText(name, seen.car ?? '');
     slides.draw(seen);
-    const word = stateWord(seen);
-    const state = word.toLowerCase();
+    const title = stateWord(seen);
+    const state = title.toLowerCase();
     for (const legend of legends) {
       setText(field(legend, 'legend-state'), state);
       setAttribute(legend, 'data-state', state);
