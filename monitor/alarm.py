@@ -57,11 +57,11 @@ class Transition:
     occurrence: int
     change: Change
     at_s: float
-    text: str  # what the check said at that moment
+    text: str  # the finding's text at that moment
     by: str | None = None  # who, where a person did it
     announces: bool = False  # to be announced now
     state: AlarmState = AlarmState.NORMAL  # the alarm's state after it
-    finding: Finding | None = None  # what the check had last said; None: it had said nothing, or monitoring ended
+    finding: Finding | None = None  # the check's newest; None: it had none, or monitoring ended
     causes: tuple[str, ...] = ()  # the announced causes that were still active
     suppressed_by: tuple[str, ...] = ()
     shelved_until_s: float | None = None
@@ -83,7 +83,7 @@ class Alarm:
     id: str
     spec: AlarmSpec
     occurrence: int = 0  # counts announcements
-    condition: bool = False  # what the check last said, without delays; UNKNOWN leaves it
+    condition: bool = False  # by the newest finding, without delays; UNKNOWN leaves it
     active: bool = False  # the same with delays: the announced state
     acknowledged: bool = True
     latched: bool = False  # active only because it latches
@@ -117,7 +117,7 @@ class Alarm:
 
     @property
     def is_standing(self) -> bool:
-        """Active, or gone and still unacknowledged."""
+        """Active, or over and still unacknowledged."""
         return self.active or not self.acknowledged
 
     @property
@@ -127,7 +127,7 @@ class Alarm:
 
     @property
     def sound(self) -> Sound:
-        """What it sounds like now: silent once it is gone, acknowledged, silenced, shelved or suppressed."""
+        """The sound to play now: none once it is over, acknowledged, silenced, shelved or suppressed."""
         sounds = self.state is AlarmState.UNACKED and self.silenced_until_s is None
         return self.spec.sound if sounds else Sound.NONE
 

@@ -140,19 +140,19 @@ class CarClock:
 
     def __init__(self) -> None:
         self.epoch = 0  # another one: the clock was set
-        self.asked_s: float | None = None  # the newest question that was answered
+        self.requested_s: float | None = None  # the time of the newest request that was answered
         self.ahead_s: float | None = None  # at most
         self._samples: deque[tuple[float, float]] = deque(maxlen=SAMPLES)  # ahead at least, at most
 
-    def answered(self, asked_s: float, answered_s: float, car_s: float) -> None:
+    def answered(self, requested_s: float, answered_s: float, car_s: float) -> None:
         """The car's time came."""
-        least_s, most_s = car_s - answered_s, car_s - asked_s
+        least_s, most_s = car_s - answered_s, car_s - requested_s
         samples = self._samples
         if any(least_s > most + CONTRADICTION_S or most_s < least - CONTRADICTION_S for least, most in samples):
             samples.clear()
             self.epoch += 1
         samples.append((least_s, most_s))
-        self.asked_s = asked_s
+        self.requested_s = requested_s
         self.ahead_s = min(most for _, most in samples)
 
 
@@ -172,7 +172,7 @@ class StampedDelay:
         if stamp_s < self._stamp_s:
             self._stepped_s = at_s
         self._stamp_s = stamp_s
-        if clock.ahead_s is None or clock.asked_s is None or clock.asked_s <= self._stepped_s:
+        if clock.ahead_s is None or clock.requested_s is None or clock.requested_s <= self._stepped_s:
             return None
         if self._epoch != clock.epoch:
             self._epoch, self._least_s = clock.epoch, float("inf")

@@ -97,7 +97,7 @@ def fault(
     causes: tuple[str, ...] = (),
     level: int = 0,
 ) -> Finding:
-    """The verdict FAULT. `brief` follows the word FAULT on the tile ("12.6 m/s"), where it fits."""
+    """The verdict FAULT. `brief` follows "FAULT" on the tile ("12.6 m/s"), where it fits."""
     short = on_tile(brief)
     return Finding(
         verdict=Verdict.FAULT,
@@ -196,7 +196,7 @@ class Check(Generic[L]):
     ends: Callable[[L], End] | None = None  # where the alarm ends at another value than that which raises it
     group: str = ""  # name of its thresholds; a family shares one; "" = id
     tile: str = ""  # the tile of the home tab it belongs to; "" = label
-    checked_when: str = ""  # what makes it checked, as a sentence; said where it is not
+    checked_when: str = ""  # when it is checked, as a sentence; shown where it is not
     scope: Scope = Scope.CAR
     order: int = 500  # place of its tile on the home tab, which never moves: smaller comes first
 

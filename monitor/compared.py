@@ -49,7 +49,7 @@ NOTHING_COMPARED = Compared()
 
 
 MOTION = frozenset({"speed", "odometry", "position"})  # signals whose sources are compared with each other
-MOVING = frozenset({Twist, Odometry, GpsFix})  # values that say how the car moves
+MOVING = frozenset({Twist, Odometry, GpsFix})  # values that show how the car moves
 
 
 class SourceFollower:

@@ -83,7 +83,7 @@ def _along(x_m: NDArray[np.float64], y_m: NDArray[np.float64], corridor: Corrido
     return way_m
 
 
-# Asked for a scan by several checks, and again when it has become the one to compare with.
+# Several checks call it with the same scan, and again when that is the scan before.
 @lru_cache(maxsize=64)
 def look(scan: LaserScan, corridor: Corridor, reach_m: float) -> Sight:
     """What the scan shows within `reach_m` along the corridor. A beam without a return is blind, never free, and so is

@@ -50,7 +50,7 @@ class CauseTable:
         """The alarms that now explain this one away."""
         if not self._gone_at_s:
             return ()
-        if self._held_s != now_s:  # asked for all alarms at each moment
+        if self._held_s != now_s:  # it is called for all alarms at each moment
             self._held_s = now_s
             self._held = frozenset(name for name in self._gone_at_s if self._holds(name, now_s))
         held = self._held

@@ -1,4 +1,4 @@
-"""How much the alarms ask of one operator, measured after EEMUA 191."""
+"""The load of the alarms on one operator, measured after EEMUA 191."""
 
 from __future__ import annotations
 

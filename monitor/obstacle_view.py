@@ -11,7 +11,7 @@ from monitor.snapshot import Snapshot
 from monitor.values import LaserScan
 
 BLIND_AT_M = 5.0  # where the beams of the corridor are counted
-BLIND_SHARE = 0.9  # of them without a return: nothing can be said
+BLIND_SHARE = 0.9  # of them without a return: nothing is known
 ANGLE_STEP_RAD = 0.005  # 10 cm aside at 10 m: a computed bend is reused for the next scan
 WIDEST_TYRE_RAD = 0.6  # no car turns its wheels farther
 ASIDE_DEADBAND_M = 0.2  # hysteresis at the corridor's edge

@@ -114,7 +114,7 @@ class PlaceFollower:
         self.restart()
 
     def restart(self) -> None:
-        """What came before says nothing of what comes now."""
+        """Discard what came before: it proves nothing about what follows."""
         self._places.clear()
         self._made_s = -math.inf
         self.pace: Pace | None = None

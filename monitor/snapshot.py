@@ -40,7 +40,7 @@ MODES_KEPT = 64  # changes; a topic that flickered with every message at 1000 Hz
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeardMode:
-    """From this moment on the car said so."""
+    """The car reported this mode from this moment on."""
 
     number: int  # counts the changes, from 1 on
     at_s: float  # received
@@ -48,7 +48,7 @@ class HeardMode:
 
 
 class HeardModes:
-    """Every change of what the car says of who drives, between one judgement and the next.
+    """Every change of the mode that the car reports, between one judgement and the next.
 
     Follows the messages of the mode; bounded.
     """
@@ -65,7 +65,7 @@ class HeardModes:
         self.changes = (*self.changes[-MODES_KEPT + 1 :], HeardMode(number=self._count, at_s=at_s, value=value))
 
     def forget(self) -> None:
-        """The clock went back: what was heard before has no time any more."""
+        """The clock went back: what was received before has no valid time any more."""
         self.changes = ()
 
 
@@ -108,7 +108,7 @@ class Snapshot:
     reach: ReachFacts | None = None  # operators that can hear an alarm; None: not applicable, as in a recording
     slowing: SlowingFacts = field(default_factory=SlowingFacts)
     slow_proof: SlowProof = NOTHING_SHOWN  # what the car's speed shows of the order
-    modes_heard: tuple[HeardMode, ...] = ()  # the newest changes of what the car says of who drives, oldest first
+    modes_heard: tuple[HeardMode, ...] = ()  # the newest changes of the mode that the car reports, oldest first
 
     @overload
     def get(self, signal: Literal["speed"]) -> Reading[Twist] | None: ...

@@ -21,9 +21,9 @@ REPEATS = 3  # messages with one place
 class Shown(NamedTuple):
     """The speed by one source. A tuple, because several are made with each tick."""
 
-    by: str  # in words: a topic, "GPS", "the poses of /odom"
+    by: str  # as text: a topic, "GPS", "the poses of /odom"
     pace: Pace | None  # None: not known
-    why_not: str = ""  # why it proves nothing, in words
+    why_not: str = ""  # why it proves nothing, as text
     short: str = ""  # the same in at most 8 letters
 
 

@@ -54,7 +54,7 @@ class State:
         self._scans = Scans()
         self._phones = Phones()
         self._fix_s = -math.inf  # when the newest position was sent
-        self._rides: str | None = None
+        self._phone_in_car: str | None = None
         self._scan_history = self._stats["scan"].history = ReadingHistory()
         self._distance_history = self._stats["distance"].history = ReadingHistory()
         # Public to read, written by `link` and `set_paused` only: read at every message.
@@ -149,7 +149,7 @@ class State:
     def ride(self, phone: str | None, now_s: float) -> None:
         """Set the phone in the car, chosen by the operator; None: no choice."""
         self._follow_clock(now_s)
-        self._rides = phone
+        self._phone_in_car = phone
         self._phones.ride(phone, now_s)
 
     def get(self, signal: str) -> Reading[Any] | None:
@@ -263,7 +263,7 @@ class State:
         self._scans.forget_times()
         self._derived.comparisons.restart()
         self._phones = Phones()  # they report again within seconds
-        self._phones.ride(self._rides, at_s)
+        self._phones.ride(self._phone_in_car, at_s)
         self._table.shift(shift_s)
         self._unusable = MappingProxyType({})
         if self._heard_s is not None:

@@ -53,7 +53,7 @@ def _tile_at(place: Place, findings: Mapping[str, Finding]) -> Tile:
         return _saying(place, found[0].verdict, found[0].text, found[0].brief)
     relevant = [finding for finding in found if finding.applies] or found
     verdict = _worst(relevant)
-    text, brief = _words(verdict, [finding for finding in relevant if finding.verdict is verdict], len(relevant))
+    text, brief = _texts(verdict, [finding for finding in relevant if finding.verdict is verdict], len(relevant))
     return _saying(place, verdict, text, brief)
 
 
@@ -72,7 +72,7 @@ def _worst(findings: Sequence[Finding]) -> Verdict:
     return worst
 
 
-def _words(verdict: Verdict, those: Sequence[Finding], of: int) -> tuple[str, str]:
+def _texts(verdict: Verdict, those: Sequence[Finding], of: int) -> tuple[str, str]:
     first = those[0]
     if all(finding.text == first.text for finding in those):
         return first.text, first.brief

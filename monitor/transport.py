@@ -32,7 +32,7 @@ OLDER_S = 0.5  # the first message of a topic that is so much older by its stamp
 OLDEST_S = 30 * 86_400.0  # a stamp that is further behind is of another clock
 PLACE_PERIODS = 2.0  # a mean of a burst is too short
 KEPT_S = 10.0  # the offset of a clock is the least of the last one to two of these: ±200 ppm are 4 ms
-RECENT_S = 3.0  # a topic that was silent for longer says nothing of the link now …
+RECENT_S = 3.0  # a topic that was silent for longer shows nothing of the link now …
 FAST_S = 0.5  # … nor does one that comes less often than this, where others come more often
 USUAL_S = 30.0  # what a link needs when nothing waits is the least round trip of one to two of these …
 USUAL_AT_MOST_S = 1.0
@@ -98,7 +98,7 @@ class _Topic:
         self.stamped = 0  # messages with a stamp on this connection
 
     def restart(self) -> None:
-        """What came over another connection says nothing of this one, but for how often it comes."""
+        """Begin anew on another connection: of the one before only the usual intervals are kept."""
         self.marks.clear()
         self.clock = _Clock()
         self.by_clock = StampedDelay()
@@ -306,7 +306,7 @@ class TransportDelay:
         }
 
     def queued_s(self, now_s: float) -> float:
-        """How much of that is because more is asked of the link than it carries."""
+        """How much of that is queueing: more is requested than the link carries."""
         return max(0.0, self.late_s(now_s) - min(self._usual_trip_s, self._usual_before_s, USUAL_AT_MOST_S))
 
     @property

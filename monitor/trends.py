@@ -1,7 +1,7 @@
 """The last minute of a few signals and of every check.
 
-Bounded: a ring of one minute for each signal, however fast it speaks, and for each check that ever measured. Of signals
-the lowest and the highest number heard in each fifth of a second are kept, so that no peak of a fast signal is lost
+Bounded: a ring of one minute for each signal, whatever its rate, and for each check that ever measured. Of signals
+the lowest and the highest number received in each fifth of a second are kept, so that no peak of a fast signal is lost
 between two points. A check is looked at once in each step; what it found between two looks is in its alarm.
 """
 

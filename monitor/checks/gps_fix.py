@@ -53,7 +53,7 @@ def has_fix(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
         return absent("Position is not published")
     fix = snapshot.need("position")
     if fix.status == STATUS_UNSET:
-        return fault("The receiver does not say whether it has a fix", brief="fix unset", causes=("position",))
+        return fault("The receiver does not report whether it has a fix", brief="fix unset", causes=("position",))
     if fix.is_unset:
         text = "The receiver reports a fix with coordinates 0, 0: it has no position yet"
         return fault(text, brief="no place", causes=("position",))

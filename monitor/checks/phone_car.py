@@ -70,8 +70,8 @@ def _why_not(snapshot: Snapshot, was_active: bool) -> Finding | None:
         return unknown("The car's receiver has no fix", short="no fix")
     reason = view.why_not(now_s)
     if reason is not None:
-        words = why_words(reason, view, now_s, name_of(view))
-        return unknown(words.sentence, short=words.short)
+        reason_text = why_words(reason, view, now_s, name_of(view))
+        return unknown(reason_text.sentence, short=reason_text.short)
     return None
 
 

@@ -192,7 +192,7 @@ def goes_on(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Fin
 CHECKS = (
     Check(
         id="slow_down_unconfirmed",
-        label="Car obeys",
+        label="Car complies",
         order=110,
         checked_when="Checked while the car is being slowed.",
         group="slow_down",

@@ -16,7 +16,7 @@ def asked(*answers: tuple[float, float, float]) -> CarClock:
 
 def test_nothing_is_known_before_an_answer() -> None:
     clock = CarClock()
-    assert (clock.epoch, clock.ahead_s, clock.asked_s) == (0, None, None)
+    assert (clock.epoch, clock.ahead_s, clock.requested_s) == (0, None, None)
     assert StampedDelay().late_s(1.0, 2.0, clock) is None
 
 
@@ -36,7 +36,7 @@ def test_the_offset_is_the_tightest_of_the_answers(
 ) -> None:
     clock = asked(*answers)
     assert clock.ahead_s == pytest.approx(ahead_s)
-    assert (clock.epoch, clock.asked_s) == (epoch, answers[-1][0])
+    assert (clock.epoch, clock.requested_s) == (epoch, answers[-1][0])
 
 
 def test_only_the_newest_answers_count() -> None:

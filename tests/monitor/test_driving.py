@@ -287,7 +287,7 @@ def test_whatever_the_topic_says_changes_are_bounded_ordered_and_counted(periods
         summary.step(state.snapshot(late_s), LIMITS)
     watch, changes = summary.driving.watch, summary.changes
     real = sum(one != other for one, other in itertools.pairwise(["unknown", *spoken]))
-    assert watch.changes_heard == real, "each real change is counted"
+    assert watch.changes_received == real, "each real change is counted"
     assert watch.mode == mode, "what stands is believed in the end"
     for one, other in itertools.pairwise(changes):
         assert other.before == one.mode

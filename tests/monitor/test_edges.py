@@ -77,13 +77,13 @@ def test_two_inhibitors_of_one_alarm_both_explain_it_and_so_do_theirs() -> None:
 
 def test_the_car_s_clock_is_known_between_question_and_answer() -> None:
     clock = CarClock()
-    assert (clock.ahead_s, clock.asked_s, clock.epoch) == (None, None, 0)
+    assert (clock.ahead_s, clock.requested_s, clock.epoch) == (None, None, 0)
     clock.answered(10.0, 10.5, 110.3)  # ahead by 99.8 … 100.3 s
-    assert (clock.ahead_s, clock.asked_s, clock.epoch) == (pytest.approx(100.3), 10.0, 0)
+    assert (clock.ahead_s, clock.requested_s, clock.epoch) == (pytest.approx(100.3), 10.0, 0)
     clock.answered(11.0, 11.2, 111.1)  # 99.9 … 100.1
     assert clock.ahead_s == pytest.approx(100.1)
     clock.answered(12.0, 12.9, 112.8)  # 99.9 … 100.8: the closest counts
-    assert (clock.ahead_s, clock.asked_s, clock.epoch) == (pytest.approx(100.1), 12.0, 0)
+    assert (clock.ahead_s, clock.requested_s, clock.epoch) == (pytest.approx(100.1), 12.0, 0)
 
 
 @pytest.mark.parametrize(("by_s", "is_another"), [(0.99, False), (1.01, True), (-0.99, False), (-1.01, True)])

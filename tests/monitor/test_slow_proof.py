@@ -23,7 +23,7 @@ CAR = SlowCar(
     speed_mps=6.0,
     own_mps2=1.0,
     began_s=1.0,
-    obeys=False,
+    complies=False,
     lag_s=0.2,
     builds_s=0.1,
     deceleration_mps2=1.5,
@@ -38,7 +38,7 @@ CAR = SlowCar(
 
 def false_proofs(count: int, seed: int) -> list[SlowCar]:
     rng = random.Random(seed)
-    cars = (random_car(rng, obeys=False) for _ in range(count))
+    cars = (random_car(rng, complies=False) for _ in range(count))
     return [car for car in cars if car.judged().shown is not None]
 
 
@@ -46,7 +46,7 @@ def late_proofs(count: int, seed: int) -> list[SlowCar]:
     rng = random.Random(seed)
     found = []
     for _ in range(count):
-        car = random_car(rng, obeys=True)
+        car = random_car(rng, complies=True)
         shown_s = car.judged().shown_s
         if shown_s is None or shown_s - ORDERED_S - car.responds_s > 1.0:
             found.append(car)
@@ -100,7 +100,7 @@ def test_proof_within_a_second_of_the_response_in_99_of_100_runs() -> None:
         {"manner": "downhill"},
         {"manner": "eases off", "began_s": 0.3},
         {"manner": "stands", "noise_mps": 0.1},
-        {"obeys": True, "freezes": True},
+        {"complies": True, "freezes": True},
     ],
     ids=lambda more: " ".join(map(str, more.values())) or "cruise",
 )
@@ -112,7 +112,7 @@ def test_what_the_order_does_not_explain_shows_nothing(more: dict[str, Any]) -> 
 @pytest.mark.parametrize("manner", ["cruise", "coasts", "accelerates", "downhill", "wavers"])
 @pytest.mark.parametrize("lag_s", [0.1, 0.5, 1.0])
 def test_a_car_that_obeys_is_shown_to(manner: str, lag_s: float) -> None:
-    car = replace(CAR, manner=manner, own_mps2=0.8, obeys=True, lag_s=lag_s)
+    car = replace(CAR, manner=manner, own_mps2=0.8, complies=True, lag_s=lag_s)
     proof = car.judged()
     assert proof.shown == "slows"
     assert proof.shown_s is not None
@@ -120,7 +120,7 @@ def test_a_car_that_obeys_is_shown_to(manner: str, lag_s: float) -> None:
 
 
 def test_a_slow_car_that_comes_to_rest_is_shown_to_have_stopped() -> None:
-    proof = replace(CAR, speed_mps=0.8, obeys=True, lag_s=0.1).judged()
+    proof = replace(CAR, speed_mps=0.8, complies=True, lag_s=0.1).judged()
     assert proof.shown in ("stopped", "slows")
 
 

@@ -54,7 +54,7 @@ def test_who_hears(
 @pytest.mark.parametrize(
     ("facts", "ended"),
     [
-        (HEARD, "Alarms can be heard again"),
+        (HEARD, "Alarms are audible again"),
         (ALONE, "Nobody can hear alarms, car stands"),  # it ended, and still nobody can
     ],
 )
