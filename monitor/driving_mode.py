@@ -86,7 +86,7 @@ class ModeWatch:
         for received in snapshot.modes_heard:
             if received.number > self._numbered:
                 self._numbered = received.number
-                self.text = received.value.said
+                self.text = received.value.text
                 self._follow(meaning(received.value, limits), received.at_s)
         if reading is None or snapshot.link.phase != "monitoring":
             self._follow("unknown", now_s)

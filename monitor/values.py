@@ -194,7 +194,7 @@ class DriveMode:
     """Who drives, as the car reports it."""
 
     mode: Mode  # unknown: the meaning of its report is not known
-    said: str  # the car's own name of the mode, short
+    text: str  # the car's own name of the mode, short
     number: int | None = None  # of a plain number, whose meaning is a setting
 
 

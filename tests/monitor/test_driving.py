@@ -49,7 +49,7 @@ class Car:
             at_s = self.now_s
             self.state.link(LinkFacts(phase="monitoring", published=frozenset({"speed", "brake"})))
             if mode is not None:
-                said = mode if isinstance(mode, DriveMode) else DriveMode(mode=mode, said=mode)
+                said = mode if isinstance(mode, DriveMode) else DriveMode(mode=mode, text=mode)
                 self.state.receive("mode", said, at_s)
             if speed is not None:
                 self.state.receive("speed", Twist(speed_mps=speed), at_s)
@@ -188,10 +188,10 @@ def test_time_and_distance_belong_to_the_mode_from_its_first_word_on() -> None:
 @pytest.mark.parametrize(("number", "mode"), [(1, "autonomous"), (0, "manual"), (7, "unknown")])
 def test_a_plain_number_means_what_the_settings_say(number: int, mode: Mode) -> None:
     car = Car()
-    car.drive(2.0, mode=DriveMode(mode="unknown", said=str(number), number=number))
+    car.drive(2.0, mode=DriveMode(mode="unknown", text=str(number), number=number))
     assert car.summary.driving.watch.mode == mode
     other = Car(driving__autonomous_number=7.0)
-    other.drive(2.0, mode=DriveMode(mode="unknown", said=str(number), number=number))
+    other.drive(2.0, mode=DriveMode(mode="unknown", text=str(number), number=number))
     assert (other.summary.driving.watch.mode == "autonomous") == (number == 7)
 
 
@@ -245,7 +245,7 @@ def test_by_rule_a_car_that_stands_without_commands_is_not_known_to_be_autonomou
 
 # -- flickering ------------------------------------------------------------------------------------------------------
 
-WORDS: dict[Mode, DriveMode] = {mode: DriveMode(mode=mode, said=mode) for mode in ("autonomous", "manual", "unknown")}
+WORDS: dict[Mode, DriveMode] = {mode: DriveMode(mode=mode, text=mode) for mode in ("autonomous", "manual", "unknown")}
 
 
 def runs() -> st.SearchStrategy[list[tuple[Mode, float]]]:
