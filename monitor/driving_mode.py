@@ -83,7 +83,7 @@ class ModeWatch:
 
     def _receive(self, snapshot: Snapshot, limits: Any) -> None:
         now_s, reading = snapshot.now_s, snapshot.get("mode")
-        for received in snapshot.modes_heard:
+        for received in snapshot.modes_received:
             if received.number > self._numbered:
                 self._numbered = received.number
                 self.text = received.value.text

@@ -18,7 +18,7 @@ from monitor.shell_facts import LinkFacts, Phase, ReachFacts, RecorderFacts, Slo
 from monitor.signal_stats import MeasuredRates, SignalStats, extend, keep
 from monitor.signals import SIGNALS
 from monitor.slow_proof import ProofFollower
-from monitor.snapshot import HeardModes, NotFresh, Snapshot
+from monitor.snapshot import ReceivedModes, NotFresh, Snapshot
 from monitor.tracks import TrackPoint
 from monitor.unusable import Unusable, refused, without
 from monitor.values import Diagnostics, DriveMode, GpsFix, LaserScan, Twist, Value
@@ -64,7 +64,7 @@ class State:
         self._reach: ReachFacts | None = None
         self._slowing = SlowingFacts()
         self._slow_proof = ProofFollower()
-        self._modes = HeardModes()
+        self._modes = ReceivedModes()
         self._paused_since_s: float | None = None
 
     def expect(self, expected_hz: Mapping[str, float]) -> None:
@@ -236,7 +236,7 @@ class State:
             reach=self._reach,
             slowing=self._slowing,
             slow_proof=self._slow_proof.proof,
-            modes_heard=self._modes.changes,
+            modes_received=self._modes.changes,
         )
 
     def glance(self, now_s: float) -> Snapshot:
