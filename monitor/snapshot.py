@@ -181,7 +181,7 @@ class Snapshot:
             raise NotFresh(f"{label}: {undecided}", "not set")
         unusable = self.unusable.get(signal)
         if unusable is not None and (reading is None or not reading.is_fresh(self.now_s)):
-            raise NotFresh(f"{label}: {unusable.words}", "unusable")
+            raise NotFresh(f"{label}: {unusable.text}", "unusable")
         if reading is None:
             if signal in self.link.published:
                 raise NotFresh(f"{label}: nothing received yet", "no data")

@@ -70,7 +70,7 @@ def test_a_message_that_cannot_be_used_is_counted_as_one_that_came() -> None:
     snapshot = state.snapshot(5.0)
     assert snapshot.heard_s == pytest.approx(4.95)
     assert snapshot.unusable["speed"].count == 100
-    assert snapshot.unusable["speed"].words == "not a number (linear.x)"
+    assert snapshot.unusable["speed"].text == "not a number (linear.x)"
     assert snapshot.rates["speed"].measured_hz == pytest.approx(20.0, rel=0.1)
     pipeline.receive(
         sources,
