@@ -93,7 +93,7 @@ class SlowDownLimits(Limits):
     on_rate_after_s: float = _after("Too slow for", 2.0)
 
 
-def obeys(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Finding:
+def is_followed(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Finding:
     facts = snapshot.slowing
     if facts.ordered_s is None:
         return absent("The car is not ordered to slow down", brief="not ordered")
@@ -210,7 +210,7 @@ CHECKS = (
             advice="Use the physical stop: tell the safety driver now.",
         ),
         limits=SlowDownLimits,
-        find=obeys,
+        find=is_followed,
         needs=frozenset({"speed"}),
     ),
     Check(

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from monitor.check import Verdict
-from monitor.checks.slow_down import BEFORE_UNKNOWN, STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, obeys
+from monitor.checks.slow_down import BEFORE_UNKNOWN, STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, is_followed
 from monitor.shell_facts import SlowingFacts
 from monitor.slow_proof import ProofFollower
 from monitor.state import State
@@ -153,7 +153,7 @@ def order(ordered_s: float, commanded_mps: float = 6.0) -> SlowingFacts:
 
 def judged(state: State, now_s: float, commanded_mps: float) -> tuple[Verdict, str]:
     state.slow(order(ORDERED_S, commanded_mps))
-    finding = obeys(state.snapshot(now_s), SlowDownLimits(), False)
+    finding = is_followed(state.snapshot(now_s), SlowDownLimits(), False)
     return finding.verdict, finding.text
 
 
@@ -218,4 +218,4 @@ def test_the_proof_of_one_order_is_not_that_of_the_next() -> None:
     now_s = ORDERED_S + 2.0
     assert state.snapshot(now_s).slow_proof.shown == "slows"
     later = replace(state.snapshot(now_s), slowing=order(now_s, 3.0))
-    assert obeys(later, SlowDownLimits(), False).verdict is Verdict.UNKNOWN
+    assert is_followed(later, SlowDownLimits(), False).verdict is Verdict.UNKNOWN
