@@ -145,7 +145,7 @@ class Alarm:
 
     @property
     def is_at_rest(self) -> bool:
-        """Normal in every respect: another judgement which is no fault changes nothing of it."""
+        """Whether it is normal in every respect: another judgement without a fault changes nothing."""
         return not (
             self.condition
             or self.active
@@ -164,7 +164,7 @@ def _state(active: bool, acknowledged: bool) -> AlarmState:
 def transition(
     alarm: Alarm, change: Change, at_s: float, *, text: str = "", by: str | None = None, announces: bool = False
 ) -> Transition:
-    """That `change` has made of the alarm what it is now."""
+    """Return the transition by which `change` led to the alarm's present state."""
     return Transition(
         alarm_id=alarm.id,
         spec=alarm.spec,
@@ -189,7 +189,7 @@ def there(causes: Collection[Cause]) -> tuple[str, ...]:
 
 
 def rebased(alarm: Alarm, now_s: float) -> Alarm:
-    """The alarm with its times moved along when the clock went back, so that every duration stays what it was."""
+    """Return the alarm with its times shifted after the clock went back, so that durations are unchanged."""
     if alarm.at_s is None or now_s >= alarm.at_s - CLOCK_BACK_S:
         return alarm
     shift_s = now_s - alarm.at_s

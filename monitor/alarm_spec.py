@@ -18,7 +18,7 @@ class Priority(StrEnum):
 
 
 def priority_of(name: object) -> Priority:
-    """By its name; one that this version does not know is the most urgent."""
+    """Return the priority by its name; a name unknown to this version counts as the most urgent."""
     try:
         return Priority(str(name))
     except ValueError:
@@ -81,5 +81,5 @@ class AlarmSpec:
 
     @property
     def shelvable(self) -> bool:
-        """Whether this priority may be hidden for a time; an alarm that inhibits others never is (the runner knows)."""
+        """Whether this priority may be hidden for a time; an alarm that inhibits others never is (see the runner)."""
         return self.priority is not Priority.CRITICAL

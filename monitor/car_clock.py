@@ -98,7 +98,7 @@ class StampFollower:
         return None
 
     def _doubt(self, stamp_s: float, difference_s: float, at_s: float) -> float | None:
-        """An odd stamp: believed when the next ones agree with it, and do not run on."""
+        """Handle an odd stamp: it is a jump once the next ones agree with it and do not drift."""
         if not self._odd:
             self._odd_at_s = at_s
         self._odd_n += 1
@@ -128,7 +128,7 @@ class StampFollower:
 
 
 def merged(before: ClockJump | None, signal: str, at_s: float, by_s: float) -> ClockJump:
-    """A jump that several signals show is one."""
+    """Merge the jumps that several signals show into one."""
     if before is not None and 0.0 <= at_s - before.at_s <= SAME_JUMP_S and (before.by_s > 0) == (by_s > 0):
         signals = before.signals if signal in before.signals else (*before.signals, signal)
         return ClockJump(at_s=before.at_s, by_s=before.by_s, signals=signals)
@@ -145,7 +145,7 @@ class CarClock:
         self._samples: deque[tuple[float, float]] = deque(maxlen=SAMPLES)  # ahead at least, at most
 
     def answered(self, requested_s: float, answered_s: float, car_s: float) -> None:
-        """The car's time came."""
+        """Take the answer to a request for the car's time."""
         least_s, most_s = car_s - answered_s, car_s - requested_s
         samples = self._samples
         if any(least_s > most + CONTRADICTION_S or most_s < least - CONTRADICTION_S for least, most in samples):

@@ -66,7 +66,7 @@ class Finding(NamedTuple):
     measured: Quantity | None = None
     limit: Quantity | None = None
     causes: tuple[str, ...] = ()  # the faulty parts, if one alarm covers several; a new one re-alarms
-    level: int = 0  # how bad, where a check knows degrees; a higher one re-alarms
+    level: int = 0  # how bad, where a check has degrees; a higher one re-alarms
     applies: bool = True  # False: there is nothing here to check (an optional signal that is not published)
     ended: str = ""  # title of its alarm once that has ended, where the declared one would not be true of this finding
 
@@ -119,7 +119,7 @@ def unknown(why: str, *, short: str = "") -> Finding:
 
 @lru_cache(maxsize=KEPT_FINDINGS)
 def absent(why: str, *, brief: str = "not published") -> Finding:
-    """There is nothing to check: unknown, but no reason to call the tile unknown."""
+    """The verdict UNKNOWN because there is nothing to check: it does not make the tile unknown."""
     return Finding(verdict=Verdict.UNKNOWN, text=why, brief=brief, applies=False)
 
 

@@ -90,7 +90,7 @@ class Components:
         return Diagnostics(components=tuple(reports.at(at_s) for reports in self._known.values()))
 
     def watch(self, now_s: float) -> None:
-        """To be called whenever all is judged: nothing was received in a time without it."""
+        """Must be called at every judgement of all checks: in a time without a call nothing could be received."""
         self._miss_stall(now_s)
         self._watched_s = now_s
 

@@ -237,7 +237,7 @@ def covered(geometries: tuple[Geometry, ...], corridor: Corridor, reach_m: float
     seen = np.zeros(ahead.size, dtype=bool)
     for n, first_rad, increment_rad in geometries:
         if n < 2:
-            continue  # no two adjacent beams, which alone are believed
+            continue  # no two adjacent beams: a single beam is no proof
         span_rad = (n - 1) * abs(increment_rad)
         low_rad = first_rad if increment_rad > 0 else first_rad - span_rad
         margin_rad = min(abs(increment_rad) / 2, step_rad)

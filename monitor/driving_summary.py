@@ -50,7 +50,7 @@ class Driving:
     def step(
         self, snapshot: Snapshot, limits: Any, active: Callable[[], Collection[str]] = tuple
     ) -> tuple[list[ModeChange], list[Intervention]]:
-        """Time has passed. `limits`: all thresholds; `active`: ids of the alarms that stand."""
+        """Advance to `snapshot`. `limits`: all thresholds; `active`: ids of the alarms that stand."""
         watch = self.watch
         self._go_on(snapshot)
         changes = watch.step(snapshot, limits.driving)

@@ -82,7 +82,7 @@ class RepeatFollower:
         self.restart()
 
     def restart(self) -> None:
-        """What came before a gap is not repeated by what comes after; how the signal behaves stays known."""
+        """Begin anew after a gap: a message after it repeats none before it. The learned share of changes stays."""
         self._part: Any = None
         self._value_n = self._in_motion = self._stamp_n = 0
         self._way = (0.0, 0.0)  # of the wheels, when the value was new

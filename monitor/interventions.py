@@ -91,7 +91,7 @@ class InterventionWatch:
         self.forget()
 
     def forget(self) -> None:
-        """The clock went back: what was known has no time any more."""
+        """Forget all: the clock went back, and times before that are void."""
         self.samples: deque[Sample] = deque(maxlen=math.ceil((BEFORE_S + 2.0) / SAMPLE_S))
         self._commands: deque[tuple[float, float | None, float | None]] = deque(maxlen=64)  # s, m/s, rad
         self._brake = Against()
@@ -173,8 +173,8 @@ class InterventionWatch:
         ]
 
     def _who(self, kind: KindOf, at_s: float, mode_text: str) -> tuple[By, float | None]:
-        """Who began it, and how long before the mode changed. Of brake and wheel alone nobody can be named for certain
-        but the one who is at them."""
+        """Who began it, and how long before the mode changed. Of brake and wheel alone only the driver can be
+        named for certain."""
         if at_s - self._slowed_s <= OPERATOR_S:
             return "operator", None
         if kind != "to_manual":

@@ -68,7 +68,7 @@ def _forget(announced: deque[float], now_s: float) -> None:
 
 
 def is_turn(transition: Transition) -> bool:
-    """It came or went; what the operator does about it is no turn."""
+    """Whether the alarm came or went; an operator's action is no turn."""
     return transition.change in ("raised", "cleared")
 
 

@@ -52,7 +52,7 @@ def look_ahead(scan: LaserScan, corridor: Corridor) -> Sight:
 
 
 def sweep_ahead(snapshot: Snapshot, scan: LaserScan, corridor: Corridor) -> Sight:
-    """What the newest scan shows of the corridor, and where it looks only into a part of it, what the other parts of
+    """What the newest scan shows of the corridor, and where it covers only a part of it, what the other parts of
     its sweep show."""
     newest = look_ahead(scan, corridor)
     if newest.covered >= COVERED_SHARE or not snapshot.scan_parts:
@@ -86,7 +86,7 @@ def is_blind(sight: Sight) -> bool:
 
 
 def is_covered(sight: Sight) -> bool:
-    """Whether the laser looks into the whole corridor: only then nothing seen is nothing there."""
+    """Whether the laser covers the whole corridor: only then a scan without returns shows that it is free."""
     return sight.covered >= COVERED_SHARE
 
 

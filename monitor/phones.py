@@ -196,7 +196,7 @@ class Phones:
         self._compare_only(None if found is None else found.name)
 
     def _compare_only(self, name: str | None) -> None:
-        """From now on this one is compared; what was found of another is forgotten."""
+        """Compare this phone from now on; the comparisons of another are dropped."""
         if name != self._chosen:
             self._chosen, self._waiting = name, None
             self._comparisons.clear()

@@ -23,7 +23,7 @@ REASONS: Mapping[StopReason, str] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannedStop:
-    """`since_s` is on the clock of whoever keeps it."""
+    """`since_s` is on the clock of its owner."""
 
     reason: StopReason
     since_s: float

@@ -1,4 +1,4 @@
-"""What the server knows and the checks read: the link, the recorder, whom an alarm reaches, an order to slow."""
+"""Facts from the server that the checks read: the link, the recorder, whom an alarm reaches, an order to slow."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from monitor.immutable import immutable
 
 Phase = Literal["idle", "connecting", "failed", "monitoring", "lost"]
 
-# off: nothing is to be recorded; held: the link is lost, and the session goes on when it returns soon; saving: what
+# off: nothing is to be recorded; held: the link is lost, and the session continues if it returns soon; saving: what
 # was recorded is being completed; stopped: it was to record and cannot
 RecorderState = Literal["off", "recording", "saving", "held", "stopped"]
 

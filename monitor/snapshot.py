@@ -177,7 +177,7 @@ class Snapshot:
         reading = self.readings.get(signal)
         label = SIGNALS[signal].label
         undecided = self.link.undecided.get(signal) if self.link.undecided else None
-        if undecided is not None:  # what came before is not trusted either
+        if undecided is not None:  # earlier values are not used either
             raise NotFresh(f"{label}: {undecided}", "not set")
         unusable = self.unusable.get(signal)
         if unusable is not None and (reading is None or not reading.is_fresh(self.now_s)):

@@ -118,8 +118,8 @@ def allowed_mps(a: Pace, b: Pace, *, least_mps: float, share: float) -> float:
 
 
 def is_in_dispute(snapshot: Snapshot, over_ground_mps: float, speed_mps: float) -> bool:
-    """Whether the position moves as a car does, and so much faster than the wheels that their comparison will say so
-    whatever its limits; or is about to, for it still gains speed."""
+    """Whether the position moves as a car does, and so much faster than the wheels that their comparison will fail
+    whatever its limits; or is about to, because it still gains speed."""
     made = snapshot.compared.made.get("position")
     if made is None or made.error_mps > POOR_MPS or not (snapshot.gps.is_smooth and _is_apart("position", snapshot)):
         return False

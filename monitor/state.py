@@ -18,7 +18,7 @@ from monitor.shell_facts import LinkFacts, Phase, ReachFacts, RecorderFacts, Slo
 from monitor.signal_stats import MeasuredRates, SignalStats, extend, keep
 from monitor.signals import SIGNALS
 from monitor.slow_proof import ProofFollower
-from monitor.snapshot import ReceivedModes, NotFresh, Snapshot
+from monitor.snapshot import NotFresh, ReceivedModes, Snapshot
 from monitor.tracks import TrackPoint
 from monitor.unusable import Unusable, refused, without
 from monitor.values import Diagnostics, DriveMode, GpsFix, LaserScan, Twist, Value
@@ -138,7 +138,7 @@ class State:
         )
 
     def forget(self, signal: str) -> None:
-        """What was received of a signal is void, and so is what was derived from it: its unit was another."""
+        """Discard what was received of a signal and what was derived from it: its unit has changed."""
         forget(signal, self._stats[signal], self._table, self._derived)
 
     def receive_phone(self, report: PhoneReport, now_s: float) -> None:

@@ -5,7 +5,7 @@ connection. So a message that arrives after the answer was written after the pin
 of the car is needed, and a delay that exists from the first message on is measured too.
 
 A message may have waited before it was written. ROS 1's rosbridge, and ours, keep a queue for each subscription and
-hold one message more in the hand while the connection takes nothing. A message cannot have entered a queue of `q`
+hold one message more beside the queue while the connection takes nothing. A message cannot have entered a queue of `q`
 before the message that came `q + 1` before it was written; the mark known at *that* arrival bounds its age.
 
 Stamps only make the bound a little tighter. Any clock will do: its offset is bounded by the message that waited least,
@@ -263,11 +263,12 @@ class TransportDelay:
         if queued_s - since_mark_s <= EXACT_WITHIN_S:
             return queued_s
         # The connection takes nothing until it is empty; so long the answer of a ping waits too. Each time it takes
-        # something again, at least one message of each topic goes.
+        # something again, at least one message of each topic is sent.
         shut_s = places * self._shut_s(self._longest_shut_s, at_s)
         if topic.queue_length == 1 and topic.period_s is not None:
             # A longer queue may hold what came before several shuts. One place holds the newest: it came a
-            # period before what was in the hand was taken; and a shut that ended before the mark was over by then.
+            # period before the message beside the queue was taken; and a shut that ended before the
+            # mark was over by then.
             shut_s = min(shut_s, self._shut_s(self._mark_shut_s, at_s) + PLACE_PERIODS * topic.period_s)
         return min(queued_s, since_mark_s + shut_s + topic.held_s)
 

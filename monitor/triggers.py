@@ -1,4 +1,4 @@
-"""When catgraph slows the car by itself: rules as data, each off until somebody switches it on, rehearsable on any
+"""When catgraph slows the car by itself: rules as data, each off until an operator enables it, and testable on any
 recording.
 
 A rule watches checks. Once one of them has found FAULT for as long as the rule requires, the rule is due: a countdown
@@ -99,7 +99,7 @@ class Triggers:
         return due
 
     def veto(self, trigger_id: str) -> None:
-        """Not this time: until its fault has gone the rule is not due again."""
+        """Veto the rule: it is not due again until its fault has gone."""
         self._vetoed.add(trigger_id)
 
     def forget(self) -> None:

@@ -85,7 +85,7 @@ class PhoneFix:
     alt_m: float | None = None  # above the ellipsoid
     speed_mps: float | None = None
     heading_deg: float | None = None  # 0 north, clockwise; None while standing
-    at_ms: float | None = None  # by the phone's own clock, which may be wrong by hours: to look at, not to reckon with
+    at_ms: float | None = None  # by the phone's own clock, which may be wrong by hours: for display only
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

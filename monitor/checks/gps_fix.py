@@ -1,8 +1,8 @@
 """Does the receiver have a fix, and does it report its quality?
 
 Covariance is trusted only if its type is at least APPROXIMATED and its values are finite and above zero
-(sensor_msgs/NavSatFix); the real car marks zeros as known. Rejecting unknown quality, as the report wants, is a
-setting, off by default, because it would always reject the real car.
+(sensor_msgs/NavSatFix); the real car marks zeros as known. Rejecting unknown quality is a setting, off by
+default, because it would always reject the real car.
 """
 
 from __future__ import annotations

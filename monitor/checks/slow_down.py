@@ -56,7 +56,7 @@ def _after(label: str, default_s: float) -> Any:
 
 
 class SlowDownLimits(Limits):
-    """How the car is slowed; the page, the sender and the checks go by the same."""
+    """How the car is slowed; the page, the sender and the checks use the same values."""
 
     deceleration_mps2: float = threshold(
         1.5,
