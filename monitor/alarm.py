@@ -26,7 +26,7 @@ Change = Literal[
 ]
 
 
-CLOCK_BACK_S = 0.5  # less is a message that waited a moment, not a clock that went back
+CLOCK_BACK_S = 0.5  # a smaller step back is a delayed message, not a clock that was set back
 LEVEL = "level "  # begins the name of a cause that is a degree of badness
 
 

@@ -69,7 +69,7 @@ class AlarmSpec:
     actions: tuple[Action, ...] = (Action.ACKNOWLEDGE,)
     advice: str = ""  # one sentence: what the operator should do
     inhibited_by: tuple[str, ...] = ()  # alarms which explain this one: while they stand it is not announced
-    grace_s: float = 0.0  # once this alarm's condition has gone, what it explains gets this long to go too
+    grace_s: float = 0.0  # once this alarm's condition has gone, what it explains has this long to end too
     repeat_after_s: float = 0.0  # an intermittent alarm is not announced again within this time
     latches: bool = False  # stays active until acknowledged although its condition has gone
     ended: str = ""  # its title once its condition has gone; "": the title and "ended"

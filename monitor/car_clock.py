@@ -17,11 +17,11 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-JUMP_S = 0.5  # less is how drivers and radios are
-CONFIRMED_BY = 3  # messages in a row: single odd stamps are known of real receivers
+JUMP_S = 0.5  # smaller steps are normal for drivers and radios
+CONFIRMED_BY = 3  # messages in a row: real receivers send single odd stamps
 AGREE_WITHIN_S = 0.25
 SETTLES_S = 5.0  # the first messages after connecting may have waited long
-FOLLOWS = 0.001  # seconds a second: what no clock of a computer drifts
+FOLLOWS = 0.001  # seconds a second: no computer's clock drifts as fast
 PACE_AFTER = 10  # so many odd stamps that do not agree are no jump but another pace, as of a replay
 PACE, PACE_LEAST_S = 0.4, 0.05  # stamps that gain or lose so much a second are of another pace, as of a replay
 SAME_JUMP_S = 3.0  # jumps of several signals within this are one jump of one clock
@@ -30,7 +30,7 @@ SAME_JUMP_S = 3.0  # jumps of several signals within this are one jump of one cl
 MANY_WRITERS = frozenset({"diagnostics", "command"})
 
 SAMPLES = 8
-CONTRADICTION_S = 0.1  # so far apart two answers are of one clock no more: it was set, or runs at another pace
+CONTRADICTION_S = 0.1  # answers so far apart are not of one clock: it was set, or runs at another pace
 IN_TIME_S = 0.5  # stamps that were once so little late are of this clock …
 AHEAD_S = 0.1  # … if they are never further ahead
 

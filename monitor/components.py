@@ -11,7 +11,7 @@ from monitor.values import Component, Diagnostics
 SILENT_AFTER_S = 5.0  # at least, as ROS's diagnostic aggregator …
 SILENT_PERIODS = 3  # … and so many of the component's own intervals
 INTERVALS = 8  # the longest of the newest ones is a component's own: reports also come out of turn
-ONE_INTERVAL_S = 60.0  # at least, while there is only one: two reports of a start are no habit
+ONE_INTERVAL_S = 60.0  # at least, while there is only one: two reports at a start are no interval
 SELDOM_S = 150.0  # healthy components report every two minutes, and between two reports nothing else may come
 TOPIC_SILENT_S = 10.0  # at least, of the whole topic
 FORGOTTEN_AFTER_S = 60.0  # at least, and twice the allowed silence: a node that was ended does not alarm for ever

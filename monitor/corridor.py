@@ -46,7 +46,7 @@ class Sight:
     blind: int  # of those, the ones without a usable return from beyond the nose
     gap_m: float | None  # from the nose along the corridor to the nearest thing two adjacent beams agree on; None: none
     bearing_rad: float | None  # of it, from the laser, counter-clockwise from ahead, −π to π
-    covered: float = 1.0  # share of the directions into the corridor that the laser looks into
+    covered: float = 1.0  # share of the directions into the corridor that the laser covers
 
 
 def along_and_aside(
@@ -138,7 +138,7 @@ def is_round(n: int, increment_rad: float) -> bool:
 
 
 # A laser keeps its geometry (two of them, where it is interlaced, and one for each part of a sweep), so that this is
-# reckoned once and not 75 times a second.
+# computed once and not 75 times a second.
 @lru_cache(maxsize=64)
 def _directions(n: int, angle_min_rad: float, increment_rad: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Cosines and sines of the beams, each shape (n,), never to be written to."""

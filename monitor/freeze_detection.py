@@ -9,7 +9,7 @@ from typing import Any
 from monitor.motion import MOVES_ABOVE_MPS
 from monitor.values import Acceleration, GpsFix, Heading, LaserScan, Odometry, Twist
 
-STEP_AT_MOST_S = 1.0  # between two speeds farther apart the car may have done anything
+STEP_AT_MOST_S = 1.0  # over a longer gap between two speeds the motion is unknown
 MEMORY = 200  # messages: the last ten seconds in motion at 20 Hz decide …
 KNOWN_AFTER = 40  # … and not before two
 WEIGHT_AT_MOST = 20  # repetitions of one stretch that count: one that was frozen does not make a signal sluggish

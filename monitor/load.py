@@ -14,7 +14,7 @@ FLOOD_IN_10_MIN = 10
 WINDOW_S = 600.0
 CHATTER_WINDOW_S = 60.0
 CHATTER_IN_60_S = 3  # transitions of one alarm: it came, went and came again
-KEPT = 5000  # comings and goings; a flood of more is a flood all the same
+KEPT = 5000  # raised and cleared; the bound is far above a flood
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -39,7 +39,7 @@ class PhoneReport:
 
     phone: str  # its own name for itself, the same over reconnections
     is_handheld: bool  # not a desktop computer, of which no GPS is expected
-    label: str = ""  # what its operator calls it
+    label: str = ""  # the operator's name for it
     fix: PhoneFix | None = None
     measured_s: float = 0.0  # when it was there …
     uncertain_s: float = 0.0  # … give or take

@@ -17,7 +17,7 @@ UNDECLARED_S = 10.0  # before the rate of a signal that may have any rate is set
 BLOCK_S = 2.5  # two blocks in a row that agree are a steady rate: 5 s after connecting at the earliest
 BLOCK_INTERVALS = 5
 STEADY_WITHIN = 0.1  # relative
-PROVISIONAL_BLOCKS = 6  # so long a learned rate is refined: its first blocks may hold the catching up of a hiccup
+PROVISIONAL_BLOCKS = 6  # so long a learned rate is refined: its first blocks may include a burst after a stall
 HICCUP_SHARE = 0.8  # a block below this share of the learned rate is a source that slowed down, and refines nothing
 DECIDED_BLOCKS = 4  # without agreement by then, the declared rate applies
 
@@ -179,7 +179,7 @@ class RateMeter:
         if before_hz is None or abs(block_hz - before_hz) > STEADY_WITHIN * max(block_hz, before_hz):
             return
         learned_hz = self._learned_hz
-        # Only a clear step up is a new rate: following every wobble upward would ratchet the demand.
+        # Only a clear step up is a new rate: following every small rise would raise the expected rate step by step.
         if learned_hz is None or min(block_hz, before_hz) > (1 + STEADY_WITHIN) * learned_hz:
             self._learned_hz_before = learned_hz
             self._learned_blocks = [before_hz, block_hz]

@@ -90,7 +90,7 @@ def differs(snapshot: Snapshot, limits: ClockLimits, was_active: bool) -> Findin
             " a recording, a simulation, or a clock that was never set",
             short="another",
         )
-    # Only what every stamped signal shows is the clock's doing, or the radio's: one alone is its own driver's.
+    # Only what every stamped signal shows is due to the clock or the radio; a single one is due to its own driver.
     change_s = _nearest(stamped, lambda reading: reading.stamp_change_s or 0.0)
     slack = 0.8 if was_active else 1.0
     if abs(change_s) > limits.late_s * slack:

@@ -121,7 +121,7 @@ def move_as_one(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -
         if _drives(snapshot):
             return unknown(f"{text[0].upper()}{text[1:]}", short="near")
         return unknown(f"Standing: {text}", short="standing")
-    r = 0.0 if tracks.correlation is None else tracks.correlation  # a phone that never moved moves with nothing
+    r = 0.0 if tracks.correlation is None else tracks.correlation  # a phone that never moved has no correlation
     least = limits.least_correlation
     text = f"The tracks correlate with {beside(r, least, 2)}; {least:.2f} is the least"
     measured = Quantity(label="Correlation", value=r, unit="r")
