@@ -74,7 +74,7 @@ def test_a_kind_of_car_has_words_and_numbers_of_its_own() -> None:
         pipeline.receive(
             sources, message, float(at), None, reception=reception, state=state, profile=own, tyre_rad_per_unit=0.0
         )
-    assert [received.value.mode for received in state.snapshot(3.0).modes_received] == ["autonomous", "manual", "autonomous"]
+    assert [one.value.mode for one in state.snapshot(3.0).modes_received] == ["autonomous", "manual", "autonomous"]
     reading = state.get("mode")
     assert reading is not None
     assert reading.value == DriveMode(mode="autonomous", text="3")
