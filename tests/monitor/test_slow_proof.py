@@ -53,11 +53,11 @@ def late_proofs(count: int, seed: int) -> list[SlowCar]:
     return found
 
 
-def test_of_cars_that_do_not_obey_nothing_is_shown() -> None:
+def test_of_cars_that_do_not_comply_nothing_is_shown() -> None:
     assert false_proofs(200, seed=1) == []
 
 
-def test_of_cars_that_obey_it_is_shown_within_a_second_of_the_response() -> None:
+def test_of_cars_that_comply_it_is_shown_within_a_second_of_the_response() -> None:
     assert len(late_proofs(200, seed=2)) <= 4  # by chance more come in one of 20 seeds where one in a hundred is late
 
 
@@ -111,7 +111,7 @@ def test_what_the_order_does_not_explain_shows_nothing(more: dict[str, Any]) -> 
 
 @pytest.mark.parametrize("manner", ["cruise", "coasts", "accelerates", "downhill", "wavers"])
 @pytest.mark.parametrize("lag_s", [0.1, 0.5, 1.0])
-def test_a_car_that_obeys_is_shown_to(manner: str, lag_s: float) -> None:
+def test_a_car_that_complies_is_shown_to(manner: str, lag_s: float) -> None:
     car = replace(CAR, manner=manner, own_mps2=0.8, complies=True, lag_s=lag_s)
     proof = car.judged()
     assert proof.shown == "slows"
@@ -189,7 +189,7 @@ def test_of_a_car_that_brakes_to_rest_by_itself_no_more_is_claimed_than_that_it_
     assert judged(state, ORDERED_S + 6.4, 0.0) == (Verdict.OK, STANDS_UNPROVEN)
 
 
-def test_an_order_before_the_motion_is_known_says_why_nothing_proves_it() -> None:
+def test_an_order_before_the_motion_is_known_reports_why_nothing_proves_it() -> None:
     state = State()
     for n in range(5):  # 0.2 s of speeds
         state.receive("speed", Twist(speed_mps=6.0, yaw_rate_radps=None), ORDERED_S - 0.2 + n * 0.05)
