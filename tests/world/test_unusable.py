@@ -16,7 +16,7 @@ pytestmark = pytest.mark.world(n=7)
 
 
 def refuse_all(drive: Drive, names: list[str], *, until_s: float) -> None:
-    """Messages of these signals come at 20 Hz, and nothing they say can be used."""
+    """Messages of these signals come at 20 Hz, and none of their values can be used."""
     drive.silent |= set(names)
     while drive.now_s < until_s:
         drive.to(drive.now_s + 0.05)
