@@ -1,4 +1,4 @@
-"""Whether two receivers can be at one place, and whether two tracks are one: the statistics, and nothing else."""
+"""Whether two receivers can be at one place, and whether two tracks are one: only the statistics."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ Change = Literal[
 ]
 
 
-CLOCK_BACK_S = 0.5  # less is a message that waited a moment, not a clock that went back
+CLOCK_BACK_S = 0.5  # a smaller step back is a delayed message, not a clock that was set back
 LEVEL = "level "  # begins the name of a cause that is a degree of badness
 
 
@@ -57,11 +57,11 @@ class Transition:
     occurrence: int
     change: Change
     at_s: float
-    text: str  # what the check said at that moment
+    text: str  # the finding's text at that moment
     by: str | None = None  # who, where a person did it
     announces: bool = False  # to be announced now
     state: AlarmState = AlarmState.NORMAL  # the alarm's state after it
-    finding: Finding | None = None  # what the check had last said; None: it had said nothing, or monitoring ended
+    finding: Finding | None = None  # the check's newest; None: it had none, or monitoring ended
     causes: tuple[str, ...] = ()  # the announced causes that were still active
     suppressed_by: tuple[str, ...] = ()
     shelved_until_s: float | None = None
@@ -83,7 +83,7 @@ class Alarm:
     id: str
     spec: AlarmSpec
     occurrence: int = 0  # counts announcements
-    condition: bool = False  # what the check last said, without delays; UNKNOWN leaves it
+    condition: bool = False  # by the newest finding, without delays; UNKNOWN leaves it
     active: bool = False  # the same with delays: the announced state
     acknowledged: bool = True
     latched: bool = False  # active only because it latches
@@ -117,7 +117,7 @@ class Alarm:
 
     @property
     def is_standing(self) -> bool:
-        """Active, or gone and still unacknowledged."""
+        """Active, or over and still unacknowledged."""
         return self.active or not self.acknowledged
 
     @property
@@ -127,7 +127,7 @@ class Alarm:
 
     @property
     def sound(self) -> Sound:
-        """What it sounds like now: silent once it is gone, acknowledged, silenced, shelved or suppressed."""
+        """The sound to play now: none once it is over, acknowledged, silenced, shelved or suppressed."""
         sounds = self.state is AlarmState.UNACKED and self.silenced_until_s is None
         return self.spec.sound if sounds else Sound.NONE
 
@@ -145,7 +145,7 @@ class Alarm:
 
     @property
     def is_at_rest(self) -> bool:
-        """Normal in every respect: another judgement which is no fault changes nothing of it."""
+        """Whether it is normal in every respect: another judgement without a fault changes nothing."""
         return not (
             self.condition
             or self.active
@@ -164,7 +164,7 @@ def _state(active: bool, acknowledged: bool) -> AlarmState:
 def transition(
     alarm: Alarm, change: Change, at_s: float, *, text: str = "", by: str | None = None, announces: bool = False
 ) -> Transition:
-    """That `change` has made of the alarm what it is now."""
+    """Return the transition by which `change` led to the alarm's present state."""
     return Transition(
         alarm_id=alarm.id,
         spec=alarm.spec,
@@ -189,7 +189,7 @@ def there(causes: Collection[Cause]) -> tuple[str, ...]:
 
 
 def rebased(alarm: Alarm, now_s: float) -> Alarm:
-    """The alarm with its times moved along when the clock went back, so that every duration stays what it was."""
+    """Return the alarm with its times shifted after the clock went back, so that durations are unchanged."""
     if alarm.at_s is None or now_s >= alarm.at_s - CLOCK_BACK_S:
         return alarm
     shift_s = now_s - alarm.at_s

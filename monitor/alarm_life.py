@@ -30,7 +30,7 @@ def advance(
     if alarm.out_of_service:
         return alarm, ()
     if finding.verdict is not Verdict.FAULT and not inhibited_by and alarm.is_at_rest:
-        return alarm, ()  # by far the most frequent case, and nothing of it needs remembering
+        return alarm, ()  # by far the most frequent case, and it needs no state
     alarm = rebased(alarm, now_s)
     step = _Step(alarm, finding, now_s if alarm.at_s is None else max(now_s, alarm.at_s))
     step.suppress(tuple(inhibited_by))
@@ -153,7 +153,7 @@ class _Step:
         if self._suppressed:
             self._set["held_s"] = 0.0
             return
-        # What was explained away is no fault seen: the delay counts from the end of the suppression.
+        # A suppressed fault does not count as seen: the delay counts from the end of the suppression.
         seen_before = self._verdict_before is Verdict.FAULT and not self._alarm.suppressed_by
         held_s = self._alarm.held_s + (self._dt_s if seen_before else 0.0)
         self._set["held_s"] = held_s

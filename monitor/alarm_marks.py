@@ -29,7 +29,7 @@ class AlarmMarks:
         self.left_out = 0
 
     def add(self, transition: Transition, at_s: float) -> None:
-        """Mark it, if it announces an alarm. Beyond `MOST_MARKS` the oldest of the least urgent goes."""
+        """Mark it, if it announces an alarm. Beyond `MOST_MARKS` the oldest of the least urgent is dropped."""
         if not transition.announces:
             return
         spec = transition.spec

@@ -18,7 +18,7 @@ class Priority(StrEnum):
 
 
 def priority_of(name: object) -> Priority:
-    """By its name; one that this version does not know is the most urgent."""
+    """Return the priority by its name; a name unknown to this version counts as the most urgent."""
     try:
         return Priority(str(name))
     except ValueError:
@@ -69,7 +69,7 @@ class AlarmSpec:
     actions: tuple[Action, ...] = (Action.ACKNOWLEDGE,)
     advice: str = ""  # one sentence: what the operator should do
     inhibited_by: tuple[str, ...] = ()  # alarms which explain this one: while they stand it is not announced
-    grace_s: float = 0.0  # once this alarm's condition has gone, what it explains gets this long to go too
+    grace_s: float = 0.0  # once this alarm's condition has gone, what it explains has this long to end too
     repeat_after_s: float = 0.0  # an intermittent alarm is not announced again within this time
     latches: bool = False  # stays active until acknowledged although its condition has gone
     ended: str = ""  # its title once its condition has gone; "": the title and "ended"
@@ -81,5 +81,5 @@ class AlarmSpec:
 
     @property
     def shelvable(self) -> bool:
-        """Whether this priority may be hidden for a time; an alarm that inhibits others never is (the runner knows)."""
+        """Whether this priority may be hidden for a time; an alarm that inhibits others never is (see the runner)."""
         return self.priority is not Priority.CRITICAL

@@ -17,11 +17,11 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-JUMP_S = 0.5  # less is how drivers and radios are
-CONFIRMED_BY = 3  # messages in a row: single odd stamps are known of real receivers
+JUMP_S = 0.5  # smaller steps are normal for drivers and radios
+CONFIRMED_BY = 3  # messages in a row: real receivers send single odd stamps
 AGREE_WITHIN_S = 0.25
 SETTLES_S = 5.0  # the first messages after connecting may have waited long
-FOLLOWS = 0.001  # seconds a second: what no clock of a computer drifts
+FOLLOWS = 0.001  # seconds a second: no computer's clock drifts as fast
 PACE_AFTER = 10  # so many odd stamps that do not agree are no jump but another pace, as of a replay
 PACE, PACE_LEAST_S = 0.4, 0.05  # stamps that gain or lose so much a second are of another pace, as of a replay
 SAME_JUMP_S = 3.0  # jumps of several signals within this are one jump of one clock
@@ -30,7 +30,7 @@ SAME_JUMP_S = 3.0  # jumps of several signals within this are one jump of one cl
 MANY_WRITERS = frozenset({"diagnostics", "command"})
 
 SAMPLES = 8
-CONTRADICTION_S = 0.1  # so far apart two answers are of one clock no more: it was set, or runs at another pace
+CONTRADICTION_S = 0.1  # answers so far apart are not of one clock: it was set, or runs at another pace
 IN_TIME_S = 0.5  # stamps that were once so little late are of this clock …
 AHEAD_S = 0.1  # … if they are never further ahead
 
@@ -98,7 +98,7 @@ class StampFollower:
         return None
 
     def _doubt(self, stamp_s: float, difference_s: float, at_s: float) -> float | None:
-        """An odd stamp: believed when the next ones agree with it, and do not run on."""
+        """Handle an odd stamp: it is a jump once the next ones agree with it and do not drift."""
         if not self._odd:
             self._odd_at_s = at_s
         self._odd_n += 1
@@ -128,7 +128,7 @@ class StampFollower:
 
 
 def merged(before: ClockJump | None, signal: str, at_s: float, by_s: float) -> ClockJump:
-    """A jump that several signals show is one."""
+    """Merge the jumps that several signals show into one."""
     if before is not None and 0.0 <= at_s - before.at_s <= SAME_JUMP_S and (before.by_s > 0) == (by_s > 0):
         signals = before.signals if signal in before.signals else (*before.signals, signal)
         return ClockJump(at_s=before.at_s, by_s=before.by_s, signals=signals)
@@ -140,19 +140,19 @@ class CarClock:
 
     def __init__(self) -> None:
         self.epoch = 0  # another one: the clock was set
-        self.asked_s: float | None = None  # the newest question that was answered
+        self.requested_s: float | None = None  # the time of the newest request that was answered
         self.ahead_s: float | None = None  # at most
         self._samples: deque[tuple[float, float]] = deque(maxlen=SAMPLES)  # ahead at least, at most
 
-    def answered(self, asked_s: float, answered_s: float, car_s: float) -> None:
-        """The car's time came."""
-        least_s, most_s = car_s - answered_s, car_s - asked_s
+    def answered(self, requested_s: float, answered_s: float, car_s: float) -> None:
+        """Take the answer to a request for the car's time."""
+        least_s, most_s = car_s - answered_s, car_s - requested_s
         samples = self._samples
         if any(least_s > most + CONTRADICTION_S or most_s < least - CONTRADICTION_S for least, most in samples):
             samples.clear()
             self.epoch += 1
         samples.append((least_s, most_s))
-        self.asked_s = asked_s
+        self.requested_s = requested_s
         self.ahead_s = min(most for _, most in samples)
 
 
@@ -172,7 +172,7 @@ class StampedDelay:
         if stamp_s < self._stamp_s:
             self._stepped_s = at_s
         self._stamp_s = stamp_s
-        if clock.ahead_s is None or clock.asked_s is None or clock.asked_s <= self._stepped_s:
+        if clock.ahead_s is None or clock.requested_s is None or clock.requested_s <= self._stepped_s:
             return None
         if self._epoch != clock.epoch:
             self._epoch, self._least_s = clock.epoch, float("inf")

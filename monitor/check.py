@@ -66,7 +66,7 @@ class Finding(NamedTuple):
     measured: Quantity | None = None
     limit: Quantity | None = None
     causes: tuple[str, ...] = ()  # the faulty parts, if one alarm covers several; a new one re-alarms
-    level: int = 0  # how bad, where a check knows degrees; a higher one re-alarms
+    level: int = 0  # how bad, where a check has degrees; a higher one re-alarms
     applies: bool = True  # False: there is nothing here to check (an optional signal that is not published)
     ended: str = ""  # title of its alarm once that has ended, where the declared one would not be true of this finding
 
@@ -97,7 +97,7 @@ def fault(
     causes: tuple[str, ...] = (),
     level: int = 0,
 ) -> Finding:
-    """The verdict FAULT. `brief` follows the word FAULT on the tile ("12.6 m/s"), where it fits."""
+    """The verdict FAULT. `brief` follows "FAULT" on the tile ("12.6 m/s"), where it fits."""
     short = on_tile(brief)
     return Finding(
         verdict=Verdict.FAULT,
@@ -119,7 +119,7 @@ def unknown(why: str, *, short: str = "") -> Finding:
 
 @lru_cache(maxsize=KEPT_FINDINGS)
 def absent(why: str, *, brief: str = "not published") -> Finding:
-    """There is nothing to check: unknown, but no reason to call the tile unknown."""
+    """The verdict UNKNOWN because there is nothing to check: it does not make the tile unknown."""
     return Finding(verdict=Verdict.UNKNOWN, text=why, brief=brief, applies=False)
 
 
@@ -196,7 +196,7 @@ class Check(Generic[L]):
     ends: Callable[[L], End] | None = None  # where the alarm ends at another value than that which raises it
     group: str = ""  # name of its thresholds; a family shares one; "" = id
     tile: str = ""  # the tile of the home tab it belongs to; "" = label
-    checked_when: str = ""  # what makes it checked, as a sentence; said where it is not
+    checked_when: str = ""  # when it is checked, as a sentence; shown where it is not
     scope: Scope = Scope.CAR
     order: int = 500  # place of its tile on the home tab, which never moves: smaller comes first
 

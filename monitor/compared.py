@@ -49,7 +49,7 @@ NOTHING_COMPARED = Compared()
 
 
 MOTION = frozenset({"speed", "odometry", "position"})  # signals whose sources are compared with each other
-MOVING = frozenset({Twist, Odometry, GpsFix})  # values that say how the car moves
+MOVING = frozenset({Twist, Odometry, GpsFix})  # values that show how the car moves
 
 
 class SourceFollower:
@@ -127,7 +127,7 @@ class Comparisons:
         self._known: Compared | None = NOTHING_COMPARED
 
     def link(self, facts: LinkFacts, now_s: float) -> None:
-        """What is compared from now on. What is not any more leaves with what was known of it; so does what another
+        """Set what is compared from now on. The history of what is not compared any more is dropped; so is what another
         topic carried of a signal."""
         before, self._link = self._link, facts
         if facts.opened_s is not None and facts.opened_s != before.opened_s:

@@ -11,7 +11,7 @@ from monitor.values import Component, Diagnostics
 SILENT_AFTER_S = 5.0  # at least, as ROS's diagnostic aggregator …
 SILENT_PERIODS = 3  # … and so many of the component's own intervals
 INTERVALS = 8  # the longest of the newest ones is a component's own: reports also come out of turn
-ONE_INTERVAL_S = 60.0  # at least, while there is only one: two reports of a start are no habit
+ONE_INTERVAL_S = 60.0  # at least, while there is only one: two reports at a start are no interval
 SELDOM_S = 150.0  # healthy components report every two minutes, and between two reports nothing else may come
 TOPIC_SILENT_S = 10.0  # at least, of the whole topic
 FORGOTTEN_AFTER_S = 60.0  # at least, and twice the allowed silence: a node that was ended does not alarm for ever
@@ -69,28 +69,28 @@ class Components:
     """
 
     def __init__(self) -> None:
-        self._heard: dict[str, _Reports] = {}
+        self._known: dict[str, _Reports] = {}
         self._watched_s: float | None = None  # when all was judged, the last time
         self._closed_s = math.inf  # when the link was closed, the last time
 
-    def merge(self, said: Diagnostics, at_s: float) -> Diagnostics:
+    def merge(self, message: Diagnostics, at_s: float) -> Diagnostics:
         """All components known after this message, in the order in which they first reported."""
         self._miss_stall(at_s)
-        heard = self._heard
-        for component in said.components:
-            before = heard.get(component.name)
+        known = self._known
+        for component in message.components:
+            before = known.get(component.name)
             if before is None or not before.is_kept(at_s):
-                heard[component.name] = _Reports(component, at_s)
+                known[component.name] = _Reports(component, at_s)
             else:
                 before.add(component, at_s)
-        if len(heard) > MOST:  # those that were silent longest make room
-            for name in sorted(heard, key=lambda name: heard[name].at_s)[: len(heard) - MOST]:
-                del heard[name]
-        self._heard = {name: reports for name, reports in heard.items() if reports.is_kept(at_s)}
-        return Diagnostics(components=tuple(reports.at(at_s) for reports in self._heard.values()))
+        if len(known) > MOST:  # those that were silent longest are dropped
+            for name in sorted(known, key=lambda name: known[name].at_s)[: len(known) - MOST]:
+                del known[name]
+        self._known = {name: reports for name, reports in known.items() if reports.is_kept(at_s)}
+        return Diagnostics(components=tuple(reports.at(at_s) for reports in self._known.values()))
 
     def watch(self, now_s: float) -> None:
-        """To be called whenever all is judged: nothing was received in a time without it."""
+        """Must be called at every judgement of all checks: in a time without a call nothing could be received."""
         self._miss_stall(now_s)
         self._watched_s = now_s
 
@@ -109,15 +109,15 @@ class Components:
 
     def miss(self, from_s: float, until_s: float) -> None:
         """No report could be received for so long: that is neither a component's silence nor its interval."""
-        for reports in self._heard.values():
+        for reports in self._known.values():
             reports.miss(from_s, until_s)
 
     def horizon_s(self, now_s: float) -> float:
         """The silence of all together that the intervals of those that still report explain [s]."""
-        allowed_s = min((one.allowed_s for one in self._heard.values() if not one.is_due(now_s)), default=math.inf)
+        allowed_s = min((one.allowed_s for one in self._known.values() if not one.is_due(now_s)), default=math.inf)
         return SELDOM_S if math.isinf(allowed_s) else max(TOPIC_SILENT_S, allowed_s)
 
     def period_s(self, now_s: float) -> float | None:
         """The interval of the one that reports most often, of those that still report [s]; None: not known."""
-        found = [one.interval_s for one in self._heard.values() if not one.is_due(now_s)]
+        found = [one.interval_s for one in self._known.values() if not one.is_due(now_s)]
         return min((interval_s for interval_s in found if interval_s is not None), default=None)

@@ -46,7 +46,7 @@ class Sight:
     blind: int  # of those, the ones without a usable return from beyond the nose
     gap_m: float | None  # from the nose along the corridor to the nearest thing two adjacent beams agree on; None: none
     bearing_rad: float | None  # of it, from the laser, counter-clockwise from ahead, −π to π
-    covered: float = 1.0  # share of the directions into the corridor that the laser looks into
+    covered: float = 1.0  # share of the directions into the corridor that the laser covers
 
 
 def along_and_aside(
@@ -83,7 +83,7 @@ def _along(x_m: NDArray[np.float64], y_m: NDArray[np.float64], corridor: Corrido
     return way_m
 
 
-# Asked for a scan by several checks, and again when it has become the one to compare with.
+# Several checks call it with the same scan, and again when that is the scan before.
 @lru_cache(maxsize=64)
 def look(scan: LaserScan, corridor: Corridor, reach_m: float) -> Sight:
     """What the scan shows within `reach_m` along the corridor. A beam without a return is blind, never free, and so is
@@ -138,7 +138,7 @@ def is_round(n: int, increment_rad: float) -> bool:
 
 
 # A laser keeps its geometry (two of them, where it is interlaced, and one for each part of a sweep), so that this is
-# reckoned once and not 75 times a second.
+# computed once and not 75 times a second.
 @lru_cache(maxsize=64)
 def _directions(n: int, angle_min_rad: float, increment_rad: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Cosines and sines of the beams, each shape (n,), never to be written to."""
@@ -237,7 +237,7 @@ def covered(geometries: tuple[Geometry, ...], corridor: Corridor, reach_m: float
     seen = np.zeros(ahead.size, dtype=bool)
     for n, first_rad, increment_rad in geometries:
         if n < 2:
-            continue  # no two adjacent beams, which alone are believed
+            continue  # no two adjacent beams: a single beam is no proof
         span_rad = (n - 1) * abs(increment_rad)
         low_rad = first_rad if increment_rad > 0 else first_rad - span_rad
         margin_rad = min(abs(increment_rad) / 2, step_rad)

@@ -116,8 +116,8 @@ class DerivedSignals:
         )
 
     def not_measured(self, signal: str, at_s: float) -> None:
-        """A message declares that `signal` is not measured: a reading that is not fresh goes, and a derived one may
-        come. A fresh one stays, because another sensor on the same topic may measure it."""
+        """A message declares that `signal` is not measured: a reading that is not fresh is dropped, and a derived one
+        may come. A fresh one stays, because another sensor on the same topic may measure it."""
         known = self._table.newest.get(signal)
         if known is not None and known.derived_from is None:
             if known.is_fresh(at_s):

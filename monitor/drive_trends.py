@@ -117,7 +117,7 @@ class _Level:
 
 
 class _Line:
-    """One signal. The open bucket goes into the levels when the next one begins, or when somebody looks."""
+    """One signal. The open bucket is added to the levels when the next one begins, or when the trend is read."""
 
     __slots__ = ("gaps", "has_data", "high", "horizon_s", "levels", "low", "none", "none_since_s", "received_s", "step")
 

@@ -1,8 +1,8 @@
-"""Who drives: from what the car says, or by the rule that commands come and are followed. Never guessed.
+"""Who drives: from what the car reports, or by the rule that commands come and are followed. Else unknown.
 
-What the car says is believed once messages have said so for `CONFIRM_S`, and counts from the first of them: a link that
-stalls confirms nothing. A mode that flickers is unknown until it has stood for `SETTLE_S`; its single changes are
-counted, and reported once.
+A mode that the car reports is confirmed once messages have reported it for `CONFIRM_S`, and counts from the first of
+them: a link that stalls confirms nothing. A mode that flickers is unknown until it has stood for `SETTLE_S`; its single
+changes are counted, and reported once.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ STANDS_MPS = 0.3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModeChange:
-    """Another one drives."""
+    """The mode has changed."""
 
-    at_s: float  # when the car said so first
+    at_s: float  # when the car first reported it
     mode: Mode
     before: Mode
     source: SourceKind
@@ -39,7 +39,7 @@ class ModeChange:
 
 
 def meaning(value: DriveMode, limits: Any) -> Mode:
-    """What a message says, where plain numbers mean what the settings say."""
+    """The mode that a message reports; the settings define the meaning of plain numbers."""
     if value.number is None:
         return value.mode
     if value.number == limits.autonomous_number:
@@ -54,11 +54,11 @@ class ModeWatch:
         self.mode: Mode = "unknown"
         self.source: SourceKind = "none"
         self.since_s: float | None = None  # None: from the beginning on
-        self.said: Mode = "unknown"  # the newest word, confirmed or not
-        self.words = ""  # the car's own, of the newest message
-        self.changes_heard = 0  # every single change of what the car said
-        self._said_s = -math.inf
-        self._heard_s = -math.inf  # until when it was said
+        self.newest: Mode = "unknown"  # the newest, confirmed or not
+        self.text = ""  # the car's own name of it, in the newest message
+        self.changes_received = 0  # every single change of the mode that the car reports
+        self._newest_s = -math.inf
+        self._until_s = -math.inf  # until when it was reported
         self._numbered = 0
         self._flips: deque[float] = deque(maxlen=FLICKERS)
         self._flickers = 0
@@ -72,58 +72,58 @@ class ModeWatch:
     def step(self, snapshot: Snapshot, limits: Any) -> list[ModeChange]:
         """What changed since the step before; `limits`: those of the group `driving`."""
         now_s = snapshot.now_s
-        self._heard_s = now_s
+        self._until_s = now_s
         by_rule = self._rule.step(snapshot)
         self.source = _source(snapshot, limits)
         if self.source == "topic":
-            self._hear(snapshot, limits)
+            self._receive(snapshot, limits)
         else:
-            self._say(by_rule if self.source == "rule" else "unknown", self._rule.since_s)
+            self._follow(by_rule if self.source == "rule" else "unknown", self._rule.since_s)
         return self._settle(now_s)
 
-    def _hear(self, snapshot: Snapshot, limits: Any) -> None:
+    def _receive(self, snapshot: Snapshot, limits: Any) -> None:
         now_s, reading = snapshot.now_s, snapshot.get("mode")
-        for heard in snapshot.modes_heard:
-            if heard.number > self._numbered:
-                self._numbered = heard.number
-                self.words = heard.value.said
-                self._say(meaning(heard.value, limits), heard.at_s)
+        for received in snapshot.modes_received:
+            if received.number > self._numbered:
+                self._numbered = received.number
+                self.text = received.value.text
+                self._follow(meaning(received.value, limits), received.at_s)
         if reading is None or snapshot.link.phase != "monitoring":
-            self._say("unknown", now_s)
+            self._follow("unknown", now_s)
         elif reading.is_fresh(now_s) or 0.0 <= now_s - reading.received_s <= limits.holds_s:
-            self._say(meaning(reading.value, limits), now_s)
+            self._follow(meaning(reading.value, limits), now_s)
             if not limits.holds_s:  # else no second message is to be expected
-                self._heard_s = reading.received_s
+                self._until_s = reading.received_s
         else:
-            self._say("unknown", now_s)
+            self._follow("unknown", now_s)
 
-    def _say(self, mode: Mode, at_s: float) -> None:
-        if mode == self.said:
+    def _follow(self, mode: Mode, at_s: float) -> None:
+        if mode == self.newest:
             return
-        self.said, self._said_s = mode, at_s
-        self.changes_heard += 1
+        self.newest, self._newest_s = mode, at_s
+        self.changes_received += 1
         self._flips.append(at_s)
         self._flickers += 1
 
     def _settle(self, now_s: float) -> list[ModeChange]:
-        if now_s < self._said_s:  # the clock went back
-            self._said_s = now_s
+        if now_s < self._newest_s:  # the clock went back
+            self._newest_s = now_s
             self._flips.clear()
         flips = self._flips
         if not self._is_flicker_reported and len(flips) == FLICKERS and flips[-1] - flips[0] <= FLICKERS_WITHIN_S:
-            if now_s - self._said_s < SETTLE_S:
+            if now_s - self._newest_s < SETTLE_S:
                 self._is_flicker_reported = True
                 return [self._change("unknown", flips[0], self._flickers)]
             flips.clear()
-        stood_s = self._heard_s - self._said_s
+        stood_s = self._until_s - self._newest_s
         if stood_s < (SETTLE_S if self._is_flicker_reported else CONFIRM_S):
             return []
         flickers, self._flickers = self._flickers, 0
         if self._is_flicker_reported:
             self._is_flicker_reported = False
             flips.clear()
-            return [self._change(self.said, self._said_s, flickers)]
-        return [] if self.said == self.mode else [self._change(self.said, self._said_s, 0)]
+            return [self._change(self.newest, self._newest_s, flickers)]
+        return [] if self.newest == self.mode else [self._change(self.newest, self._newest_s, 0)]
 
     def _change(self, mode: Mode, at_s: float, flickers: int) -> ModeChange:
         change = ModeChange(at_s=at_s, mode=mode, before=self.mode, source=self.source, flickers=flickers)

@@ -38,8 +38,8 @@ class Driving:
         self.time_s: dict[Mode, float] = dict.fromkeys(MODES, 0.0)
         self.way_m: dict[Mode, float] = dict.fromkeys(MODES, 0.0)
         self.mode_way_m: float | None = None  # in this mode, since it began; None: no speed was known
-        self._pending_s = self._pending_m = 0.0  # since the car said what is not confirmed yet
-        self._said: Mode = "unknown"
+        self._pending_s = self._pending_m = 0.0  # since the car reported a mode that is not confirmed yet
+        self._newest: Mode = "unknown"
         self._last_s: float | None = None
 
     @property
@@ -50,22 +50,22 @@ class Driving:
     def step(
         self, snapshot: Snapshot, limits: Any, active: Callable[[], Collection[str]] = tuple
     ) -> tuple[list[ModeChange], list[Intervention]]:
-        """Time has passed. `limits`: all thresholds; `active`: ids of the alarms that stand."""
+        """Advance to `snapshot`. `limits`: all thresholds; `active`: ids of the alarms that stand."""
         watch = self.watch
         self._go_on(snapshot)
         changes = watch.step(snapshot, limits.driving)
         for change in changes:
             self._changed(change)
-        if watch.said != self._said:
-            self._said = watch.said
+        if watch.newest != self._newest:
+            self._newest = watch.newest
             self._pending_s = self._pending_m = 0.0
         found = self._interventions.step(
             snapshot,
             limits,
             changes,
             is_autonomous=watch.mode == "autonomous",
-            drives_itself=watch.mode == watch.said == "autonomous",
-            words=watch.words,
+            drives_itself=watch.mode == watch.newest == "autonomous",
+            mode_text=watch.text,
             active=active,
         )
         return changes, found
@@ -88,11 +88,11 @@ class Driving:
             self._pending_m += way_m
 
     def _changed(self, change: ModeChange) -> None:
-        """What passed between the car's word and its confirmation belongs to the new mode."""
+        """Count what passed between the car's report and its confirmation for the new mode."""
         before, after = change.before, change.mode
         is_known = self.mode_way_m is not None
         self.mode_way_m = None
-        if after == self._said:
+        if after == self._newest:
             pending_s = min(self._pending_s, self.time_s[before])
             pending_m = min(self._pending_m, self.way_m[before])
             self.time_s[before] -= pending_s
@@ -144,7 +144,7 @@ class DrivingSummary:
             "mode_source": self.driving.watch.source,
             "changes": [change_json(one) for one in self.changes],
             "changes_counted": self.changes_counted,
-            "changes_heard": self.driving.watch.changes_heard,
+            "changes_heard": self.driving.watch.changes_received,
             "interventions": [intervention_json(one) for one in self.interventions],
             "interventions_counted": self.interventions_counted,
             "per_km": self.per_km(),

@@ -1,4 +1,4 @@
-"""Does a signal go on saying the same? For how long, and how far the car drove meanwhile."""
+"""Does a signal keep repeating the same? For how long, and how far the car drove meanwhile."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from monitor.motion import MOVES_ABOVE_MPS
 from monitor.values import Acceleration, GpsFix, Heading, LaserScan, Odometry, Twist
 
-STEP_AT_MOST_S = 1.0  # between two speeds farther apart the car may have done anything
+STEP_AT_MOST_S = 1.0  # over a longer gap between two speeds the motion is unknown
 MEMORY = 200  # messages: the last ten seconds in motion at 20 Hz decide …
 KNOWN_AFTER = 40  # … and not before two
 WEIGHT_AT_MOST = 20  # repetitions of one stretch that count: one that was frozen does not make a signal sluggish
@@ -49,8 +49,8 @@ class Wheels:
         self._at_s = at_s
 
 
-# What of a value would differ from message to message; of types not named here a value may rest as long as it likes.
-_SAID: dict[type, Callable[[Any], Any]] = {
+# The part of a value that differs from message to message; a value of another type may stay the same for any time.
+_COMPARED_PART: dict[type, Callable[[Any], Any]] = {
     Twist: lambda twist: twist.speed_mps,
     Acceleration: lambda acceleration: acceleration.acceleration_mps2,
     Heading: lambda heading: heading.heading_deg,
@@ -58,7 +58,7 @@ _SAID: dict[type, Callable[[Any], Any]] = {
     Odometry: lambda odometry: (odometry.x_m, odometry.y_m, odometry.yaw_rad),
     LaserScan: lambda scan: scan.ranges_m.tobytes(),  # NaN is NaN, and 1081 beams take half a microsecond
 }
-COMPARED = frozenset(_SAID)
+COMPARED = frozenset(_COMPARED_PART)
 
 
 class RepeatFollower:
@@ -68,7 +68,7 @@ class RepeatFollower:
         "_in_motion",
         "_known",
         "_lively",
-        "_said",
+        "_part",
         "_stamp_n",
         "_stamp_s",
         "_stamp_since_s",
@@ -82,8 +82,8 @@ class RepeatFollower:
         self.restart()
 
     def restart(self) -> None:
-        """What came before a gap is not repeated by what comes after; how the signal behaves stays known."""
-        self._said: Any = None
+        """Begin anew after a gap: a message after it repeats none before it. The learned share of changes stays."""
+        self._part: Any = None
         self._value_n = self._in_motion = self._stamp_n = 0
         self._way = (0.0, 0.0)  # of the wheels, when the value was new
         self._stamp_s: float | None = None
@@ -91,19 +91,19 @@ class RepeatFollower:
 
     def receive(self, value: Any, stamp_s: float | None, at_s: float, wheels: Wheels) -> Repeats | None:
         """One message; None where nothing of it can be followed."""
-        say = _SAID.get(type(value))
-        if say is None and stamp_s is None:
+        part_of = _COMPARED_PART.get(type(value))
+        if part_of is None and stamp_s is None:
             return None
         if stamp_s is None or stamp_s != self._stamp_s:
             self._stamp_s, self._stamp_since_s, self._stamp_n = stamp_s, at_s, 0
         else:
             self._stamp_n += 1
-        if say is not None:
-            said = say(value)
-            if said != self._said:
+        if part_of is not None:
+            part = part_of(value)
+            if part != self._part:
                 if wheels.is_moving:
                     self._learn()
-                self._said, self._value_n, self._in_motion = said, 0, 0
+                self._part, self._value_n, self._in_motion = part, 0, 0
                 self._way = (wheels.moved_s, wheels.moved_m)
             else:
                 self._value_n += 1

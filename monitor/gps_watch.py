@@ -12,7 +12,7 @@ from monitor.values import GpsFix
 
 ANCHOR_S = 2.0  # the anchor is the median of the first fixes at rest, this long
 FIXES = 3  # in a row: one stray fix is not a fault
-STEP_AT_LEAST_S = 0.04  # fixes closer than that are two words for one
+STEP_AT_LEAST_S = 0.04  # two fixes closer than that are one, reported twice
 STEP_AT_MOST_S = 2.0  # after a longer gap the car may be anywhere
 GAINS_MPS2, UNEVEN_MPS = 6.0, 0.5  # no car gains speed faster; so much is the noise of a good receiver
 SMOOTH_AFTER_S = 5.0

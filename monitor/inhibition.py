@@ -11,7 +11,7 @@ GRACE_S = 3.0  # for the alarms which explain that messages are missing: the mes
 
 
 class CauseTable:
-    """Knows every alarm's inhibitors, direct and through others, and which of them hold now.
+    """Holds every alarm's inhibitors, direct and indirect, and which of them are active now.
 
     The table is `AlarmSpec.inhibited_by`: lost link ⊃ silent car ⊃ stale signal ⊃ slow signal. What is judged *by* a
     stale signal needs no row: its value cannot be read, its check is UNKNOWN, and UNKNOWN neither raises nor clears;
@@ -47,10 +47,10 @@ class CauseTable:
                 self._held_s = None
 
     def holding(self, alarm_id: str, now_s: float) -> tuple[str, ...]:
-        """The alarms that now explain this one away."""
+        """The alarms that suppress this one now."""
         if not self._gone_at_s:
             return ()
-        if self._held_s != now_s:  # asked for all alarms at each moment
+        if self._held_s != now_s:  # it is called for all alarms at each moment
             self._held_s = now_s
             self._held = frozenset(name for name in self._gone_at_s if self._holds(name, now_s))
         held = self._held

@@ -22,17 +22,17 @@ By = Literal["driver", "operator", "system", "unknown"]
 MOVES_MPS = 0.3  # as everywhere: above the noise of standing wheels
 SAMPLE_S = 0.25
 BEFORE_S, AFTER_S = 10.0, 6.0
-HELD_S = 0.5  # against the command for so long: longer than the car answers late
+HELD_S = 0.5  # against the command for so long: longer than the delay of the car's response
 REMEMBERED_S = 1.5  # what was commanded shortly before is still being carried out
 SPARE_MPS = 0.3
 COMING_S = 0.3  # a controller that is silent for longer, or than three of its periods, commands nothing
 LONGEST_STEP_S = 1.0  # of a server that stalls
 ONE_S = 3.0  # what happens so soon after another is part of it
 LEADS_S = 2.0  # brake or wheel so long before a change of mode brought it about
-GAP_S = 30.0  # over a longer time of an unknown mode nothing is concluded
+GAP_S = 30.0  # after a longer time in an unknown mode nothing is concluded
 OPERATOR_S = 5.0
 MOST_ACTIVE = 20
-SAID_BY_SYSTEM = frozenset({"disengaged", "fault", "emergency", "failure"})
+SYSTEM_MODES = frozenset({"disengaged", "fault", "emergency", "failure"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +91,7 @@ class InterventionWatch:
         self.forget()
 
     def forget(self) -> None:
-        """The clock went back: what was known has no time any more."""
+        """Forget all: the clock went back, and times before that are void."""
         self.samples: deque[Sample] = deque(maxlen=math.ceil((BEFORE_S + 2.0) / SAMPLE_S))
         self._commands: deque[tuple[float, float | None, float | None]] = deque(maxlen=64)  # s, m/s, rad
         self._brake = Against()
@@ -112,11 +112,11 @@ class InterventionWatch:
         *,
         is_autonomous: bool,
         drives_itself: bool,
-        words: str,
+        mode_text: str,
         active: Callable[[], Collection[str]],
     ) -> list[Intervention]:
-        """`limits`: all; `is_autonomous`: the mode is; `drives_itself`: and nothing else is said; `words`: the car's
-        own of its mode; `active`: ids of the alarms that stand."""
+        """`limits`: all; `is_autonomous`: the mode is; `drives_itself`: and no other mode is reported; `mode_text`: the
+        car's own name of its mode; `active`: ids of the alarms that stand."""
         now_s = snapshot.now_s
         if now_s < self._now_s:
             self.forget()
@@ -132,12 +132,12 @@ class InterventionWatch:
         found: list[Intervention] = []
         for change in changes:
             if change.mode == "manual" and self._was_autonomous(change):
-                found += self._made("to_manual", change.at_s, words, active)
+                found += self._made("to_manual", change.at_s, mode_text, active)
             if change.mode != "unknown":
                 self._known = change.mode
         for kind, held in (("brake", self._brake if braked else None), ("steer", self._steer if steered else None)):
             if held is not None and held.since_s is not None:
-                found += self._made("brake" if kind == "brake" else "steer", held.since_s, words, active)
+                found += self._made("brake" if kind == "brake" else "steer", held.since_s, mode_text, active)
         if is_autonomous:
             self._autonomous_s = now_s
         if self._brake.is_reported or self._steer.is_reported:
@@ -147,14 +147,16 @@ class InterventionWatch:
     def _was_autonomous(self, change: ModeChange) -> bool:
         return self._known == "autonomous" and change.at_s - self._autonomous_s <= GAP_S
 
-    def _made(self, kind: KindOf, at_s: float, words: str, active: Callable[[], Collection[str]]) -> list[Intervention]:
+    def _made(
+        self, kind: KindOf, at_s: float, mode_text: str, active: Callable[[], Collection[str]]
+    ) -> list[Intervention]:
         near = min(self.samples, key=lambda one: abs(one.at_s - at_s), default=None)
         speed_mps = None if near is None or abs(near.at_s - at_s) > 1.0 else near.speed_mps
         if near is None or speed_mps is None or abs(speed_mps) <= MOVES_MPS or abs(at_s - self._newest_s) <= ONE_S:
             return []
         self._newest_s = at_s
         lat_deg, lon_deg = near.place or (None, None)
-        by, acted_before_s = self._who(kind, at_s, words)
+        by, acted_before_s = self._who(kind, at_s, mode_text)
         return [
             Intervention(
                 at_s=at_s,
@@ -170,9 +172,9 @@ class InterventionWatch:
             )
         ]
 
-    def _who(self, kind: KindOf, at_s: float, words: str) -> tuple[By, float | None]:
-        """Who began it, and how long before the mode changed. Of brake and wheel alone nobody can be named for certain
-        but the one who is at them."""
+    def _who(self, kind: KindOf, at_s: float, mode_text: str) -> tuple[By, float | None]:
+        """Who began it, and how long before the mode changed. Of brake and wheel alone only the driver can be
+        named for certain."""
         if at_s - self._slowed_s <= OPERATOR_S:
             return "operator", None
         if kind != "to_manual":
@@ -182,7 +184,7 @@ class InterventionWatch:
         ]
         if acts:
             return "driver", round(max(0.0, at_s - min(acts)), 2)
-        return ("system" if words.casefold() in SAID_BY_SYSTEM else "unknown"), None
+        return ("system" if mode_text.casefold() in SYSTEM_MODES else "unknown"), None
 
     def _sample(self, snapshot: Snapshot) -> Sample:
         now_s, fresh = snapshot.now_s, _fresh

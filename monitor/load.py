@@ -1,4 +1,4 @@
-"""How much the alarms ask of one operator, measured after EEMUA 191."""
+"""The load of the alarms on one operator, measured after EEMUA 191."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FLOOD_IN_10_MIN = 10
 WINDOW_S = 600.0
 CHATTER_WINDOW_S = 60.0
 CHATTER_IN_60_S = 3  # transitions of one alarm: it came, went and came again
-KEPT = 5000  # comings and goings; a flood of more is a flood all the same
+KEPT = 5000  # raised and cleared; the bound is far above a flood
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +68,7 @@ def _forget(announced: deque[float], now_s: float) -> None:
 
 
 def is_turn(transition: Transition) -> bool:
-    """It came or went; what the operator does about it is no turn."""
+    """Whether the alarm came or went; an operator's action is no turn."""
     return transition.change in ("raised", "cleared")
 
 

@@ -11,7 +11,7 @@ from monitor.snapshot import Snapshot
 from monitor.values import LaserScan
 
 BLIND_AT_M = 5.0  # where the beams of the corridor are counted
-BLIND_SHARE = 0.9  # of them without a return: nothing can be said
+BLIND_SHARE = 0.9  # of them without a return: nothing is known
 ANGLE_STEP_RAD = 0.005  # 10 cm aside at 10 m: a computed bend is reused for the next scan
 WIDEST_TYRE_RAD = 0.6  # no car turns its wheels farther
 ASIDE_DEADBAND_M = 0.2  # hysteresis at the corridor's edge
@@ -52,7 +52,7 @@ def look_ahead(scan: LaserScan, corridor: Corridor) -> Sight:
 
 
 def sweep_ahead(snapshot: Snapshot, scan: LaserScan, corridor: Corridor) -> Sight:
-    """What the newest scan shows of the corridor, and where it looks only into a part of it, what the other parts of
+    """What the newest scan shows of the corridor, and where it covers only a part of it, what the other parts of
     its sweep show."""
     newest = look_ahead(scan, corridor)
     if newest.covered >= COVERED_SHARE or not snapshot.scan_parts:
@@ -86,7 +86,7 @@ def is_blind(sight: Sight) -> bool:
 
 
 def is_covered(sight: Sight) -> bool:
-    """Whether the laser looks into the whole corridor: only then nothing seen is nothing there."""
+    """Whether the laser covers the whole corridor: only then a scan without returns shows that it is free."""
     return sight.covered >= COVERED_SHARE
 
 

@@ -70,7 +70,7 @@ class SpeedFollower:
         self.pace: Pace | None = None
 
     def add(self, at_s: float, mps: float) -> None:
-        """One speed [m/s], backwards negative where the source knows it."""
+        """One speed [m/s], backwards negative where the source reports it."""
         if not math.isfinite(mps):
             return
         if self._at_s is not None:
@@ -114,7 +114,7 @@ class PlaceFollower:
         self.restart()
 
     def restart(self) -> None:
-        """What came before says nothing of what comes now."""
+        """Discard what came before: it proves nothing about what follows."""
         self._places.clear()
         self._made_s = -math.inf
         self.pace: Pace | None = None

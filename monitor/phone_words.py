@@ -1,4 +1,4 @@
-"""Why a phone has no usable position, in words that the operator reads."""
+"""Why a phone has no usable position, as text for the operator."""
 
 from __future__ import annotations
 

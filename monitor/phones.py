@@ -38,8 +38,8 @@ class PhoneReport:
     """The position of one phone, or the reason for none. Times are of the receiver's monotonic clock."""
 
     phone: str  # its own name for itself, the same over reconnections
-    is_handheld: bool  # not a computer on a desk, of which no GPS is expected
-    label: str = ""  # what its operator calls it
+    is_handheld: bool  # not a desktop computer, of which no GPS is expected
+    label: str = ""  # the operator's name for it
     fix: PhoneFix | None = None
     measured_s: float = 0.0  # when it was there …
     uncertain_s: float = 0.0  # … give or take
@@ -70,7 +70,7 @@ class PhoneView:
     measured_s: float = -math.inf
     was_usable: bool = False  # it had a usable position before
     why: Why | None = None  # why its newest report has no usable fix
-    is_chosen: bool = False  # the operator said that it rides in the car
+    is_chosen: bool = False  # the operator selected it as the phone in the car
     comparisons: tuple[Comparison, ...] = ()  # the newest five, oldest first
     tracks: Tracks | None = None  # over the last minute, of places that the gate explains
 
@@ -105,7 +105,7 @@ class _Phone:
     label: str = ""
     is_handheld: bool = True
     received_s: float = -math.inf
-    asked_s: float = -math.inf  # when it was chosen before its first report
+    selected_s: float = -math.inf  # when the operator selected it before its first report
     fix: PhoneFix | None = None
     measured_s: float = -math.inf
     why: Why | None = None
@@ -118,7 +118,7 @@ class Phones:
     def __init__(self) -> None:
         self.view = NO_PHONE
         self.views: tuple[PhoneView, ...] = ()  # every phone, in the order in which they came; without comparisons
-        self._rides: str | None = None  # which one the operator chose
+        self._selected: str | None = None  # the one that the operator selected
         self._phones: dict[str, _Phone] = {}  # in the order in which they came
         self._chosen: str | None = None
         self._trail = Trail()
@@ -131,9 +131,9 @@ class Phones:
     def receive(self, report: PhoneReport, now_s: float) -> None:
         """Take one report of one phone."""
         self._phones = {
-            n: p for n, p in self._phones.items() if n == self._rides or now_s - p.received_s <= FORGOTTEN_AFTER_S
+            n: p for n, p in self._phones.items() if n == self._selected or now_s - p.received_s <= FORGOTTEN_AFTER_S
         }
-        if report.why == "off" and report.phone != self._rides:
+        if report.why == "off" and report.phone != self._selected:
             self._phones.pop(report.phone, None)
         elif report.phone in self._phones or len(self._phones) < MOST:
             self._note(report, now_s)
@@ -145,14 +145,14 @@ class Phones:
         self._look()
 
     def ride(self, phone: str | None, now_s: float) -> None:
-        """This phone rides in the car: it is compared, and no other. It may be one that has not reported yet. None: one
-        is found as it comes."""
-        expected = self._phones.get(self._rides or "")
+        """Set the phone that is in the car: only this one is compared. It need not have reported yet. None: one is
+        chosen automatically."""
+        expected = self._phones.get(self._selected or "")
         if expected is not None and expected.received_s == -math.inf:
             del self._phones[expected.name]  # it was only waited for
-        self._rides = phone
+        self._selected = phone
         if phone is not None and phone not in self._phones:
-            self._phones[phone] = _Phone(name=phone, usable_s=now_s, asked_s=now_s)
+            self._phones[phone] = _Phone(name=phone, usable_s=now_s, selected_s=now_s)
         self._choose(now_s)
         self._look()
 
@@ -180,8 +180,8 @@ class Phones:
             phone.usable_s, phone.was_usable = report.measured_s, True
 
     def _choose(self, now_s: float) -> None:
-        if self._rides is not None:
-            self._compare_only(self._rides)
+        if self._selected is not None:
+            self._compare_only(self._selected)
             return
         chosen = self._phones.get(self._chosen or "")
         if chosen is not None and chosen.was_usable and now_s - chosen.usable_s <= HOLD_S:
@@ -196,7 +196,7 @@ class Phones:
         self._compare_only(None if found is None else found.name)
 
     def _compare_only(self, name: str | None) -> None:
-        """From now on this one is compared; what was found of another is forgotten."""
+        """Compare this phone from now on; the comparisons of another are dropped."""
         if name != self._chosen:
             self._chosen, self._waiting = name, None
             self._comparisons.clear()
@@ -262,13 +262,13 @@ class Phones:
             label=phone.label,
             count=len(self._phones),
             is_handheld=phone.is_handheld,
-            received_s=max(phone.received_s, phone.asked_s),
+            received_s=max(phone.received_s, phone.selected_s),
             usable_s=phone.usable_s,
             fix=phone.fix,
             measured_s=phone.measured_s,
             was_usable=phone.was_usable,
             why=phone.why,
-            is_chosen=phone.name == self._rides,
+            is_chosen=phone.name == self._selected,
         )
 
 

@@ -23,7 +23,7 @@ REASONS: Mapping[StopReason, str] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannedStop:
-    """`since_s` is on the clock of whoever keeps it."""
+    """`since_s` is on the clock of its owner."""
 
     reason: StopReason
     since_s: float
@@ -31,7 +31,7 @@ class PlannedStop:
 
 
 def reason_of(found: object) -> StopReason:
-    """The reason that a log names; of another version it may be another word."""
+    """Return the reason that a log names; "parked" where another version of catgraph wrote another one."""
     return next((reason for reason in REASONS if reason == found), "parked")
 
 
@@ -41,8 +41,8 @@ def is_moving(speed_mps: float | None) -> bool:
 
 
 def silent_checks(checks: Iterable[AnyCheck]) -> frozenset[str]:
-    """Ids of the checks whose alarms make no sound in a planned stop: of the car and its link, and not critical. What
-    catgraph says of itself sounds, because the stop of a car does not explain it."""
+    """Ids of the checks whose alarms make no sound in a planned stop: of the car and its link, and not critical. Alarms
+    about catgraph itself sound, because the stop of a car does not explain them."""
     return frozenset(
         check.id
         for check in checks

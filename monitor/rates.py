@@ -8,7 +8,7 @@ from statistics import median_low
 
 WINDOW_S = 5.0  # window of the measured rate: long against Wi-Fi bunching, short for the operator …
 WINDOW_PERIODS = 5  # … or this many periods, for slow signals
-STALE_PERIODS = 10  # rides out bunching on Wi-Fi …
+STALE_PERIODS = 10  # tolerates bunching on Wi-Fi …
 STALE_FLOOR_S = 1.0  # … and no shorter than this for fast signals
 STARTING_S = (
     2.0  # before the rate is settled: lets a 1 Hz car pass where 10 Hz is usual, and still keeps the promise of 2 s
@@ -17,7 +17,7 @@ UNDECLARED_S = 10.0  # before the rate of a signal that may have any rate is set
 BLOCK_S = 2.5  # two blocks in a row that agree are a steady rate: 5 s after connecting at the earliest
 BLOCK_INTERVALS = 5
 STEADY_WITHIN = 0.1  # relative
-PROVISIONAL_BLOCKS = 6  # so long a learned rate is refined: its first blocks may hold the catching up of a hiccup
+PROVISIONAL_BLOCKS = 6  # so long a learned rate is refined: its first blocks may include a burst after a stall
 HICCUP_SHARE = 0.8  # a block below this share of the learned rate is a source that slowed down, and refines nothing
 DECIDED_BLOCKS = 4  # without agreement by then, the declared rate applies
 
@@ -63,7 +63,7 @@ class RateMeter:
         "period_s",
     )
 
-    # Both are asked at every message, and change seldom.
+    # Both are read at every message, and change seldom.
     period_s: float | None  # between two messages as far as known; until settled the longer of declared and observed
     # Age from which a reading is stale: max(10 periods, 1 s), more until the rate is settled, or as `hold` has it.
     horizon_s: float
@@ -92,7 +92,7 @@ class RateMeter:
         self._settle()
 
     def expect(self, set_hz: float | None) -> None:
-        """The operator's own figure; None or 0 hands back to learning."""
+        """Set the operator's own rate; None or 0: learn it."""
         self._set_hz = set_hz or None
         self._settle()
 
@@ -179,7 +179,7 @@ class RateMeter:
         if before_hz is None or abs(block_hz - before_hz) > STEADY_WITHIN * max(block_hz, before_hz):
             return
         learned_hz = self._learned_hz
-        # Only a clear step up is a new rate: following every wobble upward would ratchet the demand.
+        # Only a clear step up is a new rate: following every small rise would raise the expected rate step by step.
         if learned_hz is None or min(block_hz, before_hz) > (1 + STEADY_WITHIN) * learned_hz:
             self._learned_hz_before = learned_hz
             self._learned_blocks = [before_hz, block_hz]

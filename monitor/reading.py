@@ -13,7 +13,7 @@ from monitor.immutable import immutable
 
 AGEING_PERIODS = 3
 AGEING_FLOOR_S = 0.4  # three periods of a 75 Hz signal are one hiccup of Wi-Fi; a healthy link has its own 0.15 s
-DELAY_AT_MOST_S = 2.0  # later than this a value is old, however patient one is with a signal that comes seldom
+DELAY_AT_MOST_S = 2.0  # from this age a value is old, also of a signal that comes seldom
 
 Freshness = Literal["fresh", "ageing", "stale"]
 T_co = TypeVar("T_co", covariant=True)

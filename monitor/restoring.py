@@ -12,7 +12,7 @@ _FLAGS = {  # state → active, acknowledged; a log that begins in the middle of
     AlarmState.ACKED: (True, True),
     AlarmState.RTN_UNACKED: (False, False),
 }
-MOST = 400  # alarms: a log of our making names fewer
+MOST = 400  # alarms: a log of catgraph has fewer
 
 
 def restore(alarms: Mapping[str, Alarm], transitions: Iterable[Transition]) -> dict[str, Alarm]:

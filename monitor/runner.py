@@ -48,7 +48,7 @@ class Crash:
     check_id: str
     error: str  # "ZeroDivisionError: division by zero"
     where: str  # traceback
-    count: int  # ever; 1 is worth a line in the log
+    count: int  # ever; the first is logged
 
 
 class CheckRow(NamedTuple):
@@ -90,7 +90,7 @@ class CheckRunner:
                 raise TypeError(f"{check.id} found {finding!r}, which is no finding")
         except NotFresh as missing:
             finding = unknown(missing.why, short=missing.short)
-        except Exception as error:  # the one net: a broken check must not silence the others
+        except Exception as error:  # the only place that catches all: a broken check must not stop the others
             self._failed[check.id] = self._failed.get(check.id, 0) + 1
             self.crashes[check.id] = Crash(
                 check_id=check.id,

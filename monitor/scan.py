@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 # At 5 m, the obstacle distance, a plane tilted by 10° passes 0.9 m above or below the laser's height: beyond that it
 # misses what stands on the road, or measures the road itself.
 MOST_TILT_RAD = math.radians(10.0)
-WORTH_A_WORD_RAD = math.radians(2.0)  # a smaller tilt is the tolerance of a bracket
+REPORTED_TILT_RAD = math.radians(2.0)  # a smaller tilt is the tolerance of a bracket
 
 Origin = Literal["transforms", "settings", "profile", "assumed"]
 
@@ -33,7 +33,7 @@ class Mounting:
 
     @property
     def why_not(self) -> str | None:
-        """Why its scans say nothing of the road ahead; None: they do."""
+        """Why its scans show nothing of the road ahead; None: they do."""
         if self.why_unknown is not None:
             return f"Where the laser looks is not known: {self.why_unknown}"
         if self.tilt_rad > MOST_TILT_RAD:
@@ -42,21 +42,21 @@ class Mounting:
 
     @property
     def reservation(self) -> str | None:
-        """What limits a finding by its scans, in few words; None: nothing."""
+        """What limits a finding by its scans, in short; None: nothing."""
         if self.origin == "assumed":
             return "laser assumed to look ahead"
-        if self.tilt_rad > WORTH_A_WORD_RAD:
+        if self.tilt_rad > REPORTED_TILT_RAD:
             return f"laser tilted by {math.degrees(self.tilt_rad):.0f}°"
         return None
 
     @property
     def gap_words(self) -> str | None:
-        """What gaps are counted from, in few words; None: from the front bumper, as one expects."""
+        """What gaps are measured from, in short; None: from the front bumper, as expected."""
         return f"gap from {self.gap_from}: no bumper set" if self.gap_from else None
 
     @property
     def notes(self) -> list[str]:
-        """What is to be known of it, in few words each; where all is assumed, that alone."""
+        """Short notes on the mounting; where all is assumed, that alone."""
         gap = None if self.origin == "assumed" else self.gap_words
         return [note for note in (gap, self.note) if note]
 

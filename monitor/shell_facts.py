@@ -1,4 +1,4 @@
-"""What the server knows and the checks read: the link, the recorder, whom an alarm reaches, an order to slow."""
+"""Facts from the server that the checks read: the link, the recorder, whom an alarm reaches, an order to slow."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from monitor.immutable import immutable
 
 Phase = Literal["idle", "connecting", "failed", "monitoring", "lost"]
 
-# off: nothing is to be recorded; held: the link is lost, and the session goes on when it returns soon; saving: what
+# off: nothing is to be recorded; held: the link is lost, and the session continues if it returns soon; saving: what
 # was recorded is being completed; stopped: it was to record and cannot
 RecorderState = Literal["off", "recording", "saving", "held", "stopped"]
 
@@ -31,13 +31,11 @@ class LinkFacts:
     behind_mark: str | None = None  # a short text
     topics_subscribed: int = 0
     connected_s: float | None = None  # when the open connection was made
-    last_message_s: float | None = None  # when the car last said anything
+    last_message_s: float | None = None  # when the newest message of the car came
     published: frozenset[str] = frozenset()  # the signals that discovery found on the car
     carriers: Mapping[str, str] = field(default_factory=dict)  # signal → the topic that carries it
     compared: Mapping[str, tuple[str, ...]] | None = None  # signal → further topics of it; None: not known
-    undecided: Mapping[str, str] = field(
-        default_factory=dict
-    )  # signals that no topic carries yet, and why, in few words
+    undecided: Mapping[str, str] = field(default_factory=dict)  # signals that no topic carries yet, and why, in short
     log_trouble: str | None = None  # why the alarm log is not kept on the disk, as a sentence; None: it is
     late_s: float | None = None  # how late the messages are that come now; None: not known
     throttled: frozenset[str] = frozenset()  # the signals that are throttled because the link is too slow
@@ -66,7 +64,7 @@ class RecorderFacts:
     dropped_s: float | None = None  # when the newest of them came
     behind_s: float = 0.0  # how long the oldest message waits to be written
     left_gb: float | None = None  # what may still be recorded before a limit stops it; None: not known yet
-    limit: str = ""  # which limit that is, in a few words
+    limit: str = ""  # which limit that is, in short
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -39,22 +39,22 @@ MODES_KEPT = 64  # changes; a topic that flickered with every message at 1000 Hz
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HeardMode:
-    """From this moment on the car said so."""
+class ReceivedMode:
+    """The car reported this mode from this moment on."""
 
     number: int  # counts the changes, from 1 on
     at_s: float  # received
     value: DriveMode
 
 
-class HeardModes:
-    """Every change of what the car says of who drives, between one judgement and the next.
+class ReceivedModes:
+    """Every change of the mode that the car reports, between one judgement and the next.
 
     Follows the messages of the mode; bounded.
     """
 
     def __init__(self) -> None:
-        self.changes: tuple[HeardMode, ...] = ()
+        self.changes: tuple[ReceivedMode, ...] = ()
         self._count = 0
 
     def add(self, at_s: float, value: DriveMode) -> None:
@@ -62,10 +62,10 @@ class HeardModes:
         if self.changes and self.changes[-1].value == value:
             return
         self._count += 1
-        self.changes = (*self.changes[-MODES_KEPT + 1 :], HeardMode(number=self._count, at_s=at_s, value=value))
+        self.changes = (*self.changes[-MODES_KEPT + 1 :], ReceivedMode(number=self._count, at_s=at_s, value=value))
 
     def forget(self) -> None:
-        """The clock went back: what was heard before has no time any more."""
+        """The clock went back: what was received before has no valid time any more."""
         self.changes = ()
 
 
@@ -108,7 +108,7 @@ class Snapshot:
     reach: ReachFacts | None = None  # operators that can hear an alarm; None: not applicable, as in a recording
     slowing: SlowingFacts = field(default_factory=SlowingFacts)
     slow_proof: SlowProof = NOTHING_SHOWN  # what the car's speed shows of the order
-    modes_heard: tuple[HeardMode, ...] = ()  # the newest changes of what the car says of who drives, oldest first
+    modes_received: tuple[ReceivedMode, ...] = ()  # the newest changes of the mode that the car reports, oldest first
 
     @overload
     def get(self, signal: Literal["speed"]) -> Reading[Twist] | None: ...
@@ -177,11 +177,11 @@ class Snapshot:
         reading = self.readings.get(signal)
         label = SIGNALS[signal].label
         undecided = self.link.undecided.get(signal) if self.link.undecided else None
-        if undecided is not None:  # what came before is not trusted either
+        if undecided is not None:  # earlier values are not used either
             raise NotFresh(f"{label}: {undecided}", "not set")
         unusable = self.unusable.get(signal)
         if unusable is not None and (reading is None or not reading.is_fresh(self.now_s)):
-            raise NotFresh(f"{label}: {unusable.words}", "unusable")
+            raise NotFresh(f"{label}: {unusable.text}", "unusable")
         if reading is None:
             if signal in self.link.published:
                 raise NotFresh(f"{label}: nothing received yet", "no data")

@@ -21,9 +21,9 @@ REPEATS = 3  # messages with one place
 class Shown(NamedTuple):
     """The speed by one source. A tuple, because several are made with each tick."""
 
-    by: str  # in words: a topic, "GPS", "the poses of /odom"
+    by: str  # as text: a topic, "GPS", "the poses of /odom"
     pace: Pace | None  # None: not known
-    why_not: str = ""  # why it proves nothing, in words
+    why_not: str = ""  # why it proves nothing, as text
     short: str = ""  # the same in at most 8 letters
 
 
@@ -118,8 +118,8 @@ def allowed_mps(a: Pace, b: Pace, *, least_mps: float, share: float) -> float:
 
 
 def is_in_dispute(snapshot: Snapshot, over_ground_mps: float, speed_mps: float) -> bool:
-    """Whether the position moves as a car does, and so much faster than the wheels that their comparison will say so
-    whatever its limits; or is about to, for it still gains speed."""
+    """Whether the position moves as a car does, and so much faster than the wheels that their comparison will fail
+    whatever its limits; or is about to, because it still gains speed."""
     made = snapshot.compared.made.get("position")
     if made is None or made.error_mps > POOR_MPS or not (snapshot.gps.is_smooth and _is_apart("position", snapshot)):
         return False

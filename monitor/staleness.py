@@ -13,7 +13,7 @@ OVERDUE_S = 0.3  # later than this nothing of Wi-Fi's usual bunching explains
 FAST_HORIZON_S = 2.0  # signals that would be missed within the 2 s in which silence is to be named
 FALTERS_AT = 0.5  # of its horizon: an announced silence ends when no gap comes near another
 CROWD = 3  # so many fast signals do not die at one moment by themselves
-OTHERS_S, OTHERS_PERIODS = 1.5, 1.5  # another signal goes on if its newest message is no older than this
+OTHERS_S, OTHERS_PERIODS = 1.5, 1.5  # another signal continues if its newest message is no older than this
 BRIDGE_WITHIN_S = 2.6  # a half-open link is found within 2.5 s: then it has been called lost, or the bridge is alive
 REGULAR = frozenset(name for name, one in SIGNALS.items() if not (one.event_like or one.by_parts))
 

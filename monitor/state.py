@@ -18,7 +18,7 @@ from monitor.shell_facts import LinkFacts, Phase, ReachFacts, RecorderFacts, Slo
 from monitor.signal_stats import MeasuredRates, SignalStats, extend, keep
 from monitor.signals import SIGNALS
 from monitor.slow_proof import ProofFollower
-from monitor.snapshot import HeardModes, NotFresh, Snapshot
+from monitor.snapshot import NotFresh, ReceivedModes, Snapshot
 from monitor.tracks import TrackPoint
 from monitor.unusable import Unusable, refused, without
 from monitor.values import Diagnostics, DriveMode, GpsFix, LaserScan, Twist, Value
@@ -54,7 +54,7 @@ class State:
         self._scans = Scans()
         self._phones = Phones()
         self._fix_s = -math.inf  # when the newest position was sent
-        self._rides: str | None = None
+        self._phone_in_car: str | None = None
         self._scan_history = self._stats["scan"].history = ReadingHistory()
         self._distance_history = self._stats["distance"].history = ReadingHistory()
         # Public to read, written by `link` and `set_paused` only: read at every message.
@@ -64,7 +64,7 @@ class State:
         self._reach: ReachFacts | None = None
         self._slowing = SlowingFacts()
         self._slow_proof = ProofFollower()
-        self._modes = HeardModes()
+        self._modes = ReceivedModes()
         self._paused_since_s: float | None = None
 
     def expect(self, expected_hz: Mapping[str, float]) -> None:
@@ -138,7 +138,7 @@ class State:
         )
 
     def forget(self, signal: str) -> None:
-        """What was received of a signal is void, and so is what was derived from it: its unit was another."""
+        """Discard what was received of a signal and what was derived from it: its unit has changed."""
         forget(signal, self._stats[signal], self._table, self._derived)
 
     def receive_phone(self, report: PhoneReport, now_s: float) -> None:
@@ -149,7 +149,7 @@ class State:
     def ride(self, phone: str | None, now_s: float) -> None:
         """Set the phone in the car, chosen by the operator; None: no choice."""
         self._follow_clock(now_s)
-        self._rides = phone
+        self._phone_in_car = phone
         self._phones.ride(phone, now_s)
 
     def get(self, signal: str) -> Reading[Any] | None:
@@ -241,7 +241,7 @@ class State:
             reach=self._reach,
             slowing=self._slowing,
             slow_proof=self._slow_proof.proof,
-            modes_heard=self._modes.changes,
+            modes_received=self._modes.changes,
         )
 
     def glance(self, now_s: float) -> Snapshot:
@@ -268,7 +268,7 @@ class State:
         self._scans.forget_times()
         self._derived.comparisons.restart()
         self._phones = Phones()  # they report again within seconds
-        self._phones.ride(self._rides, at_s)
+        self._phones.ride(self._phone_in_car, at_s)
         self._table.shift(shift_s)
         self._unusable = MappingProxyType({})
         if self._heard_s is not None:

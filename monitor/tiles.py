@@ -50,14 +50,14 @@ def tiles(places: Sequence[Place], findings: Mapping[str, Finding]) -> list[Tile
 def _tile_at(place: Place, findings: Mapping[str, Finding]) -> Tile:
     found = [findings.get(check_id, NOT_YET) for check_id in place.checks]
     if len(found) == 1:
-        return _saying(place, found[0].verdict, found[0].text, found[0].brief)
+        return _tile(place, found[0].verdict, found[0].text, found[0].brief)
     relevant = [finding for finding in found if finding.applies] or found
     verdict = _worst(relevant)
-    text, brief = _words(verdict, [finding for finding in relevant if finding.verdict is verdict], len(relevant))
-    return _saying(place, verdict, text, brief)
+    text, brief = _texts(verdict, [finding for finding in relevant if finding.verdict is verdict], len(relevant))
+    return _tile(place, verdict, text, brief)
 
 
-def _saying(place: Place, verdict: Verdict, text: str, brief: str) -> Tile:
+def _tile(place: Place, verdict: Verdict, text: str, brief: str) -> Tile:
     return Tile(id=place.id, label=place.label, verdict=verdict, text=text, brief=brief, checks=place.checks)
 
 
@@ -72,7 +72,7 @@ def _worst(findings: Sequence[Finding]) -> Verdict:
     return worst
 
 
-def _words(verdict: Verdict, those: Sequence[Finding], of: int) -> tuple[str, str]:
+def _texts(verdict: Verdict, those: Sequence[Finding], of: int) -> tuple[str, str]:
     first = those[0]
     if all(finding.text == first.text for finding in those):
         return first.text, first.brief

@@ -22,9 +22,9 @@ ENDS_S = 0.5  # of that, what is averaged at either end …
 SPAN_S = 1.0  # … and the least distance of the ends
 MOVES_ABOVE_MPS = 0.5  # drift of a standing receiver stays below (19 m in a minute at the worst); a walk is above
 STANDS_BELOW_MPS = 0.3
-CHORD_M = 1.0  # the way is summed in chords of at least this, or of two sigma of a receiver that knows its own
+CHORD_M = 1.0  # the way is summed in chords of at least this, or of two sigma of a receiver that reports its own
 CHORD_AT_MOST_M = 10.0
-GAP_S = 5.0  # after a longer gap the current wheel speed says nothing about the distance in it
+GAP_S = 5.0  # after a longer gap the current wheel speed proves nothing about the distance in it
 FASTEST_MPS = 70.0
 JUMP_M = 10.0
 POINTS = 2000
@@ -55,7 +55,7 @@ class Trail:
         return self._fixes[-1][0] if self._fixes else -math.inf
 
     def add(self, fix: GpsFix, at_s: float) -> None:
-        """One position. Without a fix, and when the clock went back, what was known is no guide any more."""
+        """One position. Without a fix, and when the clock went back, the positions before are discarded."""
         fixes = self._fixes
         if fix.status < 0 or not (math.isfinite(fix.lat_deg) and math.isfinite(fix.lon_deg)):
             fixes.clear()

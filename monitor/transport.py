@@ -5,7 +5,7 @@ connection. So a message that arrives after the answer was written after the pin
 of the car is needed, and a delay that exists from the first message on is measured too.
 
 A message may have waited before it was written. ROS 1's rosbridge, and ours, keep a queue for each subscription and
-hold one message more in the hand while the connection takes nothing. A message cannot have entered a queue of `q`
+hold one message more beside the queue while the connection takes nothing. A message cannot have entered a queue of `q`
 before the message that came `q + 1` before it was written; the mark known at *that* arrival bounds its age.
 
 Stamps only make the bound a little tighter. Any clock will do: its offset is bounded by the message that waited least,
@@ -32,7 +32,7 @@ OLDER_S = 0.5  # the first message of a topic that is so much older by its stamp
 OLDEST_S = 30 * 86_400.0  # a stamp that is further behind is of another clock
 PLACE_PERIODS = 2.0  # a mean of a burst is too short
 KEPT_S = 10.0  # the offset of a clock is the least of the last one to two of these: ±200 ppm are 4 ms
-RECENT_S = 3.0  # a topic that was silent for longer says nothing of the link now …
+RECENT_S = 3.0  # a topic that was silent for longer shows nothing of the link now …
 FAST_S = 0.5  # … nor does one that comes less often than this, where others come more often
 USUAL_S = 30.0  # what a link needs when nothing waits is the least round trip of one to two of these …
 USUAL_AT_MOST_S = 1.0
@@ -101,7 +101,7 @@ class _Topic:
         self.stamped = 0  # messages with a stamp on this connection
 
     def restart(self) -> None:
-        """What came over another connection says nothing of this one, but for how often it comes."""
+        """Begin anew on another connection: of the one before only the usual intervals are kept."""
         self.marks.clear()
         self.clock = _Clock()
         self.by_clock = StampedDelay()
@@ -276,11 +276,12 @@ class TransportDelay:
         if queued_s - since_mark_s <= EXACT_WITHIN_S:
             return queued_s
         # The connection takes nothing until it is empty; so long the answer of a ping waits too. Each time it takes
-        # something again, at least one message of each topic goes.
+        # something again, at least one message of each topic is sent.
         shut_s = places * self._shut_s(self._longest_shut_s, at_s)
         if topic.queue_length == 1 and topic.period_s is not None:
             # A longer queue may hold what came before several shuts. One place holds the newest: it came a
-            # period before what was in the hand was taken; and a shut that ended before the mark was over by then.
+            # period before the message beside the queue was taken; and a shut that ended before the
+            # mark was over by then.
             shut_s = min(shut_s, self._shut_s(self._mark_shut_s, at_s) + PLACE_PERIODS * topic.period_s)
         return min(queued_s, since_mark_s + shut_s + topic.held_s)
 
@@ -319,7 +320,7 @@ class TransportDelay:
         }
 
     def queued_s(self, now_s: float) -> float:
-        """How much of that is because more is asked of the link than it carries."""
+        """How much of that is queueing: more is requested than the link carries."""
         return max(0.0, self.late_s(now_s) - min(self._usual_trip_s, self._usual_before_s, USUAL_AT_MOST_S))
 
     @property

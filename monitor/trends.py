@@ -1,8 +1,8 @@
 """The last minute of a few signals and of every check.
 
-Bounded: a ring of one minute for each signal, however fast it speaks, and for each check that ever measured. Of signals
-the lowest and the highest number heard in each fifth of a second are kept, so that no peak of a fast signal is lost
-between two points. A check is looked at once in each step; what it found between two looks is in its alarm.
+Bounded: a ring of one minute for each signal, whatever its rate, and for each check that ever measured. Of signals
+the lowest and the highest number received in each fifth of a second are kept, so that no peak of a fast signal is lost
+between two points. A check is sampled once in each step; what it found between two samples is in its alarm.
 """
 
 from __future__ import annotations
@@ -123,11 +123,11 @@ class CheckMinute:
     def __init__(self) -> None:
         self._rings: dict[str, _Ring] = {}
         self._since: dict[str, tuple[Verdict, float]] = {}
-        self._step: int | None = None  # the newest that was looked at
+        self._step: int | None = None  # the newest that was sampled
         self._first = 0
 
     def note(self, findings: Mapping[str, Finding], now_s: float) -> None:
-        """Look at what the checks found, once in a step."""
+        """Sample the findings of the checks, once in a step."""
         step = math.floor(now_s / STEP_S)
         if step == self._step:
             return

@@ -1,7 +1,7 @@
-"""When catgraph slows the car by itself: rules as data, each off until somebody switches it on, rehearsable on any
+"""When catgraph slows the car by itself: rules as data, each off until an operator enables it, and testable on any
 recording.
 
-A rule watches checks. Once one of them has said FAULT for as long as the rule asks, the rule is due: a count-down
+A rule watches checks. Once one of them has found FAULT for as long as the rule requires, the rule is due: a countdown
 begins, in which the operator may veto it. A veto counts until the fault has gone: it does not switch the rule off.
 """
 
@@ -65,7 +65,7 @@ class Due:
     """A rule whose time has come."""
 
     trigger: Trigger
-    text: str  # what the check says
+    text: str  # the check's finding
     since_s: float
 
 
@@ -99,7 +99,7 @@ class Triggers:
         return due
 
     def veto(self, trigger_id: str) -> None:
-        """Not this time: until its fault has gone the rule is not due again."""
+        """Veto the rule: it is not due again until its fault has gone."""
         self._vetoed.add(trigger_id)
 
     def forget(self) -> None:

@@ -63,7 +63,7 @@ def kept_speed_mps(late_s: float | None) -> float | None:
 
 
 def unseen_words(metres: float | None) -> str:
-    """A bound as it is read, never rounded down: "≤ 2.8 m unseen"."""
+    """A bound as text, never rounded down: "≤ 2.8 m unseen"."""
     if metres is None:
         return "metres unseen not known"
     if metres > 999.0:

@@ -24,7 +24,7 @@ class Unusable:
     wrong_s: float | None = None  # when the newest wrong one came, where declared ones came after it
 
     @property
-    def words(self) -> str:
+    def text(self) -> str:
         """The reason as it follows the name of the signal: "not a number (linear.x)"."""
         field, is_not, rest = self.reason.partition(NOT_A_NUMBER)
         return f"not a number ({field})" if is_not and not rest else self.reason

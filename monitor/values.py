@@ -1,4 +1,4 @@
-"""What the messages of a vehicle say, decoded: SI units, degrees only for WGS84 and compass headings."""
+"""The contents of a vehicle's messages, decoded: SI units, degrees only for WGS84 and compass headings."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Steering:
 class Distance:
     """Distance to the nearest object ahead."""
 
-    distance_m: float | None  # None: nothing in range, or the estimator did not say
+    distance_m: float | None  # None: nothing in range, or not reported by the estimator
     none_in_range: bool = False
 
 
@@ -77,7 +77,7 @@ class GpsFix:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhoneFix:
-    """What the operator's phone says of its own place, as the W3C Geolocation API has it (WGS84)."""
+    """The position of an operator's phone, as the W3C Geolocation API reports it (WGS84)."""
 
     lat_deg: float
     lon_deg: float
@@ -85,7 +85,7 @@ class PhoneFix:
     alt_m: float | None = None  # above the ellipsoid
     speed_mps: float | None = None
     heading_deg: float | None = None  # 0 north, clockwise; None while standing
-    at_ms: float | None = None  # by the phone's own clock, which may be wrong by hours: to look at, not to reckon with
+    at_ms: float | None = None  # by the phone's own clock, which may be wrong by hours: for display only
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,7 +155,7 @@ class Component:
     name: str
     level: int  # 0 OK, 1 WARN, 2 ERROR, 3 STALE
     message: str
-    # When it reported, on the receiver's clock, where its interval is not known; no part of what it said.
+    # When it reported, on the receiver's clock, where its interval is not known; no part of its report.
     once_s: float | None = field(default=None, compare=False)
 
 
@@ -172,7 +172,7 @@ class Diagnostics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionCommand:
-    """What the vehicle is asked to do."""
+    """The motion that the vehicle is commanded."""
 
     speed_mps: float | None
     tyre_angle_rad: float | None  # counter-clockwise; not a yaw rate
@@ -191,10 +191,10 @@ Mode = Literal["autonomous", "manual", "unknown"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveMode:
-    """Who drives, as the car says."""
+    """Who drives, as the car reports it."""
 
-    mode: Mode  # unknown: it says something of which the meaning is not known
-    said: str  # in the car's own words, short
+    mode: Mode  # unknown: the meaning of its report is not known
+    text: str  # the car's own name of the mode, short
     number: int | None = None  # of a plain number, whose meaning is a setting
 
 

@@ -21,7 +21,7 @@ from monitor.snapshot import Snapshot
 
 AT_LEAST = 3  # signals: fewer are judged each by itself
 SHARE, SHARE_WHILE_ACTIVE = 0.5, 0.3
-DEADBAND_PERCENT = 3.0  # rates at the very limit neither come nor go
+DEADBAND_PERCENT = 3.0  # hysteresis for rates at the limit
 
 
 def find(snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:

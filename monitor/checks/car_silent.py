@@ -29,7 +29,7 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     if not found.is_silent and not (was_active and found.falters):
         return ok(f"{found.fresh} of {found.regular} signals come")
     if not (found.is_bridge_proved or was_active or found.silent_s > BRIDGE_WITHIN_S):
-        # Car or link? Wait for the bridge's next sign of life: a lost link has its own words.
+        # Car or link? Wait for the bridge's next sign of life: a lost link has its own text.
         return unknown(f"No message for {found.silent_s:.1f} s, pinging the bridge", short="silent")
     if not found.is_silent:
         proof = "messages come with gaps"

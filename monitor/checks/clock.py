@@ -32,7 +32,7 @@ from monitor.snapshot import Snapshot
 
 REPORTED_S = 10.0  # a jump is instantaneous; it is reported for this time
 ANOTHER_TIME_S = 86_400.0
-STUCK_AFTER = 3  # equal stamps: a constant stamp has its own alarm and says nothing about the clock
+STUCK_AFTER = 3  # equal stamps: a constant stamp has its own alarm and proves nothing about the clock
 
 
 class ClockLimits(Limits):
@@ -64,13 +64,13 @@ def jumps(snapshot: Snapshot, limits: ClockLimits, was_active: bool) -> Finding:
             return absent("No message of the car has a stamp", brief="no stamps")
         return ok("The car's clock has not jumped since connecting")
     ago_s = max(0.0, snapshot.now_s - jump.at_s)
-    how = f"{'ahead' if jump.by_s > 0 else 'back'} by {_words(abs(jump.by_s))}"
+    how = f"{'ahead' if jump.by_s > 0 else 'back'} by {_duration_text(abs(jump.by_s))}"
     if abs(jump.by_s) <= limits.jump_s or ago_s > REPORTED_S:
-        return ok(f"It jumped {how} {_words(ago_s)} ago and is steady since then")
+        return ok(f"It jumped {how} {_duration_text(ago_s)} ago and is steady since then")
     labels = ", ".join(SIGNALS[name].label for name in jump.signals)
     return fault(
         f"The car's clock jumped {how} ({labels})",
-        brief=f"{'+' if jump.by_s > 0 else '−'}{_words(abs(jump.by_s))}",
+        brief=f"{'+' if jump.by_s > 0 else '−'}{_duration_text(abs(jump.by_s))}",
         measured=Quantity(label="Jump", value=jump.by_s, unit="s"),
         limit=Quantity(label="Allowed", value=limits.jump_s, unit="s"),
         causes=("clock",),
@@ -86,22 +86,22 @@ def differs(snapshot: Snapshot, limits: ClockLimits, was_active: bool) -> Findin
     offset_s = _offset_s(stamped, snapshot.link.wall_zero_s)
     if offset_s is not None and abs(offset_s) > ANOTHER_TIME_S:
         return unknown(
-            f"The stamps are {_words(abs(offset_s))} {'ahead of' if offset_s > 0 else 'behind'} this server:"
+            f"The stamps are {_duration_text(abs(offset_s))} {'ahead of' if offset_s > 0 else 'behind'} this server:"
             " a recording, a simulation, or a clock that was never set",
             short="another",
         )
-    # Only what every stamped signal shows is the clock's doing, or the radio's: one alone is its own driver's.
+    # Only what every stamped signal shows is due to the clock or the radio; a single one is due to its own driver.
     change_s = _nearest(stamped, lambda reading: reading.stamp_change_s or 0.0)
     slack = 0.8 if was_active else 1.0
     if abs(change_s) > limits.late_s * slack:
         return _changed(change_s, limits)
     if offset_s is None:
         return ok(f"Stamps {abs(change_s):.1f} s from usual; the time of day is unknown")
-    text = f"Car's clock {_words(abs(offset_s))} {'ahead of' if offset_s > 0 else 'behind'} this server"
+    text = f"Car's clock {_duration_text(abs(offset_s))} {'ahead of' if offset_s > 0 else 'behind'} this server"
     if abs(offset_s) > limits.offset_s * slack:
         return fault(
             text,
-            brief=f"{'+' if offset_s > 0 else '−'}{_words(abs(offset_s))}",
+            brief=f"{'+' if offset_s > 0 else '−'}{_duration_text(abs(offset_s))}",
             measured=Quantity(label="Offset", value=offset_s, unit="s"),
             limit=Quantity(label="Allowed", value=limits.offset_s, unit="s"),
             causes=("offset",),
@@ -141,7 +141,7 @@ def _nearest(stamped: list[Reading[object]], difference_s: Callable[[Reading[obj
     return min((difference_s(reading) for reading in stamped), key=abs)
 
 
-def _words(seconds: float) -> str:
+def _duration_text(seconds: float) -> str:
     """A time in the unit a person would name it in."""
     for unit, size in (("years", 365.25 * 86_400), ("days", 86_400), ("h", 3600), ("min", 60)):
         if seconds >= 2 * size:

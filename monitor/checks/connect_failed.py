@@ -22,8 +22,8 @@ from monitor.snapshot import Snapshot
 def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     link = snapshot.link
     if link.phase == "failed":
-        words = (link.problem_title or "The car cannot be reached.", link.problem_hint or "")
-        return fault(" ".join(word for word in words if word), brief="no answer", causes=("link",))
+        parts = (link.problem_title or "The car cannot be reached.", link.problem_hint or "")
+        return fault(" ".join(part for part in parts if part), brief="no answer", causes=("link",))
     if link.phase in ("monitoring", "lost"):
         return ok("The car was reached")
     return absent("Connecting", brief="connecting")

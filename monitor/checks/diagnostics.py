@@ -27,7 +27,7 @@ from monitor.snapshot import Snapshot
 from monitor.values import Component
 
 OK_LEVEL, WARN, ERROR, STALE = 0, 1, 2, 3  # diagnostic_msgs/DiagnosticStatus
-WORDS = {WARN: "warns", ERROR: "error", STALE: "stale"}
+LEVELS = {WARN: "warns", ERROR: "error", STALE: "stale"}
 NAMED = 3  # components in the text; the rest are counted
 
 
@@ -57,7 +57,7 @@ def _once(components: Sequence[Component], now_s: float) -> str:
 
 def _text(bad: list[Component]) -> str:
     listed = [
-        f"{component.name[:60]} {WORDS[component.level]}{f': {component.message[:80]}' if component.message else ''}"
+        f"{component.name[:60]} {LEVELS[component.level]}{f': {component.message[:80]}' if component.message else ''}"
         for component in bad[:NAMED]
     ]
     more = f"; and {len(bad) - NAMED} more" if len(bad) > NAMED else ""

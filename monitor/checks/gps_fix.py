@@ -1,8 +1,8 @@
 """Does the receiver have a fix, and does it report its quality?
 
 Covariance is trusted only if its type is at least APPROXIMATED and its values are finite and above zero
-(sensor_msgs/NavSatFix); the real car marks zeros as known. Rejecting unknown quality, as the report wants, is a
-setting, off by default, because it would always reject the real car.
+(sensor_msgs/NavSatFix); the real car marks zeros as known. Rejecting unknown quality is a setting, off by
+default, because it would always reject the real car.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def has_fix(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
         return absent("Position is not published")
     fix = snapshot.need("position")
     if fix.status == STATUS_UNSET:
-        return fault("The receiver does not say whether it has a fix", brief="fix unset", causes=("position",))
+        return fault("The receiver does not report whether it has a fix", brief="fix unset", causes=("position",))
     if fix.is_unset:
         text = "The receiver reports a fix with coordinates 0, 0: it has no position yet"
         return fault(text, brief="no place", causes=("position",))

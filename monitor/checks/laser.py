@@ -55,7 +55,7 @@ def _laser_is_absent(snapshot: Snapshot) -> bool:
 
 @lru_cache(maxsize=16)
 def _straight_ahead(mounting: Mounting | None) -> Corridor:
-    """That of the obstacle check with its default measures, so that a scan is looked at once for both."""
+    """That of the obstacle check with its default measures, so that a scan is evaluated once for both."""
     usual = ObstacleLimits()
     if mounting is None or mounting.x_m is None:
         place = {"laser_ahead_m": usual.laser_ahead_m, "laser_left_m": mounting.y_m if mounting is not None else 0.0}

@@ -37,14 +37,14 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     return fault(
         f"{link.behind_title} {link.behind_hint or ''}".strip()
         if link.behind_title
-        else _words(link.bridge_answers, link.topics_subscribed),
+        else _cause_text(link.bridge_answers, link.topics_subscribed),
         brief="no message",
         measured=Quantity(label="Waited", value=waited_s, unit="s"),
         causes=("car",),
     )
 
 
-def _words(bridge_answers: bool, topics: int) -> str:
+def _cause_text(bridge_answers: bool, topics: int) -> str:
     spoke = f"0 of {topics} topics sent data within {WITHIN_S:.0f} s."
     if not bridge_answers:
         return f"Connected, but neither the bridge's ROS side nor the car answers. {spoke}"

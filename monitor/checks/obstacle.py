@@ -30,7 +30,7 @@ from monitor.scan import within_half_turn
 from monitor.snapshot import NotFresh, Snapshot
 
 CLOSING_AT_LEAST_MPS = 0.3  # slower is noise of two distances
-APPROACH_AT_MOST_MPS = 10.0  # what comes towards us faster is not on a test site
+APPROACH_AT_MOST_MPS = 10.0  # nothing on a test site approaches faster
 STEADY_WITHIN_M = 3.0  # a gap that shrank more than the car can drive in between is another object's
 
 

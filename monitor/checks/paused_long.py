@@ -63,7 +63,7 @@ CHECKS = (
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.MEDIUM,
-            needs_ack=False,  # to go on is to have seen it
+            needs_ack=False,  # resuming shows that it was seen
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
             advice="Press Resume: until then nothing is checked and no alarm is raised.",
         ),

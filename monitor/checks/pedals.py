@@ -22,7 +22,7 @@ from monitor.check import (
 )
 from monitor.snapshot import Snapshot
 
-DEADBAND_PERCENT = 1.0  # a foot that rests on a pedal is less still than one quantum of the car's figures, 100/255
+DEADBAND_PERCENT = 1.0  # a resting foot moves by more than one quantum of the car's values, 100/255
 
 
 class PedalLimits(Limits):

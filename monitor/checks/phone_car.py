@@ -70,8 +70,8 @@ def _why_not(snapshot: Snapshot, was_active: bool) -> Finding | None:
         return unknown("The car's receiver has no fix", short="no fix")
     reason = view.why_not(now_s)
     if reason is not None:
-        words = why_words(reason, view, now_s, name_of(view))
-        return unknown(words.sentence, short=words.short)
+        reason_text = why_words(reason, view, now_s, name_of(view))
+        return unknown(reason_text.sentence, short=reason_text.short)
     return None
 
 
@@ -121,7 +121,7 @@ def move_as_one(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -
         if _drives(snapshot):
             return unknown(f"{text[0].upper()}{text[1:]}", short="near")
         return unknown(f"Standing: {text}", short="standing")
-    r = 0.0 if tracks.correlation is None else tracks.correlation  # a phone that never moved moves with nothing
+    r = 0.0 if tracks.correlation is None else tracks.correlation  # a phone that never moved has no correlation
     least = limits.least_correlation
     text = f"The tracks correlate with {beside(r, least, 2)}; {least:.2f} is the least"
     measured = Quantity(label="Correlation", value=r, unit="r")

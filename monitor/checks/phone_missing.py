@@ -47,12 +47,12 @@ def find(snapshot: Snapshot, limits: MissingLimits, was_active: bool) -> Finding
         return _none("This is not a phone: no position is expected", was_active)
     if why == "silent" and not view.was_usable and not view.is_chosen:
         return _none("No phone is sharing its position", was_active)  # nothing was lost with it
-    words, missing_s = why_words(why, view, now_s, name_of(view)), view.missing_s(now_s)
+    reason_text, missing_s = why_words(why, view, now_s, name_of(view)), view.missing_s(now_s)
     if missing_s < limits.after_s and not was_active:
-        return unknown(words.sentence, short=words.short)
+        return unknown(reason_text.sentence, short=reason_text.short)
     return fault(
-        words.sentence,
-        brief=words.brief,
+        reason_text.sentence,
+        brief=reason_text.brief,
         measured=Quantity(label="Missing for", value=missing_s, unit="s"),
         limit=Quantity(label="Reported after", value=limits.after_s, unit="s"),
         causes=("phone",),

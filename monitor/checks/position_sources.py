@@ -102,7 +102,7 @@ def receives(snapshot: Snapshot, limits: PositionLimits, was_active: bool) -> Fi
         if silent_s is not None:
             lost.append((one.topic, f"Nothing from {one.topic} for {silent_s:.0f} s"))
         elif status == STATUS_UNSET:
-            unclear.append(f"{one.topic} does not say whether it has a fix")
+            unclear.append(f"{one.topic} does not report whether it has a fix")
         elif status < 0:
             lost.append((one.topic, f"No fix at {one.topic}"))
     for topic, awaited_s in _awaited_s(snapshot).items():
@@ -112,7 +112,7 @@ def receives(snapshot: Snapshot, limits: PositionLimits, was_active: bool) -> Fi
             unclear.append(f"No message from {topic} yet")
     if lost:
         goes_on = "the position" if carrier is None else f"the position of {carrier}"
-        text = f"{'; '.join(words for _, words in lost)}; {goes_on} continues without it"
+        text = f"{'; '.join(sentence for _, sentence in lost)}; {goes_on} continues without it"
         return fault(text, brief="no receiver", causes=tuple(topic for topic, _ in lost))
     if unclear:
         return unknown("; ".join(unclear), short="unclear")
@@ -138,15 +138,15 @@ def agree(snapshot: Snapshot, limits: PositionLimits, was_active: bool) -> Findi
             unclear.append(f"{one.topic} has no fix")
         else:
             distance_m, allowed_m = _apart_m(reading, one.reading, mps, limits)
-            words = f"{beside(distance_m, allowed_m)} m from that of {one.topic}; up to {allowed_m:.1f} m is normal"
+            part = f"{beside(distance_m, allowed_m)} m from that of {one.topic}; up to {allowed_m:.1f} m is normal"
             if distance_m > allowed_m * (0.8 if was_active else 1.0):
-                apart.append((distance_m / allowed_m, distance_m, allowed_m, words))
+                apart.append((distance_m / allowed_m, distance_m, allowed_m, part))
             else:
-                near.append(words)
+                near.append(part)
     if apart:
-        _, distance_m, allowed_m, words = max(apart)
+        _, distance_m, allowed_m, part = max(apart)
         return fault(
-            f"The position is {words}",
+            f"The position is {part}",
             brief=f"{distance_m:.0f} m",
             measured=Quantity(label="Distance apart", value=distance_m, unit="m"),
             limit=Quantity(label="Allowed", value=allowed_m, unit="m"),

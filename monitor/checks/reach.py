@@ -40,7 +40,7 @@ def find(snapshot: Snapshot, limits: ReachLimits, was_active: bool) -> Finding:
     if facts.can > 0:
         pages = f"operator page{'' if facts.of == 1 else 's'}"
         text = f"Alarms audible on {facts.can} of {facts.of} {pages}"
-        return ok(text, measured=measured, ended="Alarms can be heard again")
+        return ok(text, measured=measured, ended="Alarms are audible again")
     why = f"none of {facts.of} ({facts.why})" if facts.of else "no operator's phone is connected"
     speed = snapshot.get("speed")
     if speed is None:

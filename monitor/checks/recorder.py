@@ -132,7 +132,7 @@ def has_room(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> F
     if facts.state not in ("recording", "saving", "held"):
         return absent("Nothing is recorded now", brief="not recording")
     if facts.left_gb is None:
-        return unknown("The free space of the disk is unknown", short="no word")
+        return unknown("The free space of the disk is unknown", short="no data")
     left_gb, warn_gb = facts.left_gb, limits.warn_gb
     measured = Quantity(label="Room", value=round(left_gb, 2), unit="GB")
     limit = Quantity(label="Warn below", value=warn_gb, unit="GB")

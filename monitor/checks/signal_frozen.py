@@ -37,9 +37,9 @@ from monitor.values import GpsFix, LaserScan
 BY_MOTION = frozenset({"position", "odometry", "scan"})
 BY_NOISE = frozenset({"speed", "acceleration", "heading"})
 LEAST_WAY_M = 3.0  # a position in whole metres, or of a receiver that holds it at a crawl, has changed by then
-LEAST_REPEATS = 3  # two messages of one stamp are a driver's way of correcting itself
+LEAST_REPEATS = 3  # drivers correct themselves by a second message with the same stamp
 LIVELY = 0.8  # share of messages with a new value: 0.97 on the real car; below, a held value proves nothing
-HOLDS = 0.5  # of the limits: what moves on once in a while is not clear until it moves on twice as often
+HOLDS = 0.5  # of the limits: a value that changes now and then clears only once it changes twice as often
 RETURNS = 20  # a scan with fewer may see nothing but parts of the car itself
 
 

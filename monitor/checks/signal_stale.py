@@ -36,7 +36,7 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
         return unknown(f"{signal.label}: {snapshot.link.undecided[signal.name]}", short="not set")
     unusable = snapshot.unusable.get(signal.name)
     if unusable is not None and unusable.is_coming(snapshot.now_s):
-        return ok(f"{signal.label}: messages arrive, {unusable.words}")
+        return ok(f"{signal.label}: messages arrive, {unusable.text}")
     reading = snapshot.get(signal.name)
     if reading is None or reading.derived_from is not None:
         return _never_came(signal, snapshot, limits) if unusable is None else _ended(signal, unusable, snapshot, limits)
@@ -94,7 +94,7 @@ def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Findi
 def _ended(signal: Signal, unusable: Unusable, snapshot: Snapshot, limits: SlowLimits) -> Finding:
     """Messages came, all of them without a value, and come no more."""
     age_s = snapshot.now_s - unusable.at_s
-    text = f"{signal.label}: {unusable.words}, then no message for {age_s:.0f} s"
+    text = f"{signal.label}: {unusable.text}, then no message for {age_s:.0f} s"
     if not _is_wanted(signal, limits):
         return absent(text, brief="silent")
     if _car_is_quiet(snapshot):

@@ -38,12 +38,12 @@ def find(signal: Signal, snapshot: Snapshot, limits: Limits, was_active: bool) -
     if not found.is_coming(snapshot.now_s):
         return unknown(f"{signal.label}: no message for {snapshot.now_s - found.at_s:.1f} s", short="silent")
     if found.is_declared:
-        text = f"{signal.label}: {found.words}"
+        text = f"{signal.label}: {found.text}"
         return ok(text) if was_active else absent(text, brief="not measured")
     if not was_active and (for_s < AFTER_S or found.count < AT_LEAST):
-        return unknown(f"{signal.label}: {found.words}", short="unusable")
+        return unknown(f"{signal.label}: {found.text}", short="unusable")
     return fault(
-        f"{signal.label}: {found.words}, {found.count} messages in {for_s:.1f} s",
+        f"{signal.label}: {found.text}, {found.count} messages in {for_s:.1f} s",
         brief=signal.label if fits_tile(signal.label) else "",
         measured=Quantity(label="Without a usable value for", value=for_s, unit="s"),
         causes=(signal.name,),
@@ -80,7 +80,7 @@ def find_all(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
         return unknown(text, short="unusable")
     name, newest = max(useless.items(), key=lambda item: item[1].at_s)
     return fault(
-        f"No usable value for {for_s:.1f} s, although messages arrive. {SIGNALS[name].label}: {newest.words}",
+        f"No usable value for {for_s:.1f} s, although messages arrive. {SIGNALS[name].label}: {newest.text}",
         brief="no value",
         measured=Quantity(label="Without a usable value for", value=for_s, unit="s"),
         causes=("car",),

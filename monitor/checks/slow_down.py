@@ -56,7 +56,7 @@ def _after(label: str, default_s: float) -> Any:
 
 
 class SlowDownLimits(Limits):
-    """How the car is slowed; the page, the sender and the checks go by the same."""
+    """How the car is slowed; the page, the sender and the checks use the same values."""
 
     deceleration_mps2: float = threshold(
         1.5,
@@ -93,7 +93,7 @@ class SlowDownLimits(Limits):
     on_rate_after_s: float = _after("Too slow for", 2.0)
 
 
-def obeys(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Finding:
+def is_followed(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Finding:
     facts = snapshot.slowing
     if facts.ordered_s is None:
         return absent("The car is not ordered to slow down", brief="not ordered")
@@ -192,7 +192,7 @@ def goes_on(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Fin
 CHECKS = (
     Check(
         id="slow_down_unconfirmed",
-        label="Car obeys",
+        label="Car complies",
         order=110,
         checked_when="Checked while the car is being slowed.",
         group="slow_down",
@@ -210,7 +210,7 @@ CHECKS = (
             advice="Use the physical stop: tell the safety driver now.",
         ),
         limits=SlowDownLimits,
-        find=obeys,
+        find=is_followed,
         needs=frozenset({"speed"}),
     ),
     Check(

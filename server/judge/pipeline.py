@@ -126,8 +126,8 @@ def _of_the_car(value: Any, topic: str, profile: Profile, frames: Frames | None,
     """A scan from where the laser is mounted, a mode by the words of this kind of car."""
     if type(value) is LaserScan and frames is not None and limits is not None:
         return frames.mounted(topic, value, limits)
-    if type(value) is DriveMode and (mode := profile.modes.get(value.said.casefold())) is not None:
-        return DriveMode(mode=mode, said=value.said)
+    if type(value) is DriveMode and (mode := profile.modes.get(value.text.casefold())) is not None:
+        return DriveMode(mode=mode, text=value.text)
     return value
 
 

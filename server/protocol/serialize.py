@@ -88,7 +88,7 @@ def value(reading: Any) -> SignalValue | None:
         case values.Level():
             return {"value": plain(reading.value, 1), "unit": reading.unit}
         case values.DriveMode():
-            return {"mode": reading.mode, "said": reading.said}
+            return {"mode": reading.mode, "said": reading.text}
         case values.Number():
             return {"value": plain(reading.value)}
     return None

@@ -10,7 +10,7 @@ from typing import Any
 from typing_extensions import Unpack
 
 from monitor.check import Verdict
-from monitor.checks.slow_down import STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, obeys, proof_of
+from monitor.checks.slow_down import STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, is_followed, proof_of
 from monitor.shell_facts import SlowingFacts
 from monitor.state import Snapshot
 from server.protocol import serialize
@@ -98,7 +98,7 @@ class Response:
     ) -> None:
         """With each tick of the session."""
         snapshot = replace(snapshot, slowing=facts)
-        found = obeys(snapshot, limits, self.is_missing).verdict
+        found = is_followed(snapshot, limits, self.is_missing).verdict
         proof = proof_of(snapshot)
         if found is Verdict.OK:
             self.is_missing = False

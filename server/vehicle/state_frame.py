@@ -279,13 +279,13 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         "type": source.type if source else None,
         "why": source.why if source else None,
         "frame": facts.reception.frame_of(source.topic) if source else None,
-        "note": (unusable.words if unusable else None)
+        "note": (unusable.text if unusable else None)
         or (_scan_note(source, snapshot) if signal.name == "scan" else None)
         or (_old_sample(facts, reading, tally, source) if reading and source else None)
         or (source.note if source else undecided)
         or (_unknown_part(reading.value) if reading else None)
         or (facts.reception.units.note(signal.name, source.topic) if source else None),
-        "unusable": unusable.words if unusable else None,
+        "unusable": unusable.text if unusable else None,
         "count": tally.received,
         "rejected": tally.rejected,
         "rejected_why": tally.last_reason,

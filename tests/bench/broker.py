@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from tests.bench.orders import obey
+from tests.bench.orders import execute_orders
 from tests.server.bus.broker import running_broker
 
 
@@ -15,7 +15,7 @@ async def main() -> None:
             """Processor time that the broker has used so far [s]."""
             return broker.cpu_s()
 
-        await obey({"used": used}, {"address": broker.address, "pid": broker.pid})
+        await execute_orders({"used": used}, {"address": broker.address, "pid": broker.pid})
 
 
 if __name__ == "__main__":

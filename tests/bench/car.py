@@ -16,11 +16,11 @@ from server.judge.message import Json
 from server.rosbridge_server.server import RosBridge
 from server.simulator.car import SimulatedCar
 from server.simulator.messages import CMD_VEL, VEL
-from tests.bench.orders import obey, options
+from tests.bench.orders import execute_orders, options
 
 TAPE_S = 20.0
 CALM_MPS = 9.0  # all the drive stays below, and so clears the alarm
-PROBE_SPEEDS = 80  # a probe's speed tells which one it was: 12.0, 12.1 … 19.9 m/s, and again
+PROBE_SPEEDS = 80  # a probe's speed identifies it: 12.0, 12.1 … 19.9 m/s, and again
 SOON_S = 0.0005
 
 
@@ -73,7 +73,7 @@ class Car:
         return sent
 
     async def commanded(self, topic: str = CMD_VEL.topic) -> list[tuple[int, float]]:
-        """The commands that arrived since this was last asked: when [ns, CLOCK_MONOTONIC], and their speed [m/s]."""
+        """The commands that arrived since the last call: when [ns, CLOCK_MONOTONIC], and their speed [m/s]."""
         return self._commanded.pop(topic, [])
 
     def _hear(self, topic: str, type: str, message: Json) -> None:
@@ -101,7 +101,7 @@ async def main(beams: int | None = None) -> None:
         "messages_per_s": car.messages_per_s,
     }
     try:
-        await obey({"probe": car.probe, "counts": car.counts, "commanded": car.commanded}, hello)
+        await execute_orders({"probe": car.probe, "counts": car.counts, "commanded": car.commanded}, hello)
     finally:
         driving.cancel()
         await car.bridge.stop()

@@ -1,4 +1,4 @@
-"""A process of the bench as the bench sees it: started, told what to do, measured, ended whatever happens."""
+"""The bench's side of one of its processes: start it, send it orders, measure it, end it whatever happens."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ENDS_WITHIN_S = 3.0
 
 
 class Failed(RuntimeError):
-    """A process of the bench did not do what it was told."""
+    """A process of the bench failed or did not answer."""
 
 
 class Child:
@@ -72,10 +72,10 @@ class Child:
                 raise Failed(f"{self._module} has ended: {self._last_output()}")
             self._unread += read
         line, _, self._unread = self._unread.partition(b"\n")
-        said = orjson.loads(line)
-        if "error" in said:
-            raise Failed(f"{self._module}: {said['error']}")
-        return said["answer"]
+        reply = orjson.loads(line)
+        if "error" in reply:
+            raise Failed(f"{self._module}: {reply['error']}")
+        return reply["answer"]
 
     def share_of_core(self, for_s: float) -> float:
         """Watches for so long how much processor time it uses; in per cent of one core."""
@@ -108,4 +108,4 @@ class Child:
 
     def _last_output(self) -> str:
         self._errors.seek(0)
-        return self._errors.read().decode(errors="replace")[-2000:].strip() or "it said nothing"
+        return self._errors.read().decode(errors="replace")[-2000:].strip() or "without output"

@@ -16,7 +16,7 @@ import orjson
 from server.app.process import uvloop_runner
 from server.simulator.messages import SCAN, VEL
 from tests.bench.lean_socket import LeanSocket, open_socket
-from tests.bench.orders import obey, options
+from tests.bench.orders import execute_orders, options
 
 LIMIT_MPS = 11.0
 AFTER_A_GAP_S = 1.5
@@ -64,7 +64,7 @@ class Direct:
     async def connect(
         self, url: str, topics: list[str], watching: int = 1, draining: int = 0, stalled: int = 0, cbor: bool = False
     ) -> None:
-        """Opens clients, each with a subscription to every topic; `cbor`: scans in CBOR, as catgraph asks for them."""
+        """Opens clients, each with a subscription to every topic; `cbor`: scans in CBOR, as catgraph requests them."""
         for _ in range(watching):
             watcher = Watcher()
             watcher.socket = await open_socket(url, watcher.hear)
@@ -85,7 +85,7 @@ class Direct:
         self._bytes_in = sum(watcher.socket.bytes_in for watcher in self._watchers)
 
     async def report(self) -> dict[str, Any]:
-        """What the watchers heard since `begin`."""
+        """What the watchers received since `begin`."""
         return {
             "seconds": time.monotonic() - self._began_s,
             "messages": [watcher.messages for watcher in self._watchers],
@@ -99,7 +99,7 @@ class Direct:
         return await asyncio.gather(*(self._gap(watcher, seconds) for watcher in self._watchers))
 
     async def metronome(self, url: str, topic: str, seconds: float, period_s: float) -> None:
-        """A bare client that says one Twist a period, and does nothing else."""
+        """A bare client that sends one Twist a period, and does nothing else."""
         socket = await open_socket(url)
         loop = asyncio.get_running_loop()
         try:
@@ -145,7 +145,7 @@ async def main() -> None:
         "leave": direct.leave,
     }
     try:
-        await obey(orders, {})
+        await execute_orders(orders, {})
     finally:
         await direct.leave()
 

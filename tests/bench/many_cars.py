@@ -27,7 +27,7 @@ from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_link import BrokerLink
-from tests.bench.orders import obey, options
+from tests.bench.orders import execute_orders, options
 
 CONNECTS_WITHIN_S = 30.0
 CHANGES_EVERY_S = 60.0  # of a car's alarms
@@ -152,7 +152,7 @@ class ManyCars:
 async def main(broker: str) -> None:
     cars = ManyCars(broker)
     try:
-        await obey({"record": cars.record, "grow": cars.grow}, {})
+        await execute_orders({"record": cars.record, "grow": cars.grow}, {})
     finally:
         await cars.stop()
 

@@ -21,23 +21,23 @@ def options() -> dict[str, Any]:
     return orjson.loads(sys.argv[1]) if len(sys.argv) > 1 else {}
 
 
-async def obey(orders: Orders, hello: Mapping[str, Any]) -> None:
-    """Says hello, then does what it is told until its stdin ends: that is how it ends, also when the bench is killed.
+async def execute_orders(orders: Orders, hello: Mapping[str, Any]) -> None:
+    """Send `hello`, then execute orders until stdin ends: so the process ends also when the bench is killed.
 
-    Every process knows the order `cpu`: the processor time it has used so far [ns], all its threads.
+    Every process has the order `cpu`: the processor time it has used so far [ns], all its threads.
     """
     orders = {**orders, "cpu": _cpu}
     loop = asyncio.get_running_loop()
     reader = asyncio.StreamReader(limit=2**24)
     pipe, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(0, "rb"))
     try:
-        _say({"answer": hello})
+        _send({"answer": hello})
         async for line in reader:
             order = orjson.loads(line)
             try:
-                _say({"answer": await orders[order.pop("do")](**order)})
-            except Exception:  # the bench is to learn of any
-                _say({"error": traceback.format_exc()})
+                _send({"answer": await orders[order.pop("do")](**order)})
+            except Exception:  # the bench reports any
+                _send({"error": traceback.format_exc()})
     finally:
         pipe.close()
 
@@ -46,6 +46,6 @@ async def _cpu() -> int:
     return time.process_time_ns()
 
 
-def _say(message: Mapping[str, Any]) -> None:
+def _send(message: Mapping[str, Any]) -> None:
     _OUT.write(orjson.dumps(message) + b"\n")
     _OUT.flush()

@@ -1,4 +1,4 @@
-"""The bench's pages: they speak docs/protocol.md, take what they are offered at once and note when what came."""
+"""The bench's pages: they use docs/protocol.md, read all messages at once and record their arrival times."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import orjson
 
 from server.app.process import uvloop_runner
 from tests.bench.lean_socket import LeanSocket, open_socket
-from tests.bench.orders import obey, options
+from tests.bench.orders import execute_orders, options
 
 MONITORING_WITHIN_S = 15.0
 AFTER_A_GAP_S = 1.5  # how long a page's frames are looked at when it reads again
@@ -19,7 +19,7 @@ TICK_S = 0.1  # a state is made this often
 
 
 class Page:
-    """One page. `socket` is set by whoever opens it."""
+    """One page. `socket` is set when it is opened."""
 
     socket: LeanSocket
 
@@ -99,7 +99,7 @@ class Pages:
         self._come_in(pages)
 
     async def open_fleet(self, url: str, cars: int, count: int) -> None:
-        """More pages of all cars, until there are `count`; each sees so many cars that are heard."""
+        """More pages of all cars, until there are `count`; each shows so many cars that send data."""
         pages = [await self._open(f"{url}/ws?fleet=1", scan=False, deflate=True) for _ in range(len(self._live), count)]
         ends_s = time.monotonic() + MONITORING_WITHIN_S
         for page in pages:
@@ -199,7 +199,7 @@ async def main() -> None:
         "leave": pages.leave,
     }
     try:
-        await obey(orders, {})
+        await execute_orders(orders, {})
     finally:
         await pages.leave()
 

@@ -67,8 +67,8 @@ class Program:
             if not line:
                 break
         self._errors.seek(0)
-        said = self._errors.read().decode(errors="replace")[-2000:].strip() or "it said nothing"
-        raise Failed(f"{' '.join(self._arguments)} does not listen: {said}")
+        output = self._errors.read().decode(errors="replace")[-2000:].strip() or "without output"
+        raise Failed(f"{' '.join(self._arguments)} does not listen: {output}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,19 +16,19 @@ from websockets.asyncio.server import ServerConnection, broadcast, serve
 from server.app.process import uvloop_runner
 from server.simulator.messages import SCAN
 from tests.bench.lean_socket import LeanSocket, open_socket
-from tests.bench.orders import obey, options
+from tests.bench.orders import execute_orders, options
 
 STATE_HZ = 10
 
 
 class Relay:
-    """Hears one bridge and tells all pages."""
+    """Receives from one bridge and sends to all pages."""
 
     def __init__(self) -> None:
         self.pages: set[ServerConnection] = set()
         self._newest: dict[str, Any] = {}
 
-    def hear(self, _: LeanSocket, payload: bytes, is_text: bool) -> None:
+    def receive(self, _: LeanSocket, payload: bytes, is_text: bool) -> None:
         if is_text:
             message = orjson.loads(payload)
             self._newest[message["topic"]] = message["msg"]
@@ -42,7 +42,7 @@ class Relay:
             self.pages.discard(page)
 
     async def push(self) -> None:
-        """Tells all pages, for ever. The frame begins as catgraph's does, so that the bench's pages know it."""
+        """Send to all pages, for ever. The frame begins as catgraph's does, so that the bench's pages accept it."""
         while True:
             await asyncio.sleep(1 / STATE_HZ)
             if self.pages and self._newest:
@@ -53,7 +53,7 @@ class Relay:
 
 async def main(bridge: str, topics: list[str]) -> None:
     relay = Relay()
-    client = await open_socket(bridge, relay.hear)
+    client = await open_socket(bridge, relay.receive)
     for topic in topics:
         if topic != SCAN.topic:
             client.send(orjson.dumps({"op": "subscribe", "topic": topic}))
@@ -61,7 +61,7 @@ async def main(bridge: str, topics: list[str]) -> None:
     async with serve(relay.serve_page, "127.0.0.1", 0) as server:
         pushing = asyncio.create_task(relay.push())
         try:
-            await obey({}, {"url": f"ws://127.0.0.1:{server.sockets[0].getsockname()[1]}/"})
+            await execute_orders({}, {"url": f"ws://127.0.0.1:{server.sockets[0].getsockname()[1]}/"})
         finally:
             pushing.cancel()
             client.abort()

@@ -1,4 +1,4 @@
-"""The bench's processes, started when first asked for and ended together, and the pace of a run."""
+"""The bench's processes, started when first needed and ended together, and the pace of a run."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ from server.vehicle.session import Session
 from server.vehicle.tick import Tick
 from server.vehicle.vehicle import Vehicle
 from tests.bench import slow_disk
-from tests.bench.orders import obey, options
+from tests.bench.orders import execute_orders, options
 
 VEHICLE = "car"
 
@@ -145,7 +145,7 @@ async def main(events: int = 0, disk_s: float = 0.0, broker: str | None = None, 
     url = announced.getvalue().split()[3].replace("http://", "ws://")
 
     async def command(**command: Any) -> Any:
-        """What a page may ask for: connect, disconnect."""
+        """The commands of a page: connect, disconnect."""
         return await made[-1].state.services.bus.request(VEHICLE, command)
 
     async def timings() -> dict[str, Any]:
@@ -157,7 +157,7 @@ async def main(events: int = 0, disk_s: float = 0.0, broker: str | None = None, 
         if disk_s:
             slow_disk.begin(Path(kept.name), disk_s)
         orders = {"command": command, "timings": timings, "begin_stalls": lag.begin, "stalls": lag.end}
-        await obey(orders, {"url": f"{url}ws"})
+        await execute_orders(orders, {"url": f"{url}ws"})
     finally:
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)

@@ -1,6 +1,6 @@
 """A disk made slow on purpose, for one process: whatever it does with files of a folder or a database takes longer.
 
-It sleeps where the system would, in the thread that asks and without the interpreter's lock. Audit events tell of what
+It sleeps where the system would, in the calling thread and without the interpreter's lock. Audit events report what
 is opened, listed, moved and removed; `stat`, `fsync` and statements of SQLite have none, so these are wrapped.
 """
 

@@ -27,7 +27,7 @@ class Row:
 
     @property
     def is_reached(self) -> bool | None:
-        """Whether catgraph is where it should be; None where nothing is asked."""
+        """Whether catgraph is where it should be; None where there is no goal."""
         return None if self.reach is None else self.catgraph <= self.reach
 
     def cells(self) -> tuple[str, ...]:
@@ -49,7 +49,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Group:
-    """Rows measured together, under a heading that says how."""
+    """Rows measured together, under a heading that states how."""
 
     name: str
     title: str

@@ -31,7 +31,7 @@ class Wire:
         self._socket = socket.socket(socket.AF_PACKET, socket.SOCK_DGRAM, socket.htons(_ETH_P_IP))
         self._socket.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _ROOM)
-        program = _to_port(port)  # a filter in the kernel: what goes the other way is a thousand times as much
+        program = _to_port(port)  # a filter in the kernel: the other direction has a thousand times as much
         code = ctypes.create_string_buffer(program)
         self._socket.setsockopt(
             socket.SOL_SOCKET, _SO_ATTACH_FILTER, struct.pack("HL", len(program) // 8, ctypes.addressof(code))

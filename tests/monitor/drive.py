@@ -148,13 +148,13 @@ class Drive:
                 if name not in self.silent and self.bridge_alive and self.link.phase == "monitoring":
                     self._judge(self.state.receive(name, self._value(name), next_s))
 
-    def say(self, name: str, value: Value) -> Drive:
+    def send(self, name: str, value: Value) -> Drive:
         """One message out of turn."""
         self._judge(self.state.receive(name, value, self.now_s))
         return self
 
     def _value(self, name: str) -> Value:
-        """What the car says now: northward of the place in `values` as it moves, and never twice quite the same."""
+        """The car's value now: northward of the place in `values` as it moves, and never exactly the same twice."""
         speed = self.values["speed"]
         assert isinstance(speed, Twist)
         self._way_m += speed.speed_mps * (self.now_s - self._way_at_s)

@@ -26,7 +26,7 @@ class SlowCar:
     speed_mps: float  # at the order
     own_mps2: float  # how hard it brakes, coasts or accelerates by itself
     began_s: float  # before the order: since when it brakes
-    obeys: bool
+    complies: bool
     lag_s: float
     builds_s: float
     deceleration_mps2: float
@@ -67,7 +67,7 @@ class SlowCar:
         times, own = self.times_s(), self.own_acceleration()
         if self.manner == "stands":
             return np.zeros(len(times))
-        if self.obeys:
+        if self.complies:
             since = times - self.lag_s
             share = np.where(since > 0, 1 - np.exp(-np.maximum(since, 0) / max(self.builds_s, 1e-6)), 0.0)
             own = own + (np.minimum(own, -self.deceleration_mps2) - own) * share
@@ -105,23 +105,25 @@ class SlowCar:
         return follower.proof
 
 
-def random_car(rng: random.Random, *, obeys: bool) -> SlowCar:
-    """Any car. One that obeys is one whose motion the order changes: it does not brake as hard already."""
+def random_car(rng: random.Random, *, complies: bool) -> SlowCar:
+    """Any car. One that complies is one whose motion the order changes: it does not brake as hard already."""
     deceleration = rng.choice((1.5, 1.5, 1.0, 2.0, 3.0, rng.uniform(1.0, 4.6)))
-    manner = rng.choice([name for name in MANNERS if not (obeys and name in ("stands", "brakes", "begins to brake"))])
+    manner = rng.choice(
+        [name for name in MANNERS if not (complies and name in ("stands", "brakes", "begins to brake"))]
+    )
     return SlowCar(
         manner=manner,
-        speed_mps=rng.uniform(0.3, 15.0) if not obeys else rng.uniform(1.2 * deceleration + 0.5, 15.0),
+        speed_mps=rng.uniform(0.3, 15.0) if not complies else rng.uniform(1.2 * deceleration + 0.5, 15.0),
         own_mps2=rng.uniform(0.1, 1.5) if manner != "brakes" else rng.uniform(0.1, 4.0),
         began_s=rng.uniform(0.5, 3.0),
-        obeys=obeys,
+        complies=complies,
         lag_s=rng.uniform(0.1, 1.0),
         builds_s=rng.choice((0.0, 0.1, 0.2, 0.4)),
         deceleration_mps2=deceleration,
-        rate_hz=rng.uniform(5.0, 50.0) if obeys else rng.choice((5.0, 10.0, 20.0, 50.0, rng.uniform(5.0, 50.0))),
-        noise_mps=rng.uniform(0.0, 0.1) if obeys else rng.choice((0.0, 0.02, 0.05, 0.1, rng.uniform(0.0, 0.1))),
-        quantum_mps=rng.choice((0.0, 0.0, 0.01, 0.05, 0.1) if obeys else (0.0, 0.0, 0.01, 0.05, 0.1, 0.28)),
-        dropout=rng.choice((0.0, 0.0, 0.1, 0.3)) if not obeys else rng.choice((0.0, 0.0, 0.1)),
-        freezes=False if obeys else rng.random() < 0.05,
+        rate_hz=rng.uniform(5.0, 50.0) if complies else rng.choice((5.0, 10.0, 20.0, 50.0, rng.uniform(5.0, 50.0))),
+        noise_mps=rng.uniform(0.0, 0.1) if complies else rng.choice((0.0, 0.02, 0.05, 0.1, rng.uniform(0.0, 0.1))),
+        quantum_mps=rng.choice((0.0, 0.0, 0.01, 0.05, 0.1) if complies else (0.0, 0.0, 0.01, 0.05, 0.1, 0.28)),
+        dropout=rng.choice((0.0, 0.0, 0.1, 0.3)) if not complies else rng.choice((0.0, 0.0, 0.1)),
+        freezes=False if complies else rng.random() < 0.05,
         seed=rng.getrandbits(32),
     )

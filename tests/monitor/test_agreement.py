@@ -59,7 +59,7 @@ def test_the_gate_beside_a_good_receiver_in_a_standing_car(accuracy_m: float, ex
     assert gate == pytest.approx(expected_m, abs=0.55)
 
 
-def test_a_receiver_that_says_nothing_widens_the_gate() -> None:
+def test_a_receiver_without_a_covariance_widens_the_gate() -> None:
     assert gate_m(1.0, 0.0, car_sigma_m=5.0, phone_sigma_m=2.0) == pytest.approx(math.sqrt(CHI_SQUARE * 31.0))
 
 
@@ -107,7 +107,7 @@ def test_another_way_does_not_correlate() -> None:
     assert correlate(pairs([(-x, -y) for x, y in BEND], BEND)).correlation == pytest.approx(-1.0)
 
 
-def test_a_phone_that_never_moved_has_no_correlation_and_says_so() -> None:
+def test_a_phone_that_never_moved_has_no_correlation_and_reports_it() -> None:
     found = correlate(pairs(PARKED, EASTWARD))
     assert found.correlation is None
     assert found.phone_spread_m == 0.0
@@ -148,13 +148,13 @@ def latitudes(track: list[tuple[float, float]]) -> list[float]:
 
 
 def test_the_report_s_formula_is_noise_for_a_parked_car() -> None:
-    """Two good receivers side by side in a parked car: r is anything. Ours: no track, so nothing is said."""
+    """Two good receivers side by side in a parked car: r is anything. Ours: no track, so nothing is reported."""
     found = [report_7_r(latitudes(noise(seed, 40, 1.0)), latitudes(noise(seed + 500, 40, 1.0))) for seed in range(60)]
     assert min(found) < -0.3
     assert max(found) > 0.3
     assert max(found) < 0.7  # a threshold that would pass a moving car fails every parked one
     ours = correlate(pairs(noise(1, 40, 1.0), noise(2, 40, 1.0)))
-    assert ours.car_spread_m < 3 * ours.phone_sigma_m  # what the check asks before it looks at r
+    assert ours.car_spread_m < 3 * ours.phone_sigma_m  # what the check requires before it uses r
 
 
 def test_the_report_s_formula_divides_0_by_0_for_a_constant_series() -> None:

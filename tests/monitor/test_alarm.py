@@ -1,4 +1,4 @@
-"""The life of one alarm, told as stories: what the check finds when, and where the alarm then stands."""
+"""The life of one alarm: sequences of findings, and the alarm's state after each."""
 
 from __future__ import annotations
 
@@ -210,7 +210,7 @@ STORIES: dict[str, list[tuple[float, Finding | Act | Inhibited, AlarmState]]] = 
         (10.0, BAD, NORMAL),
         (11.0, BAD, UNACKED),
     ],
-    "known before, still there after: not told again": [
+    "known before, still there after: not announced again": [
         (0.0, BAD, NORMAL),
         (1.0, BAD, UNACKED),
         (1.5, ACK, ACKED),
@@ -239,7 +239,7 @@ STORIES: dict[str, list[tuple[float, Finding | Act | Inhibited, AlarmState]]] = 
         (3.0, (LINK, BAD), SUPPRESSED),
         (4.0, BAD, SHELVED),
     ],
-    "a new cause is not told while suppressed, but after": [
+    "a new cause is not announced while suppressed, but after": [
         (0.0, A, NORMAL),
         (1.0, A, UNACKED),
         (1.5, ACK, ACKED),
@@ -295,7 +295,7 @@ def test_a_latched_alarm_that_is_bad_again_is_no_longer_only_latched() -> None:
     assert alarm.active
 
 
-def test_what_happened_is_told_once_in_order() -> None:
+def test_what_happened_is_reported_once_in_order() -> None:
     _, happened = play(
         [
             (0.0, A, NORMAL),
@@ -339,7 +339,7 @@ def test_a_shelf_that_ends_while_suppressed_is_not_announced() -> None:
     assert [(t.change, t.announces) for t in happened[2:]] == [("suppressed", False), ("unshelved", False)]
 
 
-def test_a_new_cause_is_told_when_the_suppression_ends() -> None:
+def test_a_new_cause_is_announced_when_the_suppression_ends() -> None:
     _, happened = play(
         [
             (0.0, A, NORMAL),
@@ -442,7 +442,7 @@ def test_where_it_shows_once_it_is_gone() -> None:
     assert (alarm.place, alarm.sound) == (Place.LIST, Sound.NONE)
 
 
-def test_an_alarm_out_of_service_says_nothing() -> None:
+def test_an_alarm_out_of_service_announces_nothing() -> None:
     alarm = Alarm(id="hot", spec=NO_ACK, out_of_service=True)
     after, transitions = advance(alarm, BAD, 0.0)
     assert (after.state, transitions) == (OUT_OF_SERVICE, ())

@@ -93,7 +93,7 @@ def test_a_late_message_takes_nothing_from_what_was_counted() -> None:
           (20.5, BAD, UNACKED)])  # fmt: skip
 
 
-def test_a_transition_says_all_of_the_alarm() -> None:
+def test_a_transition_has_all_of_the_alarm() -> None:
     alarm = replace(STANDING, causes=(Cause(name="a"), Cause(name="b", absent_s=1.0)), suppressed_by=(LINK,))
     alarm = replace(alarm, shelved_until_s=60.0)
     assert transition(alarm, "recaused", 7.0) == Transition(
@@ -112,8 +112,8 @@ def test_a_transition_says_all_of_the_alarm() -> None:
         shelved_until_s=60.0,
         worst=BAD,
     )
-    said = transition(alarm, "shelved", 7.0, text="it is bad", by="Ann", announces=True)
-    assert (said.text, said.by, said.announces) == ("it is bad", "Ann", True)
+    made = transition(alarm, "shelved", 7.0, text="it is bad", by="Ann", announces=True)
+    assert (made.text, made.by, made.announces) == ("it is bad", "Ann", True)
 
 
 def test_a_refusal_carries_its_reason() -> None:
@@ -124,7 +124,7 @@ def test_a_refusal_carries_its_reason() -> None:
     ("alarm", "changes"),
     [(STANDING, ["cleared"]), (replace(REST, shelved_until_s=60.0), ["unshelved"]), (REST, [])],
 )
-def test_the_end_says_when_and_why(alarm: Alarm, changes: list[str]) -> None:
+def test_the_end_reports_when_and_why(alarm: Alarm, changes: list[str]) -> None:
     after, happened = end(alarm, 5.0, "Monitoring ended")
     assert [(t.change, t.at_s, t.text, t.state) for t in happened] == [
         (change, 5.0, "Monitoring ended", NORMAL) for change in changes
@@ -153,7 +153,7 @@ def by(value: float, text: str) -> Finding:
         (by(12.0, "first"), by(12.0, "second"), "first"),  # as bad is not worse
         (by(8.0, "first"), by(9.0, "second"), "first"),  # below a lower limit
         (by(9.0, "first"), by(8.0, "second"), "second"),
-        (BAD, by(10.5, "second"), "second"),  # a number says more than none
+        (BAD, by(10.5, "second"), "second"),  # a number is better than none
         (by(10.0, "first"), BAD, "first"),
         (by(10.0, "first"), by(99.0, "half")._replace(measured=None), "first"),
         (by(10.0, "first"), by(99.0, "half")._replace(limit=None), "first"),
@@ -165,7 +165,7 @@ def test_the_worst_is_what_was_furthest_beyond_its_limit(first: Finding, second:
     assert alarm.worst.text == worst
 
 
-def test_gone_on_the_shelf_its_end_is_told_and_not_announced() -> None:
+def test_gone_on_the_shelf_its_end_is_reported_and_not_announced() -> None:
     minute = Act("shelve", minutes=1.0)
     story = [(0.0, BAD, NORMAL), (1.0, BAD, UNACKED), (2.0, minute, SHELVED), (3.0, OK, SHELVED), (5.0, OK, SHELVED)]
     _, happened = play([*story, (62.0, OK, RTN_UNACKED)])
@@ -226,10 +226,10 @@ def test_why_there_is_nothing_to_acknowledge() -> None:
 
 
 @pytest.mark.parametrize("minutes", [0.001, 15.0])
-def test_the_shelf_lasts_as_long_as_was_said(minutes: float) -> None:
-    alarm, (said,) = shelve(STANDING, 1, minutes, "Ann", 100.0, is_inhibitor=False)
+def test_the_shelf_lasts_as_long_as_requested(minutes: float) -> None:
+    alarm, (made,) = shelve(STANDING, 1, minutes, "Ann", 100.0, is_inhibitor=False)
     assert alarm.shelved_until_s == 100.0 + 60.0 * minutes
-    assert (said.text, said.by, said.at_s, said.announces) == ("it is bad", "Ann", 100.0, False)
+    assert (made.text, made.by, made.at_s, made.announces) == ("it is bad", "Ann", 100.0, False)
 
 
 @pytest.mark.parametrize(
@@ -246,13 +246,13 @@ def test_taken_off_the_shelf_it_is_announced_where_it_stands(
     change: dict[str, Any], occurrence: int, acknowledged: bool, announces: bool
 ) -> None:
     shelved = replace(STANDING, shelved_until_s=60.0, shelved_by="Ann", **change)
-    alarm, (said,) = unshelve(shelved, "Bob", 9.0)
-    assert (alarm.occurrence, alarm.acknowledged, said.announces) == (occurrence, acknowledged, announces)
-    assert (alarm.shelved_until_s, alarm.shelved_by, said.by, said.at_s) == (None, None, "Bob", 9.0)
+    alarm, (made,) = unshelve(shelved, "Bob", 9.0)
+    assert (alarm.occurrence, alarm.acknowledged, made.announces) == (occurrence, acknowledged, announces)
+    assert (alarm.shelved_until_s, alarm.shelved_by, made.by, made.at_s) == (None, None, "Bob", 9.0)
     assert alarm.announced_s == (9.0 if alarm.active else STANDING.announced_s)
     assert alarm.acknowledged_by is None
 
 
 def test_a_response_to_what_was_never_judged_has_no_text() -> None:
-    _, (said,) = acknowledge(replace(STANDING, finding=None), 1, "Ann", 3.0)
-    assert said.text == ""
+    _, (made,) = acknowledge(replace(STANDING, finding=None), 1, "Ann", 3.0)
+    assert made.text == ""

@@ -73,7 +73,7 @@ def happen(alarm: Alarm, event: Judge | Tap, now_s: float) -> tuple[Alarm, tuple
 
 @given(SPECS, DAY)
 def test_no_transition_is_lost(spec: AlarmSpec, day: list[tuple[float, Judge | Tap]]) -> None:
-    """Whoever reads the journal alone knows where the alarm stands: that is what a restart will do."""
+    """The journal alone gives the state of the alarm: a restart needs that."""
     alarm, now_s = Alarm(id="hot", spec=spec), 0.0
     active, acknowledged, shelved, suppressed, occurrence = False, True, False, False, 0
     for wait_s, event in day:

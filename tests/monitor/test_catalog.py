@@ -31,7 +31,7 @@ def test_each_signal_has_its_own_alarms() -> None:
     assert {"speed_limit", "connect_failed", "no_message", "link_lost", "car_silent"} <= ids
 
 
-def test_each_check_says_what_makes_it_checked() -> None:
+def test_each_check_states_when_it_is_checked() -> None:
     for check in CHECKS:
         assert check.checked_when.endswith("."), check.id
         assert check.checked_when.startswith(("Checked ", "Always checked")), check.id
@@ -42,7 +42,7 @@ def test_what_an_alarm_must_have(alarm_id: str, spec) -> None:  # type: ignore[n
     assert 0 < len(spec.title) <= LETTERS[spec.place]
     assert spec.title[0].isupper()
     assert not spec.title.endswith(".")
-    assert spec.advice.endswith("."), "the operator is told what to do, in a sentence"
+    assert spec.advice.endswith("."), "the advice to the operator is a sentence"
     assert spec.on_delay_s >= 0.0
     assert spec.off_delay_s >= 0.0
     if spec.priority is Priority.CRITICAL:
@@ -71,7 +71,7 @@ EXPLAIN_MESSAGES = ("link_lost", "link_late", "link_late_moving", "car_silent", 
 
 @every_check
 def test_only_what_explains_missing_messages_has_a_grace(check: AnyCheck) -> None:
-    """A grace delays what is explained; what is judged by values must be told at once when it is seen again."""
+    """A grace delays what is explained; what is judged by values must be reported at once when it is seen again."""
     explains_messages = check.id in EXPLAIN_MESSAGES or check.id.startswith(("signal_stale.", "signal_unusable."))
     assert (check.alarm.grace_s > 0.0) == explains_messages
 

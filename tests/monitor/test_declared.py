@@ -22,7 +22,7 @@ def test_a_second_battery_that_is_absent_does_not_hide_that_the_first_is_low() -
     car.link = replace(car.link, published=frozenset({*REAL_HZ, "fuel"}))
     car.open()
     for second in range(1, 12):
-        car.say("fuel", LOW)
+        car.send("fuel", LOW)
         car.to(second - 1.0 + 0.002)
         car.state.refuse("fuel", NOT_MEASURED, car.now_s, is_declared=True)
         car.to(second - 0.1)
@@ -45,7 +45,7 @@ def test_two_sensors_on_one_topic_do_not_take_turns_with_what_is_derived(signal:
         reading = state.get(signal)
         assert reading is not None
         assert (reading.value, reading.derived_from) == (value, None)
-    for number in range(200, 460):  # the one that measures has gone, the other says that it does not
+    for number in range(200, 460):  # the one that measures has gone, the other declares that it does not
         state.refuse(signal, "not measured (covariance[0] is -1)", number / 20, is_declared=True)
         move(state, number / 20)
     reading = state.get(signal)

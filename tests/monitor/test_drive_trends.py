@@ -1,4 +1,4 @@
-"""The whole drive in buckets: exact lowest and highest, gaps kept as gaps, and never more memory than said."""
+"""The whole drive in buckets: exact lowest and highest, gaps kept as gaps, and never more memory than documented."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def noted(trends: DriveTrends, *messages: tuple[float, float], horizon_s: float 
 
 
 def test_every_signal_that_is_one_number_can_be_drawn() -> None:
-    assert set(CHARTED) == set(SIGNALS) - {"mode"}, "who drives is a word"
+    assert set(CHARTED) == set(SIGNALS) - {"mode"}, "who drives is a text"
     assert CHARTED["speed"] == "speed_mps"
     assert CHARTED["position"] == "alt_m"
 
@@ -149,7 +149,7 @@ def test_limits_stand_from_when_they_were_set() -> None:
     assert trends.limits("brake") == ()
 
 
-def test_eight_hours_stay_within_the_memory_that_is_said() -> None:
+def test_eight_hours_stay_within_the_documented_memory() -> None:
     trends = DriveTrends(0.0)
     peak_s = 5 * 3600.0 + 0.1
     for second in range(int(EIGHT_HOURS_S)):
@@ -190,7 +190,7 @@ def test_spans_are_bounded_and_cover_all_that_was_added() -> None:
 @pytest.mark.parametrize(
     ("from_s", "to_s"), [(-5.0, 3.0), (0.0, 1e9), (9.0, 2.0), (1e9, 2e9), (0.0, math.inf), (0.0, 0.0)]
 )
-def test_whatever_part_is_asked_for_stays_within_the_drive(from_s: float, to_s: float) -> None:
+def test_whatever_part_is_requested_stays_within_the_drive(from_s: float, to_s: float) -> None:
     trends = noted(DriveTrends(0.0), (0.5, 1.0), (9.5, 2.0))
     view = trends.view(["speed"], from_s, to_s, 20, 10.0)
     assert 0.0 <= view.from_s <= 10.0

@@ -24,7 +24,7 @@ BY_RULE = {"driving.by_rule": 1.0}
 
 
 class Car:
-    """Sends what it is told to, 20 times a second; every moment is judged."""
+    """Sends the given values 20 times a second; every moment is judged."""
 
     def __init__(self, **limits: float) -> None:
         self.state = State()
@@ -49,8 +49,8 @@ class Car:
             at_s = self.now_s
             self.state.link(LinkFacts(phase="monitoring", published=frozenset({"speed", "brake"})))
             if mode is not None:
-                said = mode if isinstance(mode, DriveMode) else DriveMode(mode=mode, said=mode)
-                self.state.receive("mode", said, at_s)
+                value = mode if isinstance(mode, DriveMode) else DriveMode(mode=mode, text=mode)
+                self.state.receive("mode", value, at_s)
             if speed is not None:
                 self.state.receive("speed", Twist(speed_mps=speed), at_s)
             if command is not None:
@@ -122,7 +122,7 @@ def test_a_gap_between_autonomous_and_manual_hides_no_take_over_and_invents_none
     assert car.kinds == ["to_manual"], "a hand drove before the gap and after it"
 
 
-def test_brake_against_the_command_is_told_once_and_a_commanded_one_is_not() -> None:
+def test_brake_against_the_command_is_reported_once_and_a_commanded_one_is_not() -> None:
     car = Car()
     car.drive(3.0)
     car.drive(3.0, brake=40.0, speed=3.0, command=0.0)
@@ -173,7 +173,7 @@ def test_the_braking_that_ends_in_manual_is_one_intervention() -> None:
     assert car.kinds == ["brake"]
 
 
-def test_time_and_distance_belong_to_the_mode_from_its_first_word_on() -> None:
+def test_time_and_distance_belong_to_the_mode_from_its_first_report_on() -> None:
     car = Car()
     car.drive(10.0)
     car.drive(10.0, mode="manual", speed=2.0)
@@ -188,10 +188,10 @@ def test_time_and_distance_belong_to_the_mode_from_its_first_word_on() -> None:
 @pytest.mark.parametrize(("number", "mode"), [(1, "autonomous"), (0, "manual"), (7, "unknown")])
 def test_a_plain_number_means_what_the_settings_say(number: int, mode: Mode) -> None:
     car = Car()
-    car.drive(2.0, mode=DriveMode(mode="unknown", said=str(number), number=number))
+    car.drive(2.0, mode=DriveMode(mode="unknown", text=str(number), number=number))
     assert car.summary.driving.watch.mode == mode
     other = Car(driving__autonomous_number=7.0)
-    other.drive(2.0, mode=DriveMode(mode="unknown", said=str(number), number=number))
+    other.drive(2.0, mode=DriveMode(mode="unknown", text=str(number), number=number))
     assert (other.summary.driving.watch.mode == "autonomous") == (number == 7)
 
 
@@ -226,7 +226,7 @@ def test_a_mode_that_holds_is_not_believed_once_the_link_is_lost() -> None:
     car = Car(driving__holds_s=3600.0)
     car.drive(5.0)
     car.drive(60.0, mode=None)
-    assert car.modes == ["autonomous"], "it is told once, and holds"
+    assert car.modes == ["autonomous"], "it is reported once, and holds"
     car.state.link(LinkFacts(phase="lost", published=frozenset({"speed", "brake"})))
     for _ in range(20):
         car.now_s += STEP_S
@@ -245,11 +245,13 @@ def test_by_rule_a_car_that_stands_without_commands_is_not_known_to_be_autonomou
 
 # -- flickering ------------------------------------------------------------------------------------------------------
 
-WORDS: dict[Mode, DriveMode] = {mode: DriveMode(mode=mode, said=mode) for mode in ("autonomous", "manual", "unknown")}
+REPORTED: dict[Mode, DriveMode] = {
+    mode: DriveMode(mode=mode, text=mode) for mode in ("autonomous", "manual", "unknown")
+}
 
 
 def runs() -> st.SearchStrategy[list[tuple[Mode, float]]]:
-    """Modes, each told for a while."""
+    """Modes, each reported for a while."""
     return st.lists(
         st.tuples(st.sampled_from(["autonomous", "manual", "unknown"]), st.floats(0.02, 4.0)), min_size=1, max_size=40
     )
@@ -268,12 +270,12 @@ def reported(periods: Iterable[tuple[Mode, float]]) -> Iterator[tuple[float, Mod
 @example([("autonomous", 3.0), *[("manual", 0.2), ("autonomous", 0.2)] * 20])
 @example([("manual", 0.5), ("autonomous", 0.5)] * 20)
 @settings(max_examples=60, deadline=None)
-def test_whatever_the_topic_says_changes_are_bounded_ordered_and_counted(periods: list[tuple[Mode, float]]) -> None:
+def test_whatever_the_topic_reports_changes_are_bounded_ordered_and_counted(periods: list[tuple[Mode, float]]) -> None:
     summary, state, tick_s = DrivingSummary(), State(), 0.0
     state.link(LinkFacts(phase="monitoring"))
     spoken: list[Mode] = []
     for at_s, mode in reported(periods):
-        state.receive("mode", WORDS[mode], at_s)
+        state.receive("mode", REPORTED[mode], at_s)
         state.receive("speed", Twist(speed_mps=5.0), at_s)
         spoken.append(mode)
         while tick_s <= at_s:
@@ -282,12 +284,12 @@ def test_whatever_the_topic_says_changes_are_bounded_ordered_and_counted(periods
     summary.step(state.snapshot(at_s), LIMITS)
     for tick in range(100):  # it goes on to say the last
         late_s = at_s + (tick + 1) * STEP_S
-        state.receive("mode", WORDS[mode], late_s)
+        state.receive("mode", REPORTED[mode], late_s)
         state.receive("speed", Twist(speed_mps=5.0), late_s)
         summary.step(state.snapshot(late_s), LIMITS)
     watch, changes = summary.driving.watch, summary.changes
     real = sum(one != other for one, other in itertools.pairwise(["unknown", *spoken]))
-    assert watch.changes_heard == real, "each real change is counted"
+    assert watch.changes_received == real, "each real change is counted"
     assert watch.mode == mode, "what stands is believed in the end"
     for one, other in itertools.pairwise(changes):
         assert other.before == one.mode
@@ -299,7 +301,7 @@ def test_whatever_the_topic_says_changes_are_bounded_ordered_and_counted(periods
     assert min(*summary.driving.time_s.values(), *summary.driving.way_m.values()) >= -1e-6
 
 
-def test_a_mode_that_flickers_is_unknown_and_told_twice_however_long_it_does() -> None:
+def test_a_mode_that_flickers_is_unknown_and_reported_twice_however_long_it_does() -> None:
     for turns in (10, 100):
         car = Car()
         car.drive(5.0)
@@ -325,7 +327,7 @@ def test_a_take_over_at_the_end_of_a_flicker_is_found() -> None:
     assert one.at_s == pytest.approx(began_s, abs=0.06)
 
 
-def test_a_link_that_stalls_confirms_no_word_of_a_flicker() -> None:
+def test_a_link_that_stalls_confirms_no_mode_of_a_flicker() -> None:
     car = Car()
     car.drive(5.0)
     car.drive(0.1, mode="manual")

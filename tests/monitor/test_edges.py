@@ -77,13 +77,13 @@ def test_two_inhibitors_of_one_alarm_both_explain_it_and_so_do_theirs() -> None:
 
 def test_the_car_s_clock_is_known_between_question_and_answer() -> None:
     clock = CarClock()
-    assert (clock.ahead_s, clock.asked_s, clock.epoch) == (None, None, 0)
+    assert (clock.ahead_s, clock.requested_s, clock.epoch) == (None, None, 0)
     clock.answered(10.0, 10.5, 110.3)  # ahead by 99.8 … 100.3 s
-    assert (clock.ahead_s, clock.asked_s, clock.epoch) == (pytest.approx(100.3), 10.0, 0)
+    assert (clock.ahead_s, clock.requested_s, clock.epoch) == (pytest.approx(100.3), 10.0, 0)
     clock.answered(11.0, 11.2, 111.1)  # 99.9 … 100.1
     assert clock.ahead_s == pytest.approx(100.1)
     clock.answered(12.0, 12.9, 112.8)  # 99.9 … 100.8: the closest counts
-    assert (clock.ahead_s, clock.asked_s, clock.epoch) == (pytest.approx(100.1), 12.0, 0)
+    assert (clock.ahead_s, clock.requested_s, clock.epoch) == (pytest.approx(100.1), 12.0, 0)
 
 
 @pytest.mark.parametrize(("by_s", "is_another"), [(0.99, False), (1.01, True), (-0.99, False), (-1.01, True)])
@@ -133,7 +133,7 @@ def test_stamps_that_step_back_count_again_after_the_next_answer() -> None:
     assert delay.late_s(110.9, 12.0, clock) is None
     assert delay.late_s(113.0, 13.0, clock) is None
     clock.answered(12.0, 12.0, 112.0)
-    assert delay.late_s(114.0, 14.0, clock) is None  # asked when they stepped back
+    assert delay.late_s(114.0, 14.0, clock) is None  # requested when they stepped back
     clock.answered(14.5, 14.5, 114.5)
     assert delay.late_s(115.0, 15.0, clock) == pytest.approx(0.0)
 
@@ -152,15 +152,15 @@ def test_unusable_messages_are_counted_in_a_row() -> None:
 
 
 @pytest.mark.parametrize(
-    ("reason", "words"),
+    ("reason", "text"),
     [
         ("x.y is not a number", "not a number (x.y)"),
         ("x is not a number, but z", "x is not a number, but z"),
         ("no x", "no x"),
     ],
 )
-def test_the_reason_as_it_follows_a_name(reason: str, words: str) -> None:
-    assert replace(refused({}, "speed", reason, 1.0, 0.5, None)["speed"]).words == words
+def test_the_reason_as_it_follows_a_name(reason: str, text: str) -> None:
+    assert replace(refused({}, "speed", reason, 1.0, 0.5, None)["speed"]).text == text
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_the_reading_before_is_old_enough_and_not_too_old(times: list[float], be
 
 
 def test_a_component_is_stale_after_its_time_and_forgotten_in_the_end() -> None:
-    def said(name: str) -> Diagnostics:
+    def message_of(name: str) -> Diagnostics:
         return Diagnostics(components=(Component(name=name, level=0, message="fine"),))
 
     known_parts = Components()
@@ -231,25 +231,25 @@ def test_a_component_is_stale_after_its_time_and_forgotten_in_the_end() -> None:
         (199.0, "b"),
         (200.0, "b"),
     ]:
-        found = known_parts.merge(said(name), at_s)
+        found = known_parts.merge(message_of(name), at_s)
     assert [one.name for one in found.components] == ["b"]
-    known_parts.merge(said("c"), 200.0)
-    found = known_parts.merge(said("c"), 200.0 + SILENT_AFTER_S)
+    known_parts.merge(message_of("c"), 200.0)
+    found = known_parts.merge(message_of("c"), 200.0 + SILENT_AFTER_S)
     assert [(one.name, one.level) for one in found.components] == [("b", 0), ("c", 0)]
-    found = known_parts.merge(said("c"), 206.0)
+    found = known_parts.merge(message_of("c"), 206.0)
     assert [(one.name, one.level, one.message) for one in found.components] == [
         ("b", 3, "no report for 6 s"),
         ("c", 0, "fine"),
     ]
-    assert [one.name for one in known_parts.merge(said("c"), 200.0 + FORGOTTEN_AFTER_S).components] == ["b", "c"]
-    assert [one.name for one in known_parts.merge(said("c"), 200.1 + FORGOTTEN_AFTER_S).components] == ["c"]
+    assert [one.name for one in known_parts.merge(message_of("c"), 200.0 + FORGOTTEN_AFTER_S).components] == ["b", "c"]
+    assert [one.name for one in known_parts.merge(message_of("c"), 200.1 + FORGOTTEN_AFTER_S).components] == ["c"]
     assert Diagnostics(components=()).worst == 0
 
 
-def test_a_slow_component_gets_three_times_its_period_and_a_second_word_at_once_is_no_period() -> None:
+def test_a_slow_component_gets_three_times_its_period_and_a_second_message_at_once_is_no_period() -> None:
     def merge(parts: Components, at_s: float, *names: str) -> dict[str, int]:
-        said = Diagnostics(components=tuple(Component(name=name, level=0, message="") for name in names))
-        return {one.name: one.level for one in parts.merge(said, at_s).components}
+        message = Diagnostics(components=tuple(Component(name=name, level=0, message="") for name in names))
+        return {one.name: one.level for one in parts.merge(message, at_s).components}
 
     parts = Components()
     for at_s in (90.0, 100.0, 110.0):

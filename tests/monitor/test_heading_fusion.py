@@ -1,4 +1,4 @@
-"""Which way the nose points: who is believed."""
+"""The heading: which source is used."""
 
 from __future__ import annotations
 

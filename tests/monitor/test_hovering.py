@@ -1,6 +1,6 @@
 """A signal that hovers at its limit: ten minutes of a sensor's own noise around a threshold are at most three alarms.
 
-The short rounds show the same in a minute each; what is at its limit must be told at least once, or nothing is tried.
+The short rounds show the same in a minute each; what is at its limit must alarm at least once, or nothing is tested.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ QUANTUM = 100 / 255
 
 @dataclass(frozen=True)
 class Case:
-    """One threshold: the signals that are published and what they say at a moment, by the dice of a sensor."""
+    """One threshold: the signals that are published and their values at a moment, with a sensor's noise."""
 
     alarm: str
     hz: dict[str, float]
     say: Callable[[random.Random, float], dict[str, Value]]
     limits: dict[str, float]
     rates: Callable[[random.Random, float], dict[str, float]] | None = None
-    begins_s: float = 0.0  # before that, `rest` is said
+    begins_s: float = 0.0  # before that, `rest` is sent
     rest: Callable[[random.Random, float], dict[str, Value]] | None = None
 
 
@@ -245,15 +245,15 @@ WITHOUT = {
     "gps_quality": "known or not",
     "signal_unusable": "a value can be used or it cannot",
     "car_unusable": "values can be used or they cannot",
-    "connect_failed": "the link's own word",
-    "bridge_fault": "the bridge's own words",
-    "link_lost": "the link's own word",
+    "connect_failed": "the link's own report",
+    "bridge_fault": "the bridge's own report",
+    "link_lost": "the link's own report",
     "no_message": "time only grows",
-    "log_not_kept": "the disk's own word",
-    "recording_stopped": "the recorder's own word",
+    "log_not_kept": "the disk's own report",
+    "recording_stopped": "the recorder's own report",
     "paused_long": "time only grows",
-    "reach": "somebody hears or nobody does; phones that come and go do so more slowly than its delays",
-    "clock_jump": "steps, told for ten seconds each",
+    "reach": "somebody can hear alarms or nobody can; phones come and go more slowly than its delays",
+    "clock_jump": "steps, reported for ten seconds each",
     "slow_down_unconfirmed": "a ramp is over within seconds, with a deadband of a fifth",
     "slow_down_hold_ended": "time only grows",
     "slow_down_rivals": "somebody else publishes or nobody does",
@@ -340,7 +340,7 @@ def test_every_threshold_is_hovered_about_or_cannot_be() -> None:
 
 
 class Hover(Drive):
-    """A car that says what the dice of a case give it."""
+    """A car that sends the random values of a case."""
 
     def __init__(self, case: Case, seed: int = 1) -> None:
         super().__init__(case.hz, Monitor(limits=catalog.changed(AllLimits(), case.limits)))
@@ -351,12 +351,12 @@ class Hover(Drive):
         case, now_s = self.case, self.now_s
         if case.rates is not None:
             self.hz |= case.rates(self.dice, now_s)
-        said = (case.rest if case.rest is not None and now_s < case.begins_s else case.say)(self.dice, now_s)
-        return said.get(name) or super()._value(name)
+        values = (case.rest if case.rest is not None and now_s < case.begins_s else case.say)(self.dice, now_s)
+        return values.get(name) or super()._value(name)
 
 
 def announced(case: Case, seconds: float) -> list[str]:
-    """The announcements of the check; it is the only one that may speak, but for what its own case brings along."""
+    """The announcements of the check; no other check may announce, but for those that its own case allows."""
     announcements = Hover(case).open().to(seconds).announced
     return [alarm for alarm in announcements if alarm == case.alarm]
 
@@ -369,7 +369,7 @@ def announced(case: Case, seconds: float) -> list[str]:
         for seconds, marks in ((60.0, ()), (600.0, (pytest.mark.soak,)))
     ],
 )
-def test_at_its_limit_a_signal_is_told_at_most_three_times(case: Case, seconds: float) -> None:
+def test_at_its_limit_a_signal_is_reported_at_most_three_times(case: Case, seconds: float) -> None:
     announcements = announced(case, seconds)
     assert 0 < len(announcements) <= AT_MOST
 
@@ -428,7 +428,7 @@ SPOKEN = ("speed", "brake", "accelerator", "position")
 
 
 def few(car: Drive, alarm: str) -> bool:
-    """Told, at most three times, and no other alarm beside it but for the rates that fall with the gaps."""
+    """Reported, at most three times, and no other alarm beside it but for the rates that fall with the gaps."""
     announcements = [name for name in car.announced if not name.startswith(("signal_slow", "all_slow"))]
     return set(announcements) == {alarm} and len(announcements) <= AT_MOST
 
@@ -456,17 +456,17 @@ def test_gaps_about_as_long_as_is_allowed(silent: tuple[str, ...], gap_s: float,
 @pytest.mark.parametrize("held_s", [2.0, 2.5, 4.0])
 def test_a_position_that_moves_on_now_and_then(held_s: float, seconds: float) -> None:
     dice, car, fix, until_s = random.Random(1), Drive({"speed": 20.0, "position": 10.0}).open().to(10.0), None, 0.0
-    car.silent = {"position"}  # it speaks out of turn, below
+    car.silent = {"position"}  # it is sent by itself, below
     while car.now_s < 10.0 + seconds:
         if fix is None or car.now_s >= until_s:
             fix = north(4.0 * car.now_s)
             until_s = car.now_s + held_s + dice.gauss(0.0, 0.1)
-        car.say("position", fix).to(car.now_s + 0.1)
+        car.send("position", fix).to(car.now_s + 0.1)
     assert few(car, "signal_frozen.position")
 
 
 def ride(car: Drive, phone: Callable[[float, GpsFix], PhoneFix | None], seconds: float, every_s: float = 1.0) -> Drive:
-    """A phone in a car that speaks as often; a receiver that says how good it is."""
+    """A phone in a car that reports as often; a receiver that reports its accuracy."""
     car.values["position"] = north(0.0, 1.0)
     while car.now_s < seconds:
         car.to(car.now_s + every_s)
@@ -478,7 +478,7 @@ def ride(car: Drive, phone: Callable[[float, GpsFix], PhoneFix | None], seconds:
             )
         elif (
             car.now_s - (car.state.snapshot(car.now_s).phone.received_s) >= 4.0
-        ):  # a page speaks more often than every 5 s
+        ):  # a page reports more often than every 5 s
             car.state.receive_phone(PhoneReport(phone="one", is_handheld=True, why="unavailable"), car.now_s)
     return car
 
@@ -510,7 +510,7 @@ def test_a_phone_that_goes_almost_its_own_way(seconds: float) -> None:
 
 @LONG
 def test_a_phone_with_a_fix_now_and_then(seconds: float) -> None:
-    """One every ten seconds and a bit, between words that it has none."""
+    """One every ten seconds and a bit, between reports that it has none."""
     car, next_s = Drive({"speed": 20.0, "position": 10.0}).open(), 1.0
 
     def now_and_then(now_s: float, place: GpsFix) -> PhoneFix | None:

@@ -73,7 +73,7 @@ def test_one_silent_signal_is_one_alarm_within_a_second() -> None:
     assert standing(car) == {}
 
 
-def test_a_slow_signal_is_told_and_clears() -> None:
+def test_a_slow_signal_is_reported_and_clears() -> None:
     car = drive().open().to(10.0)
     car.hz["scan"] = 40.0
     car.to(30.0)
@@ -87,7 +87,7 @@ def test_a_slow_signal_is_told_and_clears() -> None:
 
 @pytest.mark.parametrize("gap_s", [0.3, 0.6, 0.9])
 def test_a_hiccup_shorter_than_silence_is_no_alarm(gap_s: float) -> None:
-    """Wi-Fi loses everything for less than a second: nothing worth a word."""
+    """Wi-Fi loses everything for less than a second: nothing worth a report."""
     car = drive().open().to(20.0)
     car.silent = set(REAL_HZ)
     car.to(20.0 + gap_s)
@@ -137,7 +137,7 @@ def test_a_dead_laser_is_its_signals_alarm_not_the_cars() -> None:
 @pytest.mark.parametrize("found_after_s", [0.0, 0.9, 1.2, 2.5])
 @pytest.mark.parametrize("lost_for_s", [0.2, 2.0, 12.0])
 def test_a_lost_link_is_one_announcement_and_its_return_none(found_after_s: float, lost_for_s: float) -> None:
-    """Half-open links are found within 2.5 s; until then nobody knows yet whose silence it is."""
+    """Half-open links are found within 2.5 s; until then it is unknown whether the car or the link is silent."""
     car = drive().open().to(20.0)
     car.bridge_alive = False
     car.to(20.0 + found_after_s).lose().to(20.0 + found_after_s + lost_for_s)
@@ -156,7 +156,7 @@ def test_signals_that_come_back_slowly_after_a_loss_have_their_time() -> None:
     assert car.announced == ["link_lost"]
 
 
-def test_what_was_wrong_before_the_loss_and_still_is_is_not_told_again() -> None:
+def test_what_was_wrong_before_the_loss_and_still_is_is_not_reported_again() -> None:
     car = drive().open().to(10.0)
     car.values["speed"] = Twist(speed_mps=12.0)
     car.silent = {"brake"}
@@ -174,7 +174,7 @@ def test_what_was_wrong_before_the_loss_and_still_is_is_not_told_again() -> None
     }
 
 
-def test_what_went_wrong_during_the_loss_is_told_at_once_after_it() -> None:
+def test_what_went_wrong_during_the_loss_is_reported_at_once_after_it() -> None:
     """A new danger waits for no grace."""
     car = drive().open().to(10.0).lose().to(20.0)
     car.values["speed"] = Twist(speed_mps=12.0)
@@ -182,7 +182,7 @@ def test_what_went_wrong_during_the_loss_is_told_at_once_after_it() -> None:
     assert car.announced == ["link_lost", "speed_limit"]
 
 
-def test_a_signal_that_does_not_come_back_is_told_after_the_grace() -> None:
+def test_a_signal_that_does_not_come_back_is_reported_after_the_grace() -> None:
     car = drive().open().to(10.0).lose().to(20.0)
     car.silent = {"brake"}
     car.open().to(40.0)
@@ -221,12 +221,12 @@ def test_case_01_connecting_failed_and_then_succeeded() -> None:
     car = drive().phase("failed", problem_title="No such host.").to(10.0)
     assert car.announced == ["connect_failed"]
     car.phase("connecting").to(11.0).phase("failed", problem_title="Nobody answers.").to(20.0)
-    assert car.announced == ["connect_failed"]  # keeps trying, says it once
+    assert car.announced == ["connect_failed"]  # keeps trying, reports it once
     car.open().to(30.0)
     assert standing(car) == {}
 
 
-def test_case_17_speeding_is_told_within_its_delay_and_clears_below_the_deadband() -> None:
+def test_case_17_speeding_is_reported_within_its_delay_and_clears_below_the_deadband() -> None:
     car = drive().open().to(10.0)
     car.values["speed"] = Twist(speed_mps=12.0)
     car.to(12.0)
@@ -242,7 +242,7 @@ def test_case_17_speeding_is_told_within_its_delay_and_clears_below_the_deadband
 
 def test_a_spike_shorter_than_the_delay_is_none() -> None:
     car = drive().open().to(10.0)
-    car.say("speed", Twist(speed_mps=30.0)).to(20.0)
+    car.send("speed", Twist(speed_mps=30.0)).to(20.0)
     assert car.log == []
 
 
@@ -256,7 +256,7 @@ def test_a_stale_speed_does_not_clear_the_speed_alarm() -> None:
     assert car.announced == ["speed_limit", "signal_stale.speed"]
 
 
-def test_paused_nothing_is_told_but_the_link() -> None:
+def test_paused_nothing_is_reported_but_the_link() -> None:
     car = drive().open().to(10.0).pause()
     car.values["speed"] = Twist(speed_mps=12.0)
     car.silent = {"brake"}
@@ -287,7 +287,7 @@ def test_the_operators_rate_is_what_a_signal_is_held_to() -> None:
 
 @pytest.mark.parametrize("back_s", [2.0, 3600.0])
 def test_a_clock_that_goes_back_raises_nothing_and_clears_nothing(back_s: float) -> None:
-    """A recording that begins again. The car of the test knows only one clock, so the judge is told another."""
+    """A recording that begins again. The car of the test has only one clock, so the judge is given another."""
     car = drive().open().to(20.0)
     car.values["speed"] = Twist(speed_mps=12.0)
     car.to(21.0)

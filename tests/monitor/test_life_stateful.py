@@ -1,5 +1,5 @@
 """Any history of a monitor with three alarms that explain each other: judged, answered, paused, restarted, ended, on a
-clock that also goes back. What the log says is what stands; nothing unseen vanishes; UNKNOWN decides nothing."""
+clock that also goes back. What the log reports is what stands; nothing unseen vanishes; UNKNOWN decides nothing."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class Life(RuleBasedStateMachine):
 
     @rule(back_s=st.sampled_from([0.1, 5.0, 3600.0]))
     def set_clock_back(self, back_s: float) -> None:
-        """Noticed, and made up for, at the next judgement; what is told after it is on the new clock."""
+        """Noticed, and made up for, at the next judgement; what is reported after it is on the new clock."""
         self.remember()
         self.now_s -= back_s
         self.transitions = [
@@ -163,7 +163,7 @@ class Life(RuleBasedStateMachine):
 
     @rule()
     def end(self) -> None:
-        """By the operator's wish: it is in the log, and nothing stands."""
+        """At the operator's request: it is in the log, and nothing stands."""
         self.remember()
         self.hear(self.monitor.end(self.now_s))
         self.seen.update(NAMES)

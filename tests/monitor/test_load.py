@@ -32,7 +32,7 @@ def change_of(at_s: float, change: Change = "raised", name: str = "a", announces
         ([float(n) for n in range(10)], 10.0, 10, False, False),
         ([float(n) for n in range(11)], 11.0, 11, True, False),
         ([float(n) for n in range(11)], 600.5, 10, False, False),
-        ([-30.0], 10.0, 1, False, True),  # told before this run
+        ([-30.0], 10.0, 1, False, True),  # announced before this run
     ],
 )
 def test_alarms_of_the_last_ten_minutes(

@@ -62,7 +62,7 @@ def test_after_a_gap_it_begins_anew() -> None:
     assert slope.add(20.0, 10.0) is None
 
 
-def test_what_cannot_be_told_is_none() -> None:
+def test_what_cannot_be_known_is_none() -> None:
     slope = Slope()
     assert [slope.add(1.0, float(n)) for n in range(9)] == [None] * 9  # one moment has no slope
     assert slope.add(1.1, float("nan")) is None

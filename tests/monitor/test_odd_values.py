@@ -171,8 +171,8 @@ def test_no_check_fails_and_nobody_reads_nan(happening: list[Any], published: bo
     for later_s, (name, value), stamp_s in happening:
         now_s += later_s
         if name == "phone":
-            word = PhoneReport(phone="one", is_handheld=True, fix=value, measured_s=now_s)
-            state.receive_phone(word, now_s)
+            report = PhoneReport(phone="one", is_handheld=True, fix=value, measured_s=now_s)
+            state.receive_phone(report, now_s)
         else:
             state.receive(name, value, now_s, stamp_s)
         look_at(state.snapshot(now_s))

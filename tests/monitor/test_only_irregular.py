@@ -1,4 +1,4 @@
-"""Where only signals without a rate of their own were heard, what is missing is named in the usual time."""
+"""Where only signals without a rate of their own were received, what is missing is named in the usual time."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from tests.monitor.drive import REAL_HZ, Drive
 MISSING = {f"signal_stale.{name}" for name in REAL_HZ if name != "diagnostics" and not SIGNALS[name].optional}
 
 
-def opened(*heard: str, reports: int) -> Drive:
+def opened(*received: str, reports: int) -> Drive:
     """A car that has all topics and sends only these, so many times."""
     car = Drive()
     car.link = replace(car.link, published=frozenset({*REAL_HZ, "fuel"}))
     car.silent = set(REAL_HZ)
     car.open()
     for number in range(reports):
-        for name in heard:
-            car.say(name, car.values.get(name, Level(value=60.0, unit="%")))
+        for name in received:
+            car.send(name, car.values.get(name, Level(value=60.0, unit="%")))
         car.to(number + 1.0)
     return car
 
 
-@pytest.mark.parametrize("heard", ["diagnostics", "fuel"])
+@pytest.mark.parametrize("received", ["diagnostics", "fuel"])
 @pytest.mark.parametrize("reports", [1, 2, 4])
-def test_one_report_or_two_do_not_hide_that_nothing_else_comes(heard: str, reports: int) -> None:
-    car = opened(heard, reports=reports)
+def test_one_report_or_two_do_not_hide_that_nothing_else_comes(received: str, reports: int) -> None:
+    car = opened(received, reports=reports)
     car.to(4.9)
     assert not MISSING & set(car.announced)
     car.to(10.0)
@@ -41,7 +41,7 @@ def test_one_report_or_two_do_not_hide_that_nothing_else_comes(heard: str, repor
 def test_after_the_link_came_back_too() -> None:
     car = Drive().open().to(10.0)
     car.silent = set(REAL_HZ)
-    car.lose().to(12.0).open().say("diagnostics", car.values["diagnostics"]).to(20.0)
+    car.lose().to(12.0).open().send("diagnostics", car.values["diagnostics"]).to(20.0)
     assert set(car.announced) >= MISSING
 
 

@@ -20,7 +20,7 @@ def at(north_m: float = 0.0, accuracy_m: float = 5.0) -> PhoneFix:
 
 
 class Road:
-    """A car that drives north, ten positions a second, and phones that speak when told to."""
+    """A car that drives north, ten positions a second, and phones that report when the test lets them."""
 
     def __init__(self, speed_mps: float = 0.0) -> None:
         self.phones = Phones()
@@ -43,18 +43,18 @@ class Road:
         return self
 
     def wait(self, seconds: float) -> Road:
-        """Time passes and the car says nothing."""
+        """Time passes and the car sends nothing."""
         self.now_s = round(self.now_s + seconds, 3)
         return self
 
-    def say(self, phone: str = "one", aside_m: float = 0.0, *, age_s: float = 0.2, **more: Any) -> Road:
+    def report(self, phone: str = "one", aside_m: float = 0.0, *, age_s: float = 0.2, **more: Any) -> Road:
         """`aside_m` north of where the car was at the moment of the fix."""
         north_m = self.speed_mps * (self.now_s - age_s - 100.0) + aside_m
         accuracy_m, handheld = more.pop("accuracy_m", 5.0), more.pop("is_handheld", True)
-        word = PhoneReport(
+        report = PhoneReport(
             phone=phone, is_handheld=handheld, fix=at(north_m, accuracy_m), measured_s=self.now_s - age_s, **more
         )
-        self.phones.receive(word, self.now_s)
+        self.phones.receive(report, self.now_s)
         return self
 
     def excuse(self, why: Why, phone: str = "one", *, is_handheld: bool = True) -> Road:
@@ -70,7 +70,7 @@ def test_before_any_phone_speaks_there_is_none() -> None:
 @pytest.mark.parametrize("age_s", [0.0, 0.25, 1.5, 4.9])
 def test_the_car_is_looked_up_at_the_phone_s_own_time(age_s: float) -> None:
     """At 10 m/s a comparison with the car's newest position would be wrong by 10 m for each second of age."""
-    road = Road(10.0).drive(8.0).say(age_s=age_s)
+    road = Road(10.0).drive(8.0).report(age_s=age_s)
     (one,) = road.view.comparisons
     assert one.distance_m == pytest.approx(0.0, abs=0.05)
     assert one.at_s == pytest.approx(108.0 - age_s)
@@ -78,34 +78,34 @@ def test_the_car_is_looked_up_at_the_phone_s_own_time(age_s: float) -> None:
 
 @pytest.mark.parametrize(("aside_m", "bearing_deg"), [(40.0, 180.0), (-40.0, 0.0)])
 def test_the_bearing_of_the_car_from_the_phone(aside_m: float, bearing_deg: float) -> None:
-    (one,) = Road(10.0).drive(3.0).say(aside_m=aside_m).view.comparisons
+    (one,) = Road(10.0).drive(3.0).report(aside_m=aside_m).view.comparisons
     assert one.bearing_deg % 360.0 == pytest.approx(bearing_deg, abs=0.1)
 
 
 def test_a_fix_newer_than_the_car_s_newest_position_waits_for_the_next() -> None:
-    road = Road(10.0).drive(3.0).wait(0.05).say(age_s=0.0)
+    road = Road(10.0).drive(3.0).wait(0.05).report(age_s=0.0)
     assert road.view.comparisons == ()
     road.drive(0.05)
     assert [one.distance_m for one in road.view.comparisons] == pytest.approx([0.0], abs=0.05)
 
 
 def test_a_fix_for_which_the_car_s_position_never_comes_is_not_compared() -> None:
-    road = Road(10.0).drive(3.0).say(age_s=0.0).drive(0.1)
+    road = Road(10.0).drive(3.0).report(age_s=0.0).drive(0.1)
     assert len(road.view.comparisons) == 1
-    road.wait(0.5).say(age_s=0.0).wait(2.5).drive(1.0)  # a gap of 3 s: nobody knows how the car drove in it
+    road.wait(0.5).report(age_s=0.0).wait(2.5).drive(1.0)  # a gap of 3 s: nobody knows how the car drove in it
     assert len(road.view.comparisons) == 1
 
 
-def test_one_fix_told_twice_is_compared_once() -> None:
-    road = Road().drive(2.0).say(age_s=0.2)
-    road.say(age_s=0.2).drive(0.5).say(age_s=0.7).say(age_s=0.9)
+def test_one_fix_reported_twice_is_compared_once() -> None:
+    road = Road().drive(2.0).report(age_s=0.2)
+    road.report(age_s=0.2).drive(0.5).report(age_s=0.7).report(age_s=0.9)
     assert len(road.view.comparisons) == 1
 
 
 def test_five_comparisons_and_a_minute_of_track_are_kept() -> None:
     road = Road(5.0)
     for _ in range(90):
-        road.drive(1.0).say(aside_m=3.0)
+        road.drive(1.0).report(aside_m=3.0)
     assert len(road.view.comparisons) == 5
     assert all(one.distance_m == pytest.approx(3.0, abs=0.1) for one in road.view.comparisons)
     assert road.view.tracks is not None
@@ -118,35 +118,35 @@ def test_places_that_the_gate_does_not_explain_are_no_part_of_the_track() -> Non
     """Else a receiver that ran away for five seconds would spoil the correlation of the next minute."""
     road = Road(5.0)
     for second in range(60):
-        road.drive(1.0).say(aside_m=200.0 if 40 <= second < 45 else 3.0)
+        road.drive(1.0).report(aside_m=200.0 if 40 <= second < 45 else 3.0)
     assert road.view.tracks is not None
     assert road.view.tracks.pairs == 55
     assert road.view.tracks.correlation == pytest.approx(1.0, abs=1e-6)
     for _ in range(70):
-        road.drive(1.0).say(aside_m=200.0)
+        road.drive(1.0).report(aside_m=200.0)
     assert road.view.tracks.pairs == 0
 
 
 def test_however_fast_a_phone_speaks_what_is_kept_is_bounded() -> None:
     road = Road(5.0)
     for _ in range(600):
-        road.drive(0.1).say(age_s=0.05)
+        road.drive(0.1).report(age_s=0.05)
     assert road.view.tracks is not None
     assert road.view.tracks.pairs <= phones.TRACK_S / phones.STEP_S + 1
     assert road.view.tracks.span_s > 59.0
 
 
 def test_old_comparisons_do_not_count() -> None:
-    road = Road().drive(1.0).say().drive(1.0).say().drive(phones.COMPARED_WITHIN_S).say()
+    road = Road().drive(1.0).report().drive(1.0).report().drive(phones.COMPARED_WITHIN_S).report()
     assert len(road.view.comparisons) == 2  # the first is 16 s older
 
 
 def test_what_is_uncertain_of_the_moment_widens_the_gate() -> None:
-    sure, unsure = (Road(10.0).drive(3.0).say(uncertain_s=s).view.comparisons[0].gate_m for s in (0.0, 0.9))
+    sure, unsure = (Road(10.0).drive(3.0).report(uncertain_s=s).view.comparisons[0].gate_m for s in (0.0, 0.9))
     # The phone stands where the car was: no direction, so the gate is that across the way and does not grow.
     assert sure == pytest.approx(unsure)
     sure, unsure = (
-        Road(10.0).drive(3.0).say(aside_m=30.0, uncertain_s=s).view.comparisons[0].gate_m for s in (0.0, 0.9)
+        Road(10.0).drive(3.0).report(aside_m=30.0, uncertain_s=s).view.comparisons[0].gate_m for s in (0.0, 0.9)
     )
     assert unsure > sure + 20.0
 
@@ -164,7 +164,7 @@ def test_what_is_uncertain_of_the_moment_widens_the_gate() -> None:
     ],
 )
 def test_which_fixes_are_used(more: dict[str, Any], why: Why | None) -> None:
-    road = Road().drive(8.0).say(**more)
+    road = Road().drive(8.0).report(**more)
     assert road.view.why == why
     assert len(road.view.comparisons) == (why is None)
     assert road.view.fix is not None  # shown all the same
@@ -172,11 +172,11 @@ def test_which_fixes_are_used(more: dict[str, Any], why: Why | None) -> None:
 
 @pytest.mark.parametrize("why", ["denied", "unavailable", "timeout", "insecure", "hidden"])
 def test_a_reason_is_kept_with_the_time_since_the_last_fix(why: Why) -> None:
-    road = Road().drive(2.0).say(age_s=0.0)
+    road = Road().drive(2.0).report(age_s=0.0)
     road.drive(3.0).excuse(why)
     assert road.view.why_not(road.now_s) == why
     assert road.view.missing_s(road.now_s) == pytest.approx(3.0)
-    road.drive(1.0).say(age_s=0.0)
+    road.drive(1.0).report(age_s=0.0)
     assert road.view.why_not(road.now_s) is None
     assert road.view.missing_s(road.now_s) == 0.0
 
@@ -187,7 +187,7 @@ def test_a_phone_that_never_had_a_fix_is_missing_since_it_first_spoke() -> None:
 
 
 def test_silence_is_noticed_by_time_alone() -> None:
-    road = Road().drive(2.0).say(age_s=0.0)
+    road = Road().drive(2.0).report(age_s=0.0)
     assert road.view.why_not(road.now_s + 5.0) is None
     assert road.view.why_not(road.now_s + 5.1) == "silent"
     assert road.view.is_there(road.now_s + 60.0)
@@ -195,12 +195,12 @@ def test_silence_is_noticed_by_time_alone() -> None:
 
 
 def test_a_page_that_speaks_without_a_newer_fix_has_an_old_one() -> None:
-    road = Road().drive(6.0).say(age_s=4.0).wait(2.0)
+    road = Road().drive(6.0).report(age_s=4.0).wait(2.0)
     assert road.view.why_not(road.now_s) == "old"
 
 
 def test_a_phone_that_leaves_is_no_phone_any_more() -> None:
-    road = Road().drive(2.0).say().excuse("off")
+    road = Road().drive(2.0).report().excuse("off")
     assert road.view is NO_PHONE
 
 
@@ -208,45 +208,45 @@ def test_a_phone_that_leaves_is_no_phone_any_more() -> None:
 
 
 def test_the_first_with_a_fix_is_compared_and_stays_so() -> None:
-    road = Road().drive(2.0).excuse("timeout", "early").say("one").say("two", aside_m=300.0)
+    road = Road().drive(2.0).excuse("timeout", "early").report("one").report("two", aside_m=300.0)
     for _ in range(5):
-        road.drive(1.0).say("two", aside_m=300.0).say("one")
+        road.drive(1.0).report("two", aside_m=300.0).report("one")
     assert (road.view.phone, road.view.count) == ("one", 3)
     assert max(one.distance_m for one in road.view.comparisons) < 1.0
 
 
 def test_the_next_takes_over_when_the_first_has_none_for_10_s_and_nothing_of_the_first_counts_for_it() -> None:
-    road = Road().drive(2.0).say("one")
+    road = Road().drive(2.0).report("one")
     for second in range(1, 14):
-        road.drive(1.0).excuse("timeout", "one").say("two", aside_m=300.0)
+        road.drive(1.0).excuse("timeout", "one").report("two", aside_m=300.0)
         assert road.view.phone == ("one" if second <= 9 else "two"), second
     assert [round(one.distance_m) for one in road.view.comparisons] == [300] * 4
     assert road.view.tracks is not None
     assert road.view.tracks.pairs == 0  # what lies beyond the gate is no track
-    road.drive(1.0).say("one").say("two")
+    road.drive(1.0).report("one").report("two")
     assert road.view.phone == "two"  # who comes back is the next again, and does not push in
 
 
 def test_the_next_takes_over_at_once_from_one_that_leaves() -> None:
-    road = Road().drive(2.0).say("one").say("two").excuse("off", "one")
+    road = Road().drive(2.0).report("one").report("two").excuse("off", "one")
     assert (road.view.phone, road.view.count) == ("two", 1)
 
 
-def test_without_any_fix_the_phone_in_a_hand_is_told_of_and_not_the_desk() -> None:
-    road = Road().drive(2.0).excuse("unavailable", "desk", is_handheld=False)
-    assert road.view.phone == "desk"
+def test_without_any_fix_the_handheld_phone_is_reported_and_not_the_desktop() -> None:
+    road = Road().drive(2.0).excuse("unavailable", "desktop", is_handheld=False)
+    assert road.view.phone == "desktop"
     road.excuse("denied", "hand")
     assert (road.view.phone, road.view.why) == ("hand", "denied")
-    road.excuse("timeout", "other").excuse("unavailable", "desk", is_handheld=False)
+    road.excuse("timeout", "other").excuse("unavailable", "desktop", is_handheld=False)
     assert road.view.phone == "hand"
 
 
-def test_those_not_heard_for_a_minute_are_forgotten_and_their_number_is_bounded() -> None:
+def test_those_silent_for_a_minute_are_forgotten_and_their_number_is_bounded() -> None:
     road = Road()
     for i in range(phones.MOST + 10):
         road.excuse("denied", f"phone {i}")
     assert road.view.count == phones.MOST
-    road.wait(61.0).say("late one")
+    road.wait(61.0).report("late one")
     assert (road.view.phone, road.view.count) == ("late one", 1)
 
 
@@ -281,51 +281,51 @@ def test_another_connection_begins_without_phones() -> None:
     assert state.snapshot(100.1).phone is NO_PHONE
 
 
-# -- the phone that rides in the car -----------------------------------------------------------------------------------
+# -- the phone that is in the car --------------------------------------------------------------------------------------
 
 
 def test_the_chosen_phone_is_compared_though_another_came_first() -> None:
-    road = Road().drive(2.0).say("one").say("two", aside_m=9.0)
+    road = Road().drive(2.0).report("one").report("two", aside_m=9.0)
     assert (road.view.phone, road.view.is_chosen) == ("one", False)
     road.phones.ride("two", road.now_s)
     assert (road.view.phone, road.view.is_chosen, road.view.comparisons) == ("two", True, ())
-    road.drive(1.0).say("one").say("two", aside_m=9.0)
+    road.drive(1.0).report("one").report("two", aside_m=9.0)
     assert [one.distance_m for one in road.view.comparisons] == pytest.approx([9.0], abs=0.05)
 
 
 @pytest.mark.parametrize("why", ["denied", "hidden", "timeout", "off"])
 def test_no_other_takes_its_place_whatever_becomes_of_it(why: Why) -> None:
-    road = Road().drive(2.0).say("one").say("two")
+    road = Road().drive(2.0).report("one").report("two")
     road.phones.ride("two", road.now_s)
     road.excuse(why, "two")
     for _ in range(70):  # longer than any other phone is remembered
-        road.drive(1.0).say("one")
+        road.drive(1.0).report("one")
     assert road.view.phone == "two"
     assert road.view.fix is not None
     assert road.view.why_not(road.now_s) == ("off" if why == "off" else "silent")
     assert road.view.is_there(road.now_s + 1000.0)  # it is missed for ever
 
 
-def test_a_phone_that_was_not_heard_of_yet_is_waited_for() -> None:
-    road = Road().drive(2.0).say("one")
+def test_a_phone_that_has_not_reported_yet_is_waited_for() -> None:
+    road = Road().drive(2.0).report("one")
     road.phones.ride("two", road.now_s)
     assert road.view.phone == "two"
     assert road.view.why_not(road.now_s + 6.0) == "silent"
     assert road.view.missing_s(road.now_s + 6.0) == pytest.approx(6.0)
-    road.drive(1.0).say("two")
+    road.drive(1.0).report("two")
     assert road.view.why_not(road.now_s) is None
     assert len(road.view.comparisons) == 1
 
 
 def test_when_the_choice_is_taken_back_one_is_found_as_before() -> None:
-    road = Road().drive(2.0).say("one")
+    road = Road().drive(2.0).report("one")
     road.phones.ride("two", road.now_s)
     road.phones.ride(None, road.now_s)
     assert (road.view.phone, road.view.is_chosen, road.view.count) == ("one", False, 1)  # the one waited for is gone
 
 
 def test_every_phone_is_seen_each_with_its_own_reason() -> None:
-    road = Road().drive(2.0).say("one").say("two", accuracy_m=80.0).excuse("denied", "three")
+    road = Road().drive(2.0).report("one").report("two", accuracy_m=80.0).excuse("denied", "three")
     assert [(view.phone, view.why_not(road.now_s)) for view in road.phones.views] == [
         ("one", None), ("two", "coarse"), ("three", "denied"),
     ]  # fmt: skip

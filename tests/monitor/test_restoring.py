@@ -1,4 +1,4 @@
-"""After a restart: where the alarms stand is where the log of transitions says they stood."""
+"""After a restart: the alarms have the states that the log of transitions recorded."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TRIP = fault("12.6 m/s", causes=("a",))._replace(measured=Quantity(label="Speed"
 
 
 def lived(*findings: Finding, spec: AlarmSpec = PATIENT, each_s: float = 1.0) -> tuple[Alarm, list[Transition]]:
-    """An alarm that saw these findings, one a second, and what was told of it."""
+    """An alarm that saw these findings, one a second, and what was reported of it."""
     alarm, transitions = Alarm(id="hot", spec=spec), []
     for number, finding in enumerate(findings):
         alarm, happened = advance(alarm, finding, number * each_s)
@@ -38,7 +38,7 @@ def restored(transitions: list[Transition], spec: AlarmSpec = PATIENT) -> Alarm:
 
 
 def same(one: Alarm, other: Alarm) -> bool:
-    """In everything the operator is told of."""
+    """In everything that is reported to the operator."""
     return (
         (one.active, one.acknowledged, one.occurrence) == (other.active, other.acknowledged, other.occurrence)
         and one.shelved_until_s == other.shelved_until_s
@@ -126,7 +126,7 @@ def test_unknown_after_a_restart_clears_nothing(
     assert alarm.acknowledged <= was.acknowledged  # the end of shelving may ask anew; nothing answers by itself
 
 
-def test_an_unacknowledged_return_stays_until_somebody_says_that_they_saw_it() -> None:
+def test_an_unacknowledged_return_stays_until_somebody_acknowledges_it() -> None:
     live, transitions = lived(BAD, OK, OK, OK)
     assert live.state is AlarmState.RTN_UNACKED
     alarm = restored(transitions)
@@ -150,7 +150,7 @@ def test_the_trip_comes_back_with_its_values() -> None:
     _, transitions = lived(TRIP, TRIP)
     alarm = restored(transitions)
     assert alarm.trip == TRIP
-    assert alarm.finding is None  # what the check says now is not known
+    assert alarm.finding is None  # what the check finds now is not known
     assert not alarm.condition
 
 

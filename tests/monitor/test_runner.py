@@ -19,14 +19,14 @@ AT_ONCE = replace(SPEC, on_delay_s=0.0, off_delay_s=0.0)
 
 
 class Script:
-    """A check that finds what it is told to, and remembers how often it was asked."""
+    """A check that returns a given finding, and counts its calls."""
 
     def __init__(self, finding: Finding | Exception = OK) -> None:
         self.finding = finding
-        self.asked = 0
+        self.calls = 0
 
     def __call__(self, snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
-        self.asked += 1
+        self.calls += 1
         if isinstance(self.finding, Exception):
             raise self.finding
         return self.finding
@@ -54,14 +54,14 @@ def test_a_tick_judges_all_and_a_message_the_immediate_checks_that_need_it() -> 
         ]
     )
     monitor.step(at(0.0))
-    assert (a.asked, b.asked, c.asked) == (1, 1, 1)
+    assert (a.calls, b.calls, c.calls) == (1, 1, 1)
     monitor.step(at(0.1), ("speed",))
-    assert (a.asked, b.asked, c.asked) == (2, 1, 1)
+    assert (a.calls, b.calls, c.calls) == (2, 1, 1)
     monitor.step(at(0.2), ("speed", "acceleration", "brake"))
-    assert (a.asked, b.asked, c.asked) == (3, 1, 1)
+    assert (a.calls, b.calls, c.calls) == (3, 1, 1)
     monitor.step(at(0.3), ("scan",))
     monitor.step(at(0.3), ())
-    assert (a.asked, b.asked, c.asked) == (3, 1, 1)
+    assert (a.calls, b.calls, c.calls) == (3, 1, 1)
     assert monitor.has_immediate(("speed",))
     assert not monitor.has_immediate(("scan",))
 
@@ -132,7 +132,7 @@ def test_one_more_broken_check_is_announced_and_a_repaired_one_clears() -> None:
     assert [(t.alarm_id, t.change, t.at_s) for t in happened] == [(IMPAIRED, "cleared", 12.0)]
 
 
-def test_a_check_that_breaks_on_an_event_is_told_at_once() -> None:
+def test_a_check_that_breaks_on_an_event_is_reported_at_once() -> None:
     monitor = Monitor([check("a", Script(RuntimeError("a")), needs=frozenset({"speed"}), immediate=True)])
     assert [t.alarm_id for t in monitor.step(at(0.0), ("speed",))] == [IMPAIRED]
 
@@ -143,7 +143,7 @@ def test_without_a_link_nothing_of_the_car_is_checked(phase: str) -> None:
     monitor = Monitor([check("a", car), check("b", link, scope=Scope.LINK), check("c", server, scope=Scope.SERVER)])
     happened = monitor.step(at(0.0, phase))
     assert [t.alarm_id for t in happened] == ["b", "c"]
-    assert (car.asked, monitor.findings["a"].brief) == (0, "not checked: no link")
+    assert (car.calls, monitor.findings["a"].brief) == (0, "not checked: no link")
 
 
 def test_a_pause_suppresses_all_but_the_link_and_brings_back_what_stood() -> None:
@@ -206,7 +206,7 @@ def test_what_the_operator_does() -> None:
         monitor.acknowledge("b", 1, "Ann", 0.8)
 
 
-def test_a_refused_wish_changes_nothing() -> None:
+def test_a_refused_request_changes_nothing() -> None:
     monitor = Monitor([check("a", Script(BAD))])
     monitor.step(at(0.0))
     before = monitor.alarms["a"]

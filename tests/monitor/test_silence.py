@@ -28,7 +28,7 @@ def silenced() -> Alarm:
     return silence(standing(), 1, "Ann", 12.0)[0]
 
 
-def test_a_silenced_alarm_stands_unacknowledged_and_says_by_whom() -> None:
+def test_a_silenced_alarm_stands_unacknowledged_and_shows_by_whom() -> None:
     alarm, (happened,) = silence(standing(), 1, "Ann", 12.0)
     assert (alarm.sound, alarm.state, alarm.occurrence) == (Sound.NONE, AlarmState.UNACKED, 1)
     assert (alarm.silenced_until_s, alarm.silenced_by) == (12.0 + SILENCE_S, "Ann")
@@ -70,7 +70,7 @@ def test_a_clock_that_goes_back_makes_it_no_longer() -> None:
     assert advance(back, BAD, 32.0)[0].sound is Sound.MEDIUM
 
 
-def test_its_acknowledgement_ends_it_and_its_end_is_then_not_said() -> None:
+def test_its_acknowledgement_ends_it_and_its_end_is_then_not_reported() -> None:
     alarm, _ = acknowledge(silenced(), 1, "Ben", 14.0)
     assert (alarm.silenced_until_s, alarm.silenced_by) == (None, None)
     assert advance(alarm, BAD, 43.0)[1] == ()

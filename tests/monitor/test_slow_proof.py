@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from monitor.check import Verdict
-from monitor.checks.slow_down import BEFORE_UNKNOWN, STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, obeys
+from monitor.checks.slow_down import BEFORE_UNKNOWN, STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, is_followed
 from monitor.shell_facts import SlowingFacts
 from monitor.slow_proof import ProofFollower
 from monitor.state import State
@@ -23,7 +23,7 @@ CAR = SlowCar(
     speed_mps=6.0,
     own_mps2=1.0,
     began_s=1.0,
-    obeys=False,
+    complies=False,
     lag_s=0.2,
     builds_s=0.1,
     deceleration_mps2=1.5,
@@ -38,7 +38,7 @@ CAR = SlowCar(
 
 def false_proofs(count: int, seed: int) -> list[SlowCar]:
     rng = random.Random(seed)
-    cars = (random_car(rng, obeys=False) for _ in range(count))
+    cars = (random_car(rng, complies=False) for _ in range(count))
     return [car for car in cars if car.judged().shown is not None]
 
 
@@ -46,18 +46,18 @@ def late_proofs(count: int, seed: int) -> list[SlowCar]:
     rng = random.Random(seed)
     found = []
     for _ in range(count):
-        car = random_car(rng, obeys=True)
+        car = random_car(rng, complies=True)
         shown_s = car.judged().shown_s
         if shown_s is None or shown_s - ORDERED_S - car.responds_s > 1.0:
             found.append(car)
     return found
 
 
-def test_of_cars_that_do_not_obey_nothing_is_shown() -> None:
+def test_of_cars_that_do_not_comply_nothing_is_shown() -> None:
     assert false_proofs(200, seed=1) == []
 
 
-def test_of_cars_that_obey_it_is_shown_within_a_second_of_the_response() -> None:
+def test_of_cars_that_comply_it_is_shown_within_a_second_of_the_response() -> None:
     assert len(late_proofs(200, seed=2)) <= 4  # by chance more come in one of 20 seeds where one in a hundred is late
 
 
@@ -100,7 +100,7 @@ def test_proof_within_a_second_of_the_response_in_99_of_100_runs() -> None:
         {"manner": "downhill"},
         {"manner": "eases off", "began_s": 0.3},
         {"manner": "stands", "noise_mps": 0.1},
-        {"obeys": True, "freezes": True},
+        {"complies": True, "freezes": True},
     ],
     ids=lambda more: " ".join(map(str, more.values())) or "cruise",
 )
@@ -111,8 +111,8 @@ def test_what_the_order_does_not_explain_shows_nothing(more: dict[str, Any]) -> 
 
 @pytest.mark.parametrize("manner", ["cruise", "coasts", "accelerates", "downhill", "wavers"])
 @pytest.mark.parametrize("lag_s", [0.1, 0.5, 1.0])
-def test_a_car_that_obeys_is_shown_to(manner: str, lag_s: float) -> None:
-    car = replace(CAR, manner=manner, own_mps2=0.8, obeys=True, lag_s=lag_s)
+def test_a_car_that_complies_is_shown_to(manner: str, lag_s: float) -> None:
+    car = replace(CAR, manner=manner, own_mps2=0.8, complies=True, lag_s=lag_s)
     proof = car.judged()
     assert proof.shown == "slows"
     assert proof.shown_s is not None
@@ -120,7 +120,7 @@ def test_a_car_that_obeys_is_shown_to(manner: str, lag_s: float) -> None:
 
 
 def test_a_slow_car_that_comes_to_rest_is_shown_to_have_stopped() -> None:
-    proof = replace(CAR, speed_mps=0.8, obeys=True, lag_s=0.1).judged()
+    proof = replace(CAR, speed_mps=0.8, complies=True, lag_s=0.1).judged()
     assert proof.shown in ("stopped", "slows")
 
 
@@ -153,7 +153,7 @@ def order(ordered_s: float, commanded_mps: float = 6.0) -> SlowingFacts:
 
 def judged(state: State, now_s: float, commanded_mps: float) -> tuple[Verdict, str]:
     state.slow(order(ORDERED_S, commanded_mps))
-    finding = obeys(state.snapshot(now_s), SlowDownLimits(), False)
+    finding = is_followed(state.snapshot(now_s), SlowDownLimits(), False)
     return finding.verdict, finding.text
 
 
@@ -189,7 +189,7 @@ def test_of_a_car_that_brakes_to_rest_by_itself_no_more_is_claimed_than_that_it_
     assert judged(state, ORDERED_S + 6.4, 0.0) == (Verdict.OK, STANDS_UNPROVEN)
 
 
-def test_an_order_before_the_motion_is_known_says_why_nothing_proves_it() -> None:
+def test_an_order_before_the_motion_is_known_reports_why_nothing_proves_it() -> None:
     state = State()
     for n in range(5):  # 0.2 s of speeds
         state.receive("speed", Twist(speed_mps=6.0, yaw_rate_radps=None), ORDERED_S - 0.2 + n * 0.05)
@@ -218,4 +218,4 @@ def test_the_proof_of_one_order_is_not_that_of_the_next() -> None:
     now_s = ORDERED_S + 2.0
     assert state.snapshot(now_s).slow_proof.shown == "slows"
     later = replace(state.snapshot(now_s), slowing=order(now_s, 3.0))
-    assert obeys(later, SlowDownLimits(), False).verdict is Verdict.UNKNOWN
+    assert is_followed(later, SlowDownLimits(), False).verdict is Verdict.UNKNOWN

@@ -113,7 +113,7 @@ def test_a_queue_that_grows_is_a_change() -> None:
 
 
 def test_the_drift_of_two_good_clocks_is_followed() -> None:
-    """100 ppm, an hour: a third of a second that nobody needs to hear of."""
+    """100 ppm, an hour: a third of a second, which needs no alarm."""
     _, change_s = run(lambda at_s: EPOCH_S + 1.0001 * at_s, hz=1.0, seconds=3600.0)
     assert abs(change_s) < 0.01
 

@@ -64,7 +64,7 @@ def test_what_was_received_is_known() -> None:
     assert snapshot.heard_s == 10.05
 
 
-def test_need_says_why_there_is_nothing() -> None:
+def test_need_reports_why_there_is_nothing() -> None:
     state = State()
     with pytest.raises(NotFresh, match="Speed is not published") as missing:
         state.snapshot(0.0).need("speed")

@@ -25,7 +25,7 @@ def fix(east_m: float, north_m: float, **fields: float | None) -> GpsFix:
 
 
 def test_the_real_drive_is_76_m_by_its_wheels_and_positions(recordings: Path) -> None:
-    """Its end lies 75.98 m from its beginning, and the wheels counted 75.97 m; single fixes add up to 77.9 m."""
+    """Its end is 75.98 m from its beginning, and the wheels counted 75.97 m; single fixes add up to 77.9 m."""
     events = sorted(
         [(at_s, "fix", fix) for at_s, fix in drive_fixes(recordings)]
         + [(at_s, "speed", speed) for at_s, speed in drive_speeds(recordings)],  # type: ignore[list-item]

@@ -67,7 +67,7 @@ def test_a_long_way_that_is_always_as_long_is_no_queue() -> None:
 
 
 def test_a_queue_without_a_busy_connection_adds_nothing() -> None:
-    """A slow topic on a fast link: the marks of its last messages are old, the pings say that nothing waits."""
+    """A slow topic on a fast link: the marks of its last messages are old, the pings show that nothing waits."""
     link = opened()
     link.subscribe("/gps", 5)
     healthy(link, 40.0)

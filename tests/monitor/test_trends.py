@@ -27,7 +27,7 @@ def test_lowest_and_highest_of_a_step_and_a_hole() -> None:
     assert piece.rows["brake"] == (None,) * 5
 
 
-def test_the_step_that_is_not_over_is_not_told() -> None:
+def test_the_step_that_is_not_over_is_not_reported() -> None:
     trends = Trends(0.0)
     trends.note("speed", 1.0, 0.1)
     assert trends.piece(0.19).rows["speed"] == ()
@@ -69,7 +69,7 @@ def test_a_few_for_each_frame() -> None:
     assert len(Trends(9.7).piece(10.1, at_most=4).rows["speed"]) == 2  # no step before the beginning
 
 
-def test_the_state_says_which_number_stands_for_a_signal() -> None:
+def test_the_state_shows_which_number_stands_for_a_signal() -> None:
     assert all(SIGNALS[name].headline for name in TRENDS)
     state, trends = State(), Trends(0.0)
     for at_s, speed in ((0.05, 3.0), (0.1, 2.5)):
@@ -81,16 +81,16 @@ def test_the_state_says_which_number_stands_for_a_signal() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0, 200), st.floats(-50, 50)), max_size=200))
-def test_nothing_is_invented(heard: list[tuple[float, float]]) -> None:
+def test_nothing_is_invented(received: list[tuple[float, float]]) -> None:
     trends = Trends(0.0)
-    heard.sort(key=lambda one: one[0])
-    for at_s, number in heard:
+    received.sort(key=lambda one: one[0])
+    for at_s, number in received:
         trends.note("speed", number, at_s)
-    end_s = (heard[-1][0] if heard else 0.0) + STEP_S
+    end_s = (received[-1][0] if received else 0.0) + STEP_S
     piece = trends.piece(end_s)
     for i, row in enumerate(piece.rows["speed"]):
-        said = [number for at_s, number in heard if math.floor(at_s / STEP_S) == piece.first + i]
-        assert row == ((min(said), max(said)) if said else None)
+        expected = [number for at_s, number in received if math.floor(at_s / STEP_S) == piece.first + i]
+        assert row == ((min(expected), max(expected)) if expected else None)
 
 
 def test_an_hour_at_75_hz_takes_no_more_room_than_a_minute() -> None:

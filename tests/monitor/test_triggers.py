@@ -90,7 +90,7 @@ def test_another_drive_knows_no_veto() -> None:
     assert rules.look(faulty, limits, 2.0) is not None
 
 
-def test_of_several_the_first_in_order_is_told() -> None:
+def test_of_several_the_first_in_order_is_reported() -> None:
     first, second = TRIGGERS[0], TRIGGERS[1]
     limits = SlowDownLimits(**{first.switch: 1.0, first.after: 0.0, second.switch: 1.0, second.after: 0.0})
     faulty = at_fault(first.checks[0], second.checks[0])

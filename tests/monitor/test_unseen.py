@@ -68,9 +68,9 @@ def test_the_proposed_speed_keeps_the_metres(late_s: float) -> None:
 def test_the_page_counts_as_the_server_does() -> None:
     """tests/page/unseen.test.js reads the same table."""
     assert (KEPT_M, LATE_ABOVE_S) == (TABLE["kept_m"], TABLE["late_above_s"])
-    for speed_mps, age_s, limit, metres, words in TABLE["ways"]:
+    for speed_mps, age_s, limit, metres, text in TABLE["ways"]:
         assert unseen_m(speed_mps, age_s, limit) == metres
-        assert unseen_words(metres) == words
+        assert unseen_words(metres) == text
     for late_s, kept_mps in TABLE["kept"]:
         assert kept_speed_mps(late_s) == kept_mps
 

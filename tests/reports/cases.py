@@ -37,7 +37,7 @@ def made(generator: str) -> Path:
 
 
 def run(generator: str, *arguments: str, into: Path) -> None:
-    """Runs one of the generators; what it writes goes into a folder."""
+    """Runs one of the generators; its output is written into a folder."""
     if not (GENERATORS / generator).is_file():
         pytest.skip(f"{GENERATORS / generator} is not there")
     environment = {**os.environ, "REPORTS_OUT": str(into), "PYTHONDONTWRITEBYTECODE": "1"}
@@ -52,7 +52,7 @@ def run(generator: str, *arguments: str, into: Path) -> None:
 
 
 def counted(*paths: Path) -> tuple[int, list[str]]:
-    """How many messages a recording has, all of which are read in the order of time, and what is said of it."""
+    """Return the number of a recording's messages, all read in the order of time, and the notes on it."""
     with open_recording(list(paths)) as recording:
         times = [at_s for at_s, *_ in recording.rows()]
         assert times == sorted(times)

@@ -1,4 +1,4 @@
-"""Two lasers: without TF none is taken, and the operator is asked; with the answer the pallet ahead alarms."""
+"""Two lasers: without TF none is taken, and the operator is prompted; with the answer the pallet ahead alarms."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def drive(name: str) -> Path:
 
 
 @pytest.mark.parametrize("name", ["object-ahead", "dock-behind"])
-def test_without_tf_no_laser_is_taken_and_it_is_asked(name: str) -> None:
+def test_without_tf_no_laser_is_taken_and_the_operator_is_prompted(name: str) -> None:
     report = judged(drive(name))
     assert "scan" not in report.run.sources
     (question,) = report.run.questions

@@ -1,4 +1,4 @@
-"""Case 04: a laser mounted backwards or upside down, as its transforms say."""
+"""Case 04: a laser mounted backwards or upside down, as its transforms show."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def bags() -> Path:
 
 
 def obstacle(report: Report) -> str | None:
-    """The words with which an obstacle was announced first."""
+    """The text with which an obstacle was announced first."""
     return next((one.trip_text for one in report.run.episodes if one.alarm_id == "obstacle"), None)
 
 
@@ -34,9 +34,9 @@ def note_of(report: Report) -> str | None:
 def test_the_post_ahead_alarms_however_the_laser_is_mounted(bags: Path, name: str) -> None:
     report = judged(bags / f"{name}.bag")
     assert raised(report)["obstacle"] == pytest.approx(19.3, abs=0.2)
-    words = obstacle(report) or ""
-    assert words.startswith("Obstacle 4.9 m ahead, 5.0 m needed")
-    assert "assumed" not in words
+    text = obstacle(report) or ""
+    assert text.startswith("Obstacle 4.9 m ahead, 5.0 m needed")
+    assert "assumed" not in text
     assert (note_of(report) or "").endswith(NOTES[name])
 
 
@@ -46,6 +46,6 @@ def test_a_wall_behind_is_not_called_ahead(bags: Path) -> None:
 
 
 def test_what_stands_on_the_left_is_called_left_though_the_laser_is_upside_down(bags: Path) -> None:
-    words = obstacle(judged(bags / "upside-down-post-left.bag")) or ""
-    assert "° left" in words
-    assert "right" not in words
+    text = obstacle(judged(bags / "upside-down-post-left.bag")) or ""
+    assert "° left" in text
+    assert "right" not in text

@@ -30,9 +30,9 @@ def by_library(path: Path) -> int:
 
 def test_case_10_the_whole_messages_of_a_cut_file_are_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = made("case_10_fastwrite.py") / "10-fastwrite" / "fastwrite-power-lost.mcap"
-    read, (said,) = counted(path)
+    read, (note,) = counted(path)
     assert read == by_library(path) == 627
-    assert said.startswith("fastwrite-power-lost.mcap was never closed: it is read to its last whole part, ")
+    assert note.startswith("fastwrite-power-lost.mcap was never closed: it is read to its last whole part, ")
     assert main(["check", str(path)]) == 2
     assert "was never closed" in capsys.readouterr().err
     assert main(["export", str(path), "--format", "bag", "--out", str(tmp_path / "out.bag")]) == 1
@@ -41,9 +41,9 @@ def test_case_10_the_whole_messages_of_a_cut_file_are_read(tmp_path: Path, capsy
 
 def test_case_10_the_same_with_chunks() -> None:
     path = made("case_10_fastwrite.py") / "10-fastwrite" / "chunked-power-lost.mcap"
-    read, said = counted(path)
+    read, notes = counted(path)
     assert read == by_library(path)
-    assert len(said) == 1
+    assert len(notes) == 1
 
 
 @pytest.mark.parametrize("name", ["fastwrite", "chunked"])

@@ -80,6 +80,6 @@ def test_case_11_a_packed_file_that_is_cut_is_read_as_far_as_it_is_whole(tmp_pat
     (tmp_path / "whole.mcap.zstd").write_bytes(packed)
     assert counted(tmp_path / "whole.mcap.zstd") == (MESSAGES, [])
     (tmp_path / "cut.mcap.zstd").write_bytes(packed[: len(packed) * 4 // 5])
-    read, (said,) = counted(tmp_path / "cut.mcap.zstd")
+    read, (note,) = counted(tmp_path / "cut.mcap.zstd")
     assert MESSAGES // 2 < read < MESSAGES
-    assert "was never closed" in said
+    assert "was never closed" in note

@@ -141,7 +141,7 @@ def test_a_silence_of_20_minutes_costs_less_than_two_minutes_of_driving(tmp_path
     assert ticks_of(path) <= (LENGTH_S + 120.0) * 20
 
 
-def test_a_replay_shows_ten_seconds_of_an_empty_hour_and_says_so(tmp_path: Path) -> None:
+def test_a_replay_shows_ten_seconds_of_an_empty_hour_and_reports_it(tmp_path: Path) -> None:
     path = write(tmp_path, "bag", silent_s=(35.0, 3600.0))
     playback, took_s = played(path, lambda one: not one.is_playing, at_s=30.0)
     assert took_s == pytest.approx(LENGTH_S - 30.0 + 12.0, abs=2.0)
@@ -185,8 +185,8 @@ def test_exports_go_on_and_say_so(
 ) -> None:
     path, out = write(tmp_path, container, steps=[(25.0, 230 * DAY_S), (40.0, -70.0)]), tmp_path / "exported"
     assert main(["export", str(path), "--format", format, "--out", str(out)]) == 0  # nothing is left out
-    said = capsys.readouterr()
-    assert (said.out + said.err).count("clock was set") == 2
+    output = capsys.readouterr()
+    assert (output.out + output.err).count("clock was set") == 2
     match format:
         case "csv":
             with zipfile.ZipFile(out) as packed:

@@ -17,7 +17,7 @@ def drive() -> Path:
 
 
 @pytest.mark.parametrize("kind", ["gpx", "geojson"])
-def test_a_track_says_what_it_leaves_out(
+def test_a_track_states_what_it_leaves_out(
     drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
 ) -> None:
     out = tmp_path / f"track.{kind}"

@@ -1,4 +1,4 @@
-"""Pedals as plain numbers from 0 to 1: their unit is asked for, and with the answer both fully down alarm."""
+"""Pedals as plain numbers from 0 to 1: their unit is requested, and with the answer both fully down alarm."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def never_checked(report: Report) -> dict[str, str]:
     return {one.check_id: one.why for one in report.run.unchecked}
 
 
-def test_without_an_answer_the_pedals_are_never_checked_and_the_report_asks(bag: Path) -> None:
+def test_without_an_answer_the_pedals_are_never_checked_and_the_report_has_the_question(bag: Path) -> None:
     report = judged(bag)
     assert never_checked(report)["pedals"] == f"Brake: {UNKNOWN}"
     text = summary.text(report)
@@ -72,7 +72,7 @@ def test_one_answer_of_two_is_not_enough(bag: Path) -> None:
 
 
 @pytest.mark.parametrize("from_s", [0.0, 2.0, 13.0])
-def test_a_replay_asks_wherever_it_begins(bag: Path, from_s: float) -> None:
+def test_a_replay_has_the_question_wherever_it_begins(bag: Path, from_s: float) -> None:
     with open_recording([bag]) as recording:
         run = OfflineRun(recording, JudgedDrive(recording, read_recorded_events(recording)), from_s=from_s)
         run.advance(from_s + 1.0)
@@ -131,7 +131,7 @@ def exported(bag: Path, into: Path) -> tuple[dict[str, list[str]], list[str]]:
     return files, [*outcome.notes, *outcome.notices]
 
 
-def test_an_export_has_the_numbers_and_says_that_their_unit_is_unknown(bag: Path, tmp_path: Path) -> None:
+def test_an_export_has_the_numbers_and_reports_that_their_unit_is_unknown(bag: Path, tmp_path: Path) -> None:
     files, notes = exported(bag, tmp_path / "pedals.zip")
     lines = files["brake-unit-unknown.csv"]
     assert lines[0].endswith(",as published [unit unknown]")

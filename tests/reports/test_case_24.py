@@ -21,7 +21,7 @@ def run(**topics: str) -> Rehearsed:
         return rehearse(recording, override=SettingsOverride(topics=topics))
 
 
-def test_which_car_it_is_is_asked_once_and_nothing_is_judged_before() -> None:
+def test_the_question_which_car_it_is_comes_once_and_nothing_is_judged_before() -> None:
     report = judged(bag())
     assert report.run.sources == {}
     (question,) = report.run.questions

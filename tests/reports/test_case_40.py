@@ -36,9 +36,9 @@ def test_case_40_channels_of_other_kinds_are_named_and_the_rest_is_read(
     assert FOREIGN[name] in capsys.readouterr().err
     for form in ("bag", "ros2", "csv"):
         assert main(["export", str(path), "--format", form, "--out", str(tmp_path / form)]) == 1
-        said = capsys.readouterr().err
-        assert said.count(FOREIGN[name].partition(":")[0]) == 1
-        assert "the export is incomplete" in said
+        errors = capsys.readouterr().err
+        assert errors.count(FOREIGN[name].partition(":")[0]) == 1
+        assert "the export is incomplete" in errors
     assert counted(tmp_path / "bag") == (MESSAGES, [])
 
 
@@ -76,14 +76,14 @@ def test_case_40b_our_own_recording_copied_by_another_tool_is_the_same(tmp_path:
     assert verify(ours).state == "intact"
 
 
-def test_case_40b_check_says_the_same_of_both(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_case_40b_check_reports_the_same_of_both(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ours = record(tmp_path / "car" / "car_20260921T141320Z.mcap", alarms=[(5.0, "critical")])
     copy = tmp_path / "copy.mcap"
     run("rewrite_mcap.py", str(ours), str(copy), "some tool 1.0", into=tmp_path)
-    codes, said = [], []
+    codes, lines = [], []
     for path in (ours, copy):
         codes.append(main(["check", str(path)]))
         text = capsys.readouterr().out
-        said.append([line for line in text.splitlines() if "messages on" in line or line.startswith("  Vehicle")])
+        lines.append([line for line in text.splitlines() if "messages on" in line or line.startswith("  Vehicle")])
     assert codes[0] == codes[1]
-    assert said[0] == said[1]
+    assert lines[0] == lines[1]

@@ -1,4 +1,4 @@
-"""A latched sample that the bridge sends again after a renewed subscription is not new: its age goes on."""
+"""A latched sample that the bridge sends again after a renewed subscription is not new: its age continues."""
 
 from __future__ import annotations
 

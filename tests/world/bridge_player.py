@@ -172,8 +172,8 @@ class Player:
             return same[0] | {"service": service}
         values = self._usual(service, call["args"])
         result = values is not None
-        said = values if result else f"Service {service} does not exist"
-        return {"op": "service_response", "service": service, "values": said, "result": result}
+        payload = values if result else f"Service {service} does not exist"
+        return {"op": "service_response", "service": service, "values": payload, "result": result}
 
     def _usual(self, service: str, arguments: dict[str, Any]) -> dict[str, Any] | None:
         topics = self.transcript.topics

@@ -83,8 +83,8 @@ def _fragment(frame: str, body: dict[str, Any], parts: dict[str, str], transcrip
 
 
 def _loaded(text: str) -> Any:
-    """JSON, with null for the bare words of ROS 2 that are none."""
-    return json.loads(text, parse_constant=lambda word: None)
+    """JSON, with null for the constants of ROS 2 that JSON does not have."""
+    return json.loads(text, parse_constant=lambda constant: None)
 
 
 def _answer(body: dict[str, Any], transcript: Transcript) -> Any:
@@ -133,7 +133,7 @@ def _value(name: str, value: Any, values: dict[str, Any], transcript: Transcript
 
 
 def _fields(type: str, text: str | None) -> Any:
-    """What a definition says, without its comments; standard types are compared by message_details."""
+    """The fields of a definition, without its comments; standard types are compared by message_details."""
     if not text or not type.startswith("car_msgs/"):
         return None if text is None else bool(text)
     package, _, kind = type.partition("/")

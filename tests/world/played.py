@@ -304,7 +304,7 @@ class Window:
         self.until_s = math.inf
         self.throttle_s = 0.0
         self.is_queued = False
-        self.changed_s = -1.0  # when another encoding was asked for
+        self.changed_s = -1.0  # when another encoding was requested
         self.ids: set[object] = set()
         self.shown: list[tuple[float, Any]] = []
 

@@ -21,7 +21,7 @@ COMMAND = "/catvehicle/cmd_vel"
 SOON_S = 30.0
 
 
-async def test_where_only_we_may_command_nothing_is_said_to_be_missing(
+async def test_where_only_we_may_command_nothing_is_reported_as_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in (("RECORDED_AFTER_S", 1.0), ("RENEW_AFTER_S", 1.5), ("SILENT_AGAIN_S", 2.0)):

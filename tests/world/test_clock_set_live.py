@@ -78,7 +78,7 @@ async def driven(folder: Path, *, car_steps: bool, server_steps: bool) -> Story:
 
 
 @pytest.mark.parametrize(("car_steps", "server_steps"), [(True, False), (False, True), (True, True)])
-async def test_nothing_but_the_clock_is_said(tmp_path: Path, car_steps: bool, server_steps: bool) -> None:
+async def test_nothing_but_the_clock_is_reported(tmp_path: Path, car_steps: bool, server_steps: bool) -> None:
     story = await driven(tmp_path, car_steps=car_steps, server_steps=server_steps)
     assert story.alarms - {"reach"} <= OF_THE_CLOCK
     assert ("clock_jump" in story.alarms) == car_steps
@@ -88,9 +88,9 @@ async def test_nothing_but_the_clock_is_said(tmp_path: Path, car_steps: bool, se
     paths = sorted(tmp_path.rglob("*.mcap"))
     report = judged(*paths)
     with open_recording(paths) as recording:
-        said = [event["change"] for _, event in recording.own("/catgraph/alarms")]
+        changes = [event["change"] for _, event in recording.own("/catgraph/alarms")]
         assert recording.duration_s == pytest.approx(SECONDS, abs=0.5)
         assert {info.count for info in recording.topics.values()} == {story.published}
-    assert said.count("clock_set") == server_steps
+    assert changes.count("clock_set") == server_steps
     assert any("clock was set back by 90 s" in note for note in report.run.notes) == server_steps
     assert raised(report).keys() <= story.alarms, "no alarm of the recording is of the clock alone"

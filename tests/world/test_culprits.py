@@ -43,22 +43,22 @@ ENDINGS = {
     "the node has died": ([None, NO_NODE], "bridge_node_dead"),
     "the node is dead from the beginning": ([NO_NODE], "bridge_node_dead"),
     "mended": ([None, MISSING, MISSING, None], None),
-    "other words, twice": ([None, "busy", "busy"], None),
-    "other words, again and again": ([None, "busy", "busy", "busy"], "rosapi_failing"),
+    "another error, twice": ([None, "busy", "busy"], None),
+    "another error, again and again": ([None, "busy", "busy", "busy"], "rosapi_failing"),
     "rosapi is not installed where the bridge runs": ([NO_PACKAGE] * 3, "rosapi_failing"),
-    "mended after other words": ([NO_PACKAGE] * 3 + [None], None),
+    "mended after another error": ([NO_PACKAGE] * 3 + [None], None),
 }
 
 
 @pytest.mark.parametrize(("answers", "code"), ENDINGS.values(), ids=ENDINGS)
-def test_the_words_of_a_real_bridge_name_the_part_that_failed(answers: list[str | None], code: str | None) -> None:
+def test_the_errors_of_a_real_bridge_name_the_part_that_failed(answers: list[str | None], code: str | None) -> None:
     one = Diagnosis()
     one.opened()
-    for second, words in enumerate(answers):
-        if words is None:
+    for second, error in enumerate(answers):
+        if error is None:
             one.answered(float(second))
         else:
-            one.failed(words)
+            one.failed(error)
     found = one.problem(len(answers) - 0.9, flows=True)
     assert (found.code if found else None) == code
     assert one.is_rosbridge
@@ -102,7 +102,7 @@ def test_no_answer_is_named_after_a_while(was_there: bool, flows: bool, code: st
 
 
 def test_a_rosapi_that_hangs_stays_named_when_the_bridge_gives_its_question_up() -> None:
-    """A real bridge of ROS 1 answers 5 s after the question, with the words of a rosapi that was killed."""
+    """A real bridge of ROS 1 answers 5 s after the question, with the error of a rosapi that was killed."""
     one = Diagnosis()
     one.answered(0.0)
     one.unanswered(1.0)
@@ -150,7 +150,7 @@ def test_an_idle_publisher_is_nobody_elses_fault(one: Passing) -> None:
     assert one.problem(99.0) is None
 
 
-def test_without_the_bridges_name_nothing_is_asked_and_nothing_blamed() -> None:
+def test_without_the_bridges_name_nothing_is_requested_and_nothing_blamed() -> None:
     one = Passing()
     one.follow(["/gps_fix"], 0.0)
     assert one.to_ask(0.0) == []
@@ -166,7 +166,7 @@ async def test_after_a_neighbour_left_its_topics_are_subscribed_to_anew_and_no_g
     subscribers: tuple[str, ...] = ("/rosbridge_websocket",)
     renewed: list[tuple[float, str]] = []
 
-    async def fetch_subscribers(asks: Any, topic: str) -> tuple[str, ...]:
+    async def fetch_subscribers(questions: Any, topic: str) -> tuple[str, ...]:
         return subscribers
 
     monkeypatch.setattr(discovery, "fetch_subscribers", fetch_subscribers)
@@ -218,31 +218,31 @@ async def test_a_question_that_is_not_answered_holds_up_no_command() -> None:
     """On ROS 2 the bridge reads nothing more from a connection until its call is answered."""
     ear = Ear()
     async with bridging() as bridge, linked(bridge.address, ear) as link:
-        asks, _ = await opened(link, ear)
+        questions, _ = await opened(link, ear)
         with pytest.raises(CallFailed):
-            await asks.call("/rosapi/get_time", timeout_s=0.05)
+            await questions.call("/rosapi/get_time", timeout_s=0.05)
         for row in link.subscriptions:
             link.unsubscribe(row.topic)
         link.send_now({"op": "advertise", "id": "a", "topic": "/cmd", "type": "geometry_msgs/Twist"})
-        await until(lambda: any(said for said in bridge.connections if said and said[0]["op"] == "advertise"))
-        assert [[one["op"] for one in said] for said in bridge.connections] == [["advertise"], ["call_service"]]
-        asks.stop()
+        await until(lambda: any(sent for sent in bridge.connections if sent and sent[0]["op"] == "advertise"))
+        assert [[one["op"] for one in sent] for sent in bridge.connections] == [["advertise"], ["call_service"]]
+        questions.stop()
 
 
 @pytest.mark.virtual_time
 async def test_while_a_question_waits_no_other_is_put_behind_it_and_a_late_answer_frees_it() -> None:
     ear = Ear()
     async with bridging() as bridge, linked(bridge.address, ear) as link:
-        asks, diagnosis = await opened(link, ear)
+        questions, diagnosis = await opened(link, ear)
         for _ in range(3):
             with pytest.raises(CallFailed):
-                await asks.call("/rosapi/get_time", timeout_s=0.05)
+                await questions.call("/rosapi/get_time", timeout_s=0.05)
         assert len(bridge.operations) == 1
         await bridge.say({"op": "service_response", "id": bridge.operations[0]["id"], "values": {}, "result": True})
         bridge.answer = answered({"time": {}})
         await until(lambda: diagnosis.is_rosbridge)
-        assert await asks.call("/rosapi/get_time") == {"time": {}}
-        asks.stop()
+        assert await questions.call("/rosapi/get_time") == {"time": {}}
+        questions.stop()
 
 
 @pytest.mark.virtual_time
@@ -255,44 +255,44 @@ async def test_a_slow_link_is_not_held_against_rosapi() -> None:
             socket.transport.pause_reading()  # type: ignore[attr-defined]
 
     async with bridging() as bridge, linked(bridge.address, ear) as link:
-        asks, diagnosis = await opened(link, ear)
+        questions, diagnosis = await opened(link, ear)
         bridge.answer = answered({"time": {}})
-        await asks.call("/rosapi/get_time")
+        await questions.call("/rosapi/get_time")
         await slow(bridge)
         with pytest.raises(CallFailed):
-            await asks.call("/rosapi/get_time", timeout_s=0.1)
+            await questions.call("/rosapi/get_time", timeout_s=0.1)
         assert diagnosis.problem(time.monotonic() + 60.0, flows=True) is None
-        asks.stop()
+        questions.stop()
 
 
 @pytest.mark.virtual_time
 async def test_rosapi_that_does_not_answer_is_named_where_the_bridge_has_read_the_question() -> None:
     ear = Ear()
     async with bridging() as bridge, linked(bridge.address, ear) as link:
-        asks, diagnosis = await opened(link, ear)
+        questions, diagnosis = await opened(link, ear)
         with pytest.raises(CallFailed):
-            await asks.call("/rosapi/get_time", timeout_s=0.3)
+            await questions.call("/rosapi/get_time", timeout_s=0.3)
         found = diagnosis.problem(time.monotonic() + 60.0, flows=True)
         assert found == connection_errors.ROSAPI_SILENT
-        asks.stop()
+        questions.stop()
 
 
 @pytest.mark.virtual_time
 async def test_questions_end_with_the_link() -> None:
     ear = Ear()
     async with bridging() as bridge, linked(bridge.address, ear) as link:
-        asks, _ = await opened(link, ear)
+        questions, _ = await opened(link, ear)
         link.abort()
         await ear.hears("closed")
         with pytest.raises(LinkDown):
-            await asks.call("/rosapi/get_time")
-        asks.stop()
+            await questions.call("/rosapi/get_time")
+        questions.stop()
         assert bridge.operations == []
 
 
 # -- doctor, on transcripts of real bridges --------------------------------------------------------------------------
 
-SAID = {
+DIAGNOSES = {
     "ros1/auth": (2, "wants a login"),
     "ros1/discover_no_rosapi": (1, "rosapi is not running"),
     "ros1/lifecycle_roscore": (2, "roscore"),
@@ -302,13 +302,13 @@ SAID = {
 
 @pytest.mark.field
 @pytest.mark.skipif(not FILES, reason="the transcripts of real bridges are not here")
-@pytest.mark.parametrize("name", SAID)
+@pytest.mark.parametrize("name", DIAGNOSES)
 async def test_doctor_names_it(name: str) -> None:
     path = next(path for path in FILES if name_of(path) == name)
-    code, words = SAID[name]
+    code, text = DIAGNOSES[name]
     async with playing(path) as player:
         async with asyncio.timeout(60):
             found, out, err = await doctor(f"127.0.0.1:{player.port}")
-    assert words in out + err
+    assert text in out + err
     assert "not a rosbridge" not in out + err
     assert found == code

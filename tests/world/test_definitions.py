@@ -75,7 +75,7 @@ async def test_the_misspelled_field_is_not_accepted(version: RosVersion) -> None
     assert await discovery.fetch_definitions(link, set(values["types"]), version) == {}
 
 
-async def test_nothing_is_asked_of_ros_2_that_can_end_rosapi() -> None:
+async def test_nothing_is_requested_of_ros_2_that_can_end_rosapi() -> None:
     """On ROS 2 message_details of a type with a bounded array, bounded string or wstring ends rosapi."""
     empty = {"topics": [], "types": [], "typedefs_full_text": []}
     for version, calls in ((1, 2), (2, 1), (None, 1)):

@@ -1,4 +1,4 @@
-"""What arrives of a car's topics: when publishers are asked for, what is renewed, what is named as missing."""
+"""What arrives of a car's topics: when publishers are queried, what is renewed, what is named as missing."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def drive(
     start_s: float = 0.0,
     candidates: tuple[str, ...] = (),
 ) -> tuple[list[tuple[float, str]], list[tuple[float, str]]]:
-    """Time passes, topics of `flows` come with their period. Which were asked for, and which were renewed, and when."""
-    asked, renewed = [], []
+    """Time passes, topics of `flows` come with their period. Return what was queried and renewed, and when."""
+    queried, renewed = [], []
     step = 0
     while (now_s := start_s + step * 0.1) <= start_s + seconds:
         for topic, period_s in flows.items():
@@ -34,11 +34,11 @@ def drive(
                 delivery.received(topic, now_s)
         if step % 10 == 0:
             for topic in delivery.to_ask(now_s, candidates):
-                asked.append((now_s, topic))
+                queried.append((now_s, topic))
                 if delivery.answered(topic, publishers[topic], now_s):
                     renewed.append((now_s, topic))
         step += 1
-    return asked, renewed
+    return queried, renewed
 
 
 @pytest.mark.world(n=4)
@@ -46,8 +46,8 @@ def test_a_published_topic_of_which_nothing_comes_is_subscribed_to_anew_and_then
     delivery = Delivery()
     delivery.opened(0.0)
     delivery.follow(["/vel"], ["/imu"], 0.0)
-    asked, renewed = drive(delivery, {"/imu": ("/car",)}, flows={"/vel": 0.1}, seconds=5.0)
-    assert asked
+    queried, renewed = drive(delivery, {"/imu": ("/car",)}, flows={"/vel": 0.1}, seconds=5.0)
+    assert queried
     assert [topic for _, topic in renewed] == ["/imu"]
     assert renewed[0][0] <= 5.0
     assert delivery.not_received(5.0) == {}  # it has its time as JSON
@@ -77,27 +77,27 @@ def test_without_a_publisher_or_an_answer_nothing_is_missing() -> None:
 
 @pytest.mark.world(n=4)
 def test_a_slow_topic_that_comes_in_time_is_never_renewed_again() -> None:
-    """A latched topic says one thing and is silent for the rest of the drive."""
+    """A latched topic sends one message and is silent for the rest of the drive."""
     delivery = Delivery()
     delivery.follow(["/vel"], ["/map"], 0.0)
     delivery.received("/map", 0.2)
-    asked, renewed = drive(delivery, {"/map": ("/car",)}, flows={"/vel": 0.1}, seconds=600.0)
-    assert asked == renewed == []
+    queried, renewed = drive(delivery, {"/map": ("/car",)}, flows={"/vel": 0.1}, seconds=600.0)
+    assert queried == renewed == []
 
 
 @pytest.mark.world(n=4)
-def test_a_topic_that_stays_silent_is_asked_for_ever_more_seldom() -> None:
+def test_a_topic_that_stays_silent_is_queried_ever_more_seldom() -> None:
     delivery = Delivery()
     delivery.follow(["/vel"], [f"/quiet_{n}" for n in range(30)], 0.0)
     nodes = {f"/quiet_{n}": ("/car",) for n in range(30)}
-    asked, renewed = drive(delivery, nodes, flows={"/vel": 0.1}, seconds=1800.0)
+    queried, renewed = drive(delivery, nodes, flows={"/vel": 0.1}, seconds=1800.0)
     of_one = [at_s for at_s, topic in renewed if topic == "/quiet_7"]
     gaps = [b - a for a, b in pairwise(of_one)]
     assert len(of_one) <= 10
     assert gaps == sorted(gaps)
     assert max(gaps) < 400
-    assert len(asked) / 1800 < 0.3  # calls a second
-    most = max(sum(1 for at_s, _ in asked if at_s == when) for when, _ in asked)
+    assert len(queried) / 1800 < 0.3  # calls a second
+    most = max(sum(1 for at_s, _ in queried if at_s == when) for when, _ in queried)
     assert most <= AT_ONCE
 
 
@@ -159,7 +159,9 @@ def test_a_slow_topic_that_starts_with_one_message_is_soon_left_alone_and_nobody
 @pytest.mark.parametrize(
     "periods_s", [(5.0, 5.1), (5.0, 7.0), (5.5, 5.5), (6.0, 6.0), (4.0, 12.0), (9.0, 20.0), (6.0, 40.0)]
 )
-def test_a_topic_that_is_slow_is_never_said_to_give_one_message_a_subscription(periods_s: tuple[float, float]) -> None:
+def test_a_topic_that_is_slow_is_never_reported_to_give_one_message_a_subscription(
+    periods_s: tuple[float, float],
+) -> None:
     """Whenever its messages come, also always just behind a renewal."""
     for seed in range(20):
         chance = random.Random(seed)
@@ -205,25 +207,25 @@ def test_one_message_a_subscription_is_noticed_within_half_a_minute(given_after_
 
 
 @pytest.mark.world(n=9)
-def test_a_topic_nobody_publishes_is_known_as_such_and_asked_again_until_somebody_does() -> None:
+def test_a_topic_nobody_publishes_is_known_as_such_and_queried_again_until_somebody_does() -> None:
     delivery = Delivery()
     delivery.follow(["/vel", "/brake"], [], 0.0)
-    asked, _ = drive(delivery, {"/brake": ()}, flows={"/vel": 0.1}, seconds=2.0)
+    queried, _ = drive(delivery, {"/brake": ()}, flows={"/vel": 0.1}, seconds=2.0)
     assert delivery.unpublished == {"/brake"}
-    assert asked[0][0] <= 1.5
+    assert queried[0][0] <= 1.5
     delivery.follow(["/vel"], [], 2.0)  # it carries no signal any more
-    asked, _ = drive(delivery, {"/brake": ()}, flows={"/vel": 0.1}, seconds=60.0, start_s=2.1, candidates=("/brake",))
-    assert 15 <= len(asked) <= 21
+    queried, _ = drive(delivery, {"/brake": ()}, flows={"/vel": 0.1}, seconds=60.0, start_s=2.1, candidates=("/brake",))
+    assert 15 <= len(queried) <= 21
     drive(delivery, {"/brake": ("/late",)}, flows={"/vel": 0.1}, seconds=4.0, start_s=62.2, candidates=("/brake",))
     assert delivery.unpublished == set()
 
 
 @pytest.mark.world(n=9)
-def test_what_comes_has_a_publisher_and_is_not_asked_for() -> None:
+def test_what_comes_has_a_publisher_and_is_not_queried() -> None:
     delivery = Delivery()
     delivery.follow(["/vel"], ["/tf"], 0.0)
-    asked, _ = drive(delivery, {}, flows={"/vel": 0.1, "/tf": 0.1}, seconds=600.0)
-    assert asked == []
+    queried, _ = drive(delivery, {}, flows={"/vel": 0.1, "/tf": 0.1}, seconds=600.0)
+    assert queried == []
 
 
 @pytest.mark.world(n=9)
@@ -277,11 +279,11 @@ def test_what_may_carry_a_signal_once_it_is_published() -> None:
 
 @pytest.mark.world(n=9)
 async def test_the_doctor_looks_for_topics_with_a_publisher() -> None:
-    asked: list[str] = []
+    queried: list[str] = []
 
     class Link:
         async def call(self, service: str, arguments: dict[str, str], *, timeout_s: float) -> Any:
-            asked.append(arguments["topic"])
+            queried.append(arguments["topic"])
             return {"publishers": [] if arguments["topic"] in ("/catvehicle/vel", "/fuel") else ["/car"]}
 
     link: Any = Link()
@@ -290,7 +292,7 @@ async def test_the_doctor_looks_for_topics_with_a_publisher() -> None:
     assert unpublished == {"/catvehicle/vel", "/fuel"}
     assert (sources["speed"].topic, sources["speed"].decode is not None) == ("/vel", True)
     assert sources["fuel"].decode is None
-    assert len(asked) == len(set(asked)) == len(FOUND) - 1, "each topic once, and none that carries no signal"
+    assert len(queried) == len(set(queried)) == len(FOUND) - 1, "each topic once, and none that carries no signal"
 
 
 @pytest.mark.world(n=4)

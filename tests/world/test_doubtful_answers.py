@@ -88,7 +88,7 @@ def test_a_probe_after_a_silence_without_an_answer_shows_that_all_were_new() -> 
 
 @pytest.mark.parametrize("period_s", [number / 100 for number in range(1, 200)])
 def test_no_interval_gives_all_answers(period_s: float) -> None:
-    """A topic that goes on, of which nothing is known yet."""
+    """A topic that continues, of which nothing is known yet."""
     doubtful, at_s, sent, recorded_count, expected = Doubtful(), 0.0, 0, 0, 2  # two renewals of ours
     for tick in range(1, 100):
         while at_s + period_s <= tick / 10:

@@ -111,7 +111,7 @@ def test_every_field_counts(text: str, fit: tuple[bool, bool]) -> None:
     assert (both == {"car_msgs/Thing"}) is all(fit)
 
 
-def test_what_is_asked_for_as_cbor_before_definitions_are_known_is_fit() -> None:
+def test_what_is_requested_as_cbor_before_definitions_are_known_is_fit() -> None:
     for row in TOPICS:
         if row.compression == "cbor":
             for type in row.types:

@@ -1,4 +1,4 @@
-"""Fragments that nobody asked for, as real bridges send them: put together, or named as too large."""
+"""Fragments that nobody requested, as real bridges send them: put together, or named as too large."""
 
 from __future__ import annotations
 

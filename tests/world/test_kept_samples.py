@@ -1,4 +1,4 @@
-"""Stories of a car behind a bridge that keeps samples: their age goes on, and each is recorded once in a part."""
+"""Stories of a car behind a bridge that keeps samples: their age continues, and each is recorded once in a part."""
 
 from __future__ import annotations
 
@@ -249,7 +249,7 @@ async def test_where_stamps_are_of_another_clock_the_age_of_an_only_message_is_n
         assert signal(session, "speed")["freshness"] == "fresh"
 
 
-async def test_a_sample_without_a_stamp_that_came_alone_is_of_unknown_age_and_says_so() -> None:
+async def test_a_sample_without_a_stamp_that_came_alone_is_of_unknown_age_and_reports_it() -> None:
     bridge = KeepingBridge(topics())
     await late(bridge, FUEL, lambda: {"data": 60.0}, 40.0)
     async with monitored(bridge) as session:
@@ -324,7 +324,7 @@ async def test_clients_that_come_and_go_renew_nothing_more_often_than_every_five
     assert min(later - sooner for sooner, later in pairwise(renewed[1:])) >= 4.9
 
 
-# -- what is said of a silent car ------------------------------------------------------------------------------------
+# -- what is reported of a silent car --------------------------------------------------------------------------------
 
 
 async def test_a_car_is_not_called_silent_while_its_other_topics_come(tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ PARAMETERS = "parameters of other nodes are not simulated"
 KILLED = "a killed node of ROS leaves services behind that nobody answers"
 KEPT = "the publisher of a client that has gone stays for 10 s there, and ends at once here"
 LOST = "the real one cannot encode it and sends nothing"
-GONE = "no answer where the client that offers the service has gone; ours says so"
+GONE = "no answer where the client that offers the service has gone; ours reports it"
 WAITED = "a topic without a type is refused there, and waited for here"
 REFUSED = "a refused subscription stays there, and is none here"
 OTHERWISE: dict[tuple[str, str], str] = {  # answers by id and topics by name that are not compared
@@ -199,7 +199,7 @@ def _of_call(node: ast.expr) -> Any:
         case ast.Call(func=ast.Name(id="array"), args=[values, *_]):
             return _of_call(values)
         case ast.Call(keywords=keywords):
-            return {word.arg: _of_call(word.value) for word in keywords}
+            return {keyword.arg: _of_call(keyword.value) for keyword in keywords}
         case ast.List(elts=items) | ast.Tuple(elts=items):
             return [_of_call(item) for item in items]
         case ast.Name(id=name):
@@ -216,7 +216,7 @@ def _of_yaml(text: str) -> Any:
 
 
 def _block(rows: list[tuple[int, str]], depth: int) -> Any:
-    """What the first rows say that are as deep as this; they are taken away."""
+    """Remove the first rows of this depth and return their value."""
     if rows[0][1][0] == "-":
         items = []
         while rows and rows[0][0] == depth and rows[0][1][0] == "-":

@@ -110,7 +110,7 @@ async def until(condition: Any, session: Watched, within_s: float = 20.0) -> Non
 
 
 def expected(frame: str | bytes) -> tuple[str, Any] | None:
-    """What a frame says, read by other means; None: it is no message."""
+    """The message of a frame, decoded independently; None: it is no message."""
     if isinstance(frame, bytes):
         hooked = cbor2.loads(frame, tag_hook=lambda tag, _: np.frombuffer(tag.value, TYPED[tag.tag]).tolist())
         return (hooked["topic"], hooked["msg"]) if hooked.get("op") == "publish" else None

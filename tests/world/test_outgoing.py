@@ -194,7 +194,7 @@ def test_a_message_that_is_not_whole_is_refused(msg: Any) -> None:
 
 
 @pytest.mark.parametrize("compression", ["cbor-raw", "png", "", None, 1, ["none"]])
-def test_cbor_raw_and_png_are_never_asked_for(compression: Any) -> None:
+def test_cbor_raw_and_png_are_never_requested(compression: Any) -> None:
     row = {"op": "subscribe", "id": "a", "topic": "/a", "throttle_rate": 0, "queue_length": 0}
     Outgoing().frame(row | {"compression": "cbor"})
     with pytest.raises(NotAllowed):
@@ -253,16 +253,16 @@ def test_any_command_of_a_slow_down_is_refused_or_harmless(
 ) -> None:
     async def run() -> list[bytes]:
         link, wire = wired()
-        mouth = CommandPublisher()
-        mouth.attach(link)
+        publisher = CommandPublisher()
+        publisher.attach(link)
         kind: Any = type.rpartition("/")[2]
-        said = twist_message(kind, speed, tyre, stamp_ns=stamp_ns, ros_version=version)
+        message = twist_message(kind, speed, tyre, stamp_ns=stamp_ns, ros_version=version)
         fits = all(isinstance(x, float) and math.isfinite(x) for x in (speed, tyre))
         try:
-            mouth.publish("/catvehicle/cmd_vel", type, said)
+            publisher.publish("/catvehicle/cmd_vel", type, message)
         except NotAllowed:
-            assert not fits, "a sound command must reach the car, whatever this machine's clock says"
-        mouth.unadvertise_all()
+            assert not fits, "a sound command must reach the car, whatever this machine's clock shows"
+        publisher.unadvertise_all()
         return wire.sent
 
     check_harmless(asyncio.run(run()))
@@ -273,9 +273,9 @@ def test_any_command_of_a_slow_down_is_refused_or_harmless(
 def test_heartbeat_and_release_of_the_guard_are_refused_or_harmless(hold: Any, beats: int) -> None:
     async def run() -> list[bytes]:
         link, wire = wired()
-        mouth = CommandPublisher()
-        mouth.attach(link)
-        guard = GuardClient(mouth)
+        publisher = CommandPublisher()
+        publisher.attach(link)
+        guard = GuardClient(publisher)
         guard.tick(True, 0.0)
         guard._count = 2**32 - 3
         for _ in range(beats):
@@ -313,7 +313,7 @@ def test_a_whole_slow_down_on_any_command_topic_sends_nothing_harmful(
             now=lambda: 10.0,
             wall_ms=lambda: -5,
             snapshot=lambda: snapshot,  # type: ignore[return-value, arg-type]
-            record=lambda said: None,
+            record=lambda record: None,
             number=0,
         )
         source = Source(signal="command", topic=topic, type=type, decode=None, note=None)
@@ -338,7 +338,7 @@ def test_a_whole_slow_down_on_any_command_topic_sends_nothing_harmful(
     types=st.lists(hostile, max_size=6),
     also=st.sampled_from(["none", "light", "all"]),
 )
-def test_whatever_a_bridge_offers_nothing_harmful_is_asked_of_it(
+def test_whatever_a_bridge_offers_nothing_harmful_is_requested_of_it(
     topics: list[str], types: list[str], also: Any
 ) -> None:
     """Subscriptions and questions about any names: those that are refused cost nothing else."""

@@ -131,21 +131,21 @@ async def test_after_a_silence_of_the_bridge_the_large_ones_that_never_came_wait
     async with bridging(ros_version=2) as (bridge, port):
         bridge.advertise("/catvehicle/vel", "geometry_msgs/msg/Twist")
         bridge.advertise("/cloud", "std_msgs/msg/UInt8MultiArray")
-        bridge.advertise("/word", "std_msgs/msg/String")
+        bridge.advertise("/text", "std_msgs/msg/String")
 
-        def is_asked_for(topic: str) -> bool:
+        def is_requested(topic: str) -> bool:
             found = bridge.graph.find(topic)
             return bool(found and found.subscribers)
 
         config = Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{port}"),), data=tmp_path)
         async with driving(bridge), serving(config) as base, viewer(base) as one:
-            await until(lambda: is_asked_for("/cloud") and is_asked_for("/word"), within_s=SOON_S)
+            await until(lambda: is_requested("/cloud") and is_requested("/text"), within_s=SOON_S)
             socket = opened[0]._socket
             socket.was_silent = True
             socket.dropConnection(abort=True)
-            await until(lambda: links and not is_asked_for("/word"), within_s=SOON_S)
-            await until(lambda: is_asked_for("/word"), within_s=SOON_S)
-            assert not is_asked_for("/cloud")
+            await until(lambda: links and not is_requested("/text"), within_s=SOON_S)
+            await until(lambda: is_requested("/text"), within_s=SOON_S)
+            assert not is_requested("/cloud")
             await one.state(lambda s: s["recording"]["left_out"] == ["/cloud"], SOON_S)
-            await until(lambda: is_asked_for("/cloud"), within_s=SOON_S)
+            await until(lambda: is_requested("/cloud"), within_s=SOON_S)
             await one.state(lambda s: s["recording"]["left_out"] == [], SOON_S)

@@ -69,14 +69,14 @@ def messages(version: RosVersion) -> dict[str, tuple[str, str, dict[str, Any]]]:
 @contextlib.asynccontextmanager
 async def car(version: RosVersion, *, hz: float = 10.0) -> AsyncIterator[tuple[RosBridge, int]]:
     async with bridging(ros_version=version) as (bridge, port):
-        said = messages(version)
-        for topic, (type, definition, _) in said.items():
+        published = messages(version)
+        for topic, (type, definition, _) in published.items():
             text = definition or (TF_TEXT if "TFMessage" in type and version == 1 else "")
             bridge.advertise(topic, spelled(type, version), **({"definition": text} if text else {}))
 
         async def drive() -> None:
             while True:
-                for topic, (_, _, message) in said.items():
+                for topic, (_, _, message) in published.items():
                     bridge.publish(topic, message)
                 await asyncio.sleep(1 / hz)
 
@@ -266,14 +266,14 @@ async def test_a_topic_that_nobody_publishes_carries_no_signal_until_somebody_do
 
 
 @pytest.mark.world(n=4)
-async def test_what_is_recorded_only_is_asked_for_though_rosapi_ended_before_its_definitions(
+async def test_what_is_recorded_only_is_requested_though_rosapi_ended_before_its_definitions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """rosapi named the topics, and ended before the recording began: they are recorded as far as they are known."""
     fetch_topics, has_ended = discovery.fetch_topics, False
 
-    async def topics_while_it_lives(asks: Asks) -> discovery.Offer | None:
-        return None if has_ended else await fetch_topics(asks)
+    async def topics_while_it_lives(questions: Asks) -> discovery.Offer | None:
+        return None if has_ended else await fetch_topics(questions)
 
     async def no_definitions(*_: object) -> dict[str, str]:
         raise CallFailed("Service /rosapi/topics_and_raw_types does not exist")
@@ -293,15 +293,15 @@ async def test_what_is_recorded_only_is_asked_for_though_rosapi_ended_before_its
 
 
 @pytest.mark.world(n=4)
-async def test_what_is_asked_for_before_its_definition_is_recorded_as_its_type(
+async def test_what_is_requested_before_its_definition_is_recorded_as_its_type(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """How many clients the bridge has: its first message comes at once, and definitions take a while."""
     fetch_definitions, may_answer = discovery.fetch_definitions, asyncio.Event()
 
-    async def slow_definitions(*asked: Any) -> dict[str, str]:
+    async def slow_definitions(*arguments: Any) -> dict[str, str]:
         await may_answer.wait()
-        return await fetch_definitions(*asked)
+        return await fetch_definitions(*arguments)
 
     monkeypatch.setattr(discovery, "fetch_definitions", slow_definitions)
     async with car(1) as (bridge, port):

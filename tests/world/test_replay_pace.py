@@ -103,7 +103,7 @@ def test_a_replay_again_and_again_has_no_clock_that_jumps_and_no_negative_age(
     assert min(ages) >= 0.0
     assert len(ages) > 1000
     assert "clock_jump" not in raised, raised
-    if not is_fresh:  # else the car's clock is told as 10 min behind, which is true
+    if not is_fresh:  # else the car's clock is reported as 10 min behind, which is true
         assert not [alarm for alarm in raised if "clock" in alarm], raised
 
 

@@ -1,4 +1,4 @@
-"""A slow link before a whole server: what is shown says how old it is, less is asked for, and all of it again later."""
+"""A slow link before a whole server: values are shown with their age, less is requested, and all of it again later."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def header(at_s: float) -> dict[str, Any]:
 
 @contextlib.asynccontextmanager
 async def car() -> AsyncIterator[tuple[int, float]]:
-    """A car whose values say when they were published: seconds since the time that is yielded with the port."""
+    """A car whose values state when they were published: seconds since the time that is yielded with the port."""
     async with bridging(ros_version=1) as (bridge, port):
         for topic, type in (
             (SPEED, "geometry_msgs/Twist"),
@@ -110,23 +110,23 @@ def ages(state: dict[str, Any], began_s: float) -> dict[str, tuple[float, float]
     return found
 
 
-class Asked:
-    """What is asked of the bridge, in order: topic, and at most one message in so many milliseconds, None: none."""
+class Requests:
+    """What is requested of the bridge, in order: topic, and the least interval of messages [ms]; None: unsubscribed."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.throttles: dict[str, list[int | None]] = {}
         subscribe, unsubscribe = RosLink.subscribe, RosLink.unsubscribe
 
-        def asked(link: RosLink, subscription: Subscription) -> None:
+        def note_and_subscribe(link: RosLink, subscription: Subscription) -> None:
             self._note(subscription.topic, subscription.throttle_ms)
             subscribe(link, subscription)
 
-        def not_asked(link: RosLink, topic: str) -> None:
+        def note_and_unsubscribe(link: RosLink, topic: str) -> None:
             self._note(topic, None)
             unsubscribe(link, topic)
 
-        monkeypatch.setattr(RosLink, "subscribe", asked)
-        monkeypatch.setattr(RosLink, "unsubscribe", not_asked)
+        monkeypatch.setattr(RosLink, "subscribe", note_and_subscribe)
+        monkeypatch.setattr(RosLink, "unsubscribe", note_and_unsubscribe)
 
     def _note(self, topic: str, throttle_ms: int | None) -> None:
         before = self.throttles.setdefault(topic, [])
@@ -142,39 +142,39 @@ def steps(one: Viewer) -> list[int]:
 
 
 @pytest.mark.field
-async def test_old_looks_old_less_is_asked_for_and_all_of_it_once_the_link_is_fast_again(
+async def test_old_values_look_old_less_is_requested_and_all_of_it_once_the_link_is_fast_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = Asked(monkeypatch)
+    requests = Requests(monkeypatch)
     async with car() as (port, began_s), slow_proxy(port, None) as proxy:
         config = Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{proxy.port}"),), data=tmp_path)
         async with serving(config) as base, viewer(base, name="Ann") as one:
             state = await one.state(
                 lambda s: s["recording"]["messages"] > 200 and len(ages(s, began_s)) == len(SINCE_S), SOON_S
             )
-            assert asked.now(NOISE) == 0
+            assert requests.now(NOISE) == 0
             name = state["recording"]["name"]
 
             proxy.rate_Bps = SLOW_BPS
             late = await one.until(lambda: next((e for e in one.events if e.get("alarm")), None), SOON_S)
             assert "the link is too slow" in late["text"]
-            await one.until(lambda: max(throttle or 0 for throttle in asked.throttles[SCAN]) > 0, SOON_S)
+            await one.until(lambda: max(throttle or 0 for throttle in requests.throttles[SCAN]) > 0, SOON_S)
             await one.state(lambda s: steps(one) and s["link"]["late_s"] < 1.0, SOON_S)
             during = steps(one)
             assert during == sorted(during)
             assert during[0] == 1, "first of all what is only recorded"
-            assert asked.now(NOISE) is None
+            assert requests.now(NOISE) is None
             for topic in JUDGED:
-                assert None not in asked.throttles[topic]
+                assert None not in requests.throttles[topic]
             assert all(
-                (asked.throttles[topic][-1] or 0) <= (asked.throttles[SCAN][-1] or 0) for topic in (SPEED, BRAKE)
+                (requests.throttles[topic][-1] or 0) <= (requests.throttles[SCAN][-1] or 0) for topic in (SPEED, BRAKE)
             )
 
             proxy.rate_Bps = None
             await one.state(lambda s: s["link"]["reduced"] is None, SOON_S)
             await one.until(lambda: steps(one)[-1] == 0, SOON_S)  # the event is stored first, and comes after the state
-            await one.until(lambda: asked.now(NOISE) == 0, SOON_S)
-            assert all(asked.now(topic) == 0 for topic in (*JUDGED, SCAN))
+            await one.until(lambda: requests.now(NOISE) == 0, SOON_S)
+            assert all(requests.now(topic) == 0 for topic in (*JUDGED, SCAN))
             state = await one.state(lambda s: all(shown < true + 0.3 for shown, true in ages(s, began_s).values()))
 
             seen = [(signal, *both) for each in one.states for signal, both in ages(each, began_s).items()]

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.world(n=7)
 
 
 def refuse_all(drive: Drive, names: list[str], *, until_s: float) -> None:
-    """Messages of these signals come at 20 Hz, and nothing they say can be used."""
+    """Messages of these signals come at 20 Hz, and none of their values can be used."""
     drive.silent |= set(names)
     while drive.now_s < until_s:
         drive.to(drive.now_s + 0.05)
@@ -70,7 +70,7 @@ def test_a_message_that_cannot_be_used_is_counted_as_one_that_came() -> None:
     snapshot = state.snapshot(5.0)
     assert snapshot.heard_s == pytest.approx(4.95)
     assert snapshot.unusable["speed"].count == 100
-    assert snapshot.unusable["speed"].words == "not a number (linear.x)"
+    assert snapshot.unusable["speed"].text == "not a number (linear.x)"
     assert snapshot.rates["speed"].measured_hz == pytest.approx(20.0, rel=0.1)
     pipeline.receive(
         sources,

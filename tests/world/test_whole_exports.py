@@ -79,10 +79,10 @@ def test_nothing_left_out_is_answered_with_0(tmp_path: Path, capsys: pytest.Capt
 def test_what_is_left_out_is_named_and_answered_with_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], format: str, row: tuple[str, str, Any], named: str
 ) -> None:
-    code, said = exported(drive(tmp_path, [*GOOD, row]), format, capsys)
-    assert code == 1, said
-    assert named in said
-    assert said.endswith("catgraph export: the export is incomplete.\n")
+    code, output = exported(drive(tmp_path, [*GOOD, row]), format, capsys)
+    assert code == 1, output
+    assert named in output
+    assert output.endswith("catgraph export: the export is incomplete.\n")
 
 
 @pytest.mark.parametrize(("format", "profile"), [("bag", "ros1"), ("bag", "ros2"), ("ros2", "ros2")])
@@ -97,13 +97,13 @@ def test_a_bag_without_the_messages_kept_as_json_is_not_whole(
     for n in range(100):
         made.write(BEGIN_NS + n * 10**8, "/n", kind, "int32 data", encoding, raw)
         made.write(BEGIN_NS + n * 10**8, "/tf", "tf2_msgs/TFMessage", "{}", "json", b'{"transforms":[]}')
-    code, said = exported(made.close(), format, capsys)
+    code, output = exported(made.close(), format, capsys)
     assert code == 1
-    assert "/tf (100 messages) is left out" in said
+    assert "/tf (100 messages) is left out" in output
 
 
 @pytest.mark.field
-async def test_a_server_s_export_says_whether_it_is_whole(tmp_path: Path) -> None:
+async def test_a_server_s_export_reports_whether_it_is_whole(tmp_path: Path) -> None:
     path = drive(tmp_path, [*GOOD, ("/tf", "tf2_msgs/TFMessage", {"transforms": []})])
     made = await make_export([path], "csv", tmp_path)
     assert made.is_whole is False

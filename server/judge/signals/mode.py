@@ -34,13 +34,13 @@ def of_bool(message: Any) -> DriveMode:
     value = message.get("data") if isinstance(message, Mapping) else None
     if not isinstance(value, bool):
         raise Rejected("data is not true or false")
-    return DriveMode(mode="autonomous" if value else "manual", said="true" if value else "false")
+    return DriveMode(mode="autonomous" if value else "manual", text="true" if value else "false")
 
 
 def of_number(message: Any) -> DriveMode:
     """A plain number; what it means is a setting."""
     number = _byte(message, "data")
-    return DriveMode(mode="unknown", said=str(number), number=number)
+    return DriveMode(mode="unknown", text=str(number), number=number)
 
 
 def of_word(message: Any) -> DriveMode:
@@ -56,12 +56,12 @@ def of_word(message: Any) -> DriveMode:
     if not isinstance(value, str):
         raise Rejected("data has no word")
     said = text(message, "data").strip()[:LONGEST_WORD] or "no word"
-    return DriveMode(mode=WORDS.get(said.casefold(), "unknown"), said=said)
+    return DriveMode(mode=WORDS.get(said.casefold(), "unknown"), text=said)
 
 
 def of_autoware(message: Any) -> DriveMode:
     said, mode = AUTOWARE.get(number := _byte(message, "mode"), (f"mode {number}", "unknown"))
-    return DriveMode(mode=mode, said=said)
+    return DriveMode(mode=mode, text=said)
 
 
 def _byte(message: Any, name: str) -> int:

@@ -266,8 +266,7 @@ export class ScanPlot {
     this.#write(g, text, plate, css);
   }
 
-<<<<<<< HEAD
-  /** Words in the first place where they cover neither words nor a return; else not: the numbers beside the plot have them. @param {Pen} g @param {string} text @param {Where[]} places @param {string} css @returns {number} which place; -1: none */
+  /** Draws a label in the first place where it covers neither a label nor a return; else not: the numbers beside the plot have them. @param {Pen} g @param {string} text @param {Where[]} places @param {string} css @returns {number} which place; -1: none */
   #clear(g, text, places, css) {
     if (!this.#dots) return -1;
     const { index, box } = clearPlace(places.map((where) => this.#plate(g, text, ...where)), this.#taken, this.#dots.points, this.#dots.scale);
@@ -275,17 +274,6 @@ export class ScanPlot {
     this.#taken.push(box);
     this.#write(g, text, box, css);
     return index;
-=======
-  /** Draws the label of a line beside it, in the first place where it covers neither a label nor a return; else not: the numbers beside the plot have them. @param {Pen} g @param {string} text @param {[CanvasTextAlign, number][]} places @param {number} y @param {string} css @param {number} weight */
-  #beside(g, text, places, y, css, weight) {
-    for (const [align, x] of places) {
-      const plate = clearOf(this.#taken, this.#plate(g, text, x, y, align, 14, weight));
-      if (!plate || !this.#dots || coversAny(plate, this.#dots.points, this.#dots.scale)) continue;
-      this.#taken.push(plate);
-      this.#write(g, text, plate, css);
-      return;
-    }
->>>>>>> l5
   }
 
   /** The plate of a text. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {CanvasTextAlign} align @param {number} size @param {number} weight @returns {Box} */

@@ -55,7 +55,7 @@ def measure(rig: Rig) -> Group:
 
 @contextlib.contextmanager
 def fleet(rig: Rig) -> Iterator[tuple[Child, Child, Child]]:
-    """A broker, an agent that is connected to the car, and a web node that has heard it; each a process."""
+    """A broker, an agent that is connected to the car, and a web node that has received from it; each a process."""
     with contextlib.ExitStack() as up:
 
         def child(module: str, **options: object) -> Child:

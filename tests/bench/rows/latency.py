@@ -67,7 +67,7 @@ def series(rig: Rig, viewers: Child) -> tuple[list[float], dict[str, Any]]:
 
 
 def latencies_ms(sent: Sequence[Sequence[float]], alarms: Sequence[Sequence[Any]]) -> list[float]:
-    """Matches alarms with probes by order; the speed that each tells shows that the order is right."""
+    """Matches alarms with probes by order; the speed in each shows that the order is right."""
     speeds = [float(str(text).split()[0]) for text, _ in alarms]
     if len(alarms) != len(sent) or any(abs(a - b[0]) > 0.05 for a, b in zip(speeds, sent, strict=True)):
         raise Failed(f"{len(sent)} speeds above the limit were sent, and the alarms that came are others: {speeds}")

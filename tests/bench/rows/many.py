@@ -227,7 +227,7 @@ class Found:
 
     @property
     def is_crowd_served(self) -> bool:
-        """Else its states say nothing of what a page costs: the long lists came and the states did not."""
+        """Else its states do not show what a page costs: the long lists came and the states did not."""
         return min(p.hz for p in self.crowded) > SERVED * self.crowded[0].hz
 
     @property
@@ -235,7 +235,7 @@ class Found:
         return _by_pages(self.all_cars)
 
     def later(self) -> Iterator[str]:
-        """What the lines say of many more cars and pages; each sentence with what it takes for granted."""
+        """The extrapolation to many more cars and pages; each sentence with its assumptions."""
         node, broker, pages = self.by_car("node"), self.by_car("broker"), LATER_PAGES / LATER_NODES
         summaries = node.at(LATER_CARS)
         a_car, a_page = self.by_home.each

@@ -28,7 +28,7 @@ LINK = LinkFacts(phase="monitoring", connected_s=0.0, bridge_answers=True)
 
 
 def known(now_s: float = 100.0, *, age_s: float = 0.0, link: LinkFacts = LINK, **values: Any) -> Snapshot:
-    """A snapshot that knows these signals, each `age_s` old with a horizon of 1 s; None leaves a signal out."""
+    """A snapshot with these signals, each `age_s` old with a horizon of 1 s; None leaves a signal out."""
     readings = {
         name: Reading(value=value, received_s=now_s - age_s, horizon_s=1.0, period_s=0.05, count=10)
         for name, value in values.items()

@@ -17,7 +17,7 @@ OK, FAULT, UNKNOWN = Verdict.OK, Verdict.FAULT, Verdict.UNKNOWN
 NAMES = [name for name in REAL_HZ if not SIGNALS[name].by_parts]
 
 
-def heard(slow: int, of: int, *, to: float = 0.5, **changes: object) -> Snapshot:
+def slowed(slow: int, of: int, *, to: float = 0.5, **changes: object) -> Snapshot:
     """So many signals of a car, the first few at a part of their rate."""
     names = NAMES[:of]
     rates = {
@@ -34,22 +34,22 @@ def heard(slow: int, of: int, *, to: float = 0.5, **changes: object) -> Snapshot
 @pytest.mark.parametrize(
     ("snapshot", "was_active", "verdict"),
     [
-        pytest.param(heard(0, 10), False, OK, id="none"),
-        pytest.param(heard(4, 10), False, OK, id="four of ten"),
-        pytest.param(heard(5, 10), False, FAULT, id="half"),
-        pytest.param(heard(10, 10), False, FAULT, id="all"),
-        pytest.param(heard(2, 4), False, OK, id="two are each judged alone, even if they are half"),
-        pytest.param(heard(3, 4), False, FAULT, id="three of four"),
-        pytest.param(heard(3, 10), True, FAULT, id="not yet cleared"),
-        pytest.param(heard(2, 10), True, OK, id="cleared"),
-        pytest.param(heard(10, 10, to=0.9), False, OK, id="at the limit"),
-        pytest.param(heard(10, 10, to=0.89), False, FAULT, id="below it"),
-        pytest.param(heard(2, 2), False, UNKNOWN, id="too few to compare"),
-        pytest.param(heard(0, 0), False, UNKNOWN, id="nothing"),
-        pytest.param(heard(10, 10, settled=False), False, UNKNOWN, id="rates not settled"),
-        pytest.param(heard(10, 10, measured_hz=None), False, UNKNOWN, id="not measured"),
-        pytest.param(heard(10, 10, measured_hz=0.0), False, UNKNOWN, id="silent is another alarm"),
-        pytest.param(heard(10, 10, expected_hz=None), False, UNKNOWN, id="nothing expected"),
+        pytest.param(slowed(0, 10), False, OK, id="none"),
+        pytest.param(slowed(4, 10), False, OK, id="four of ten"),
+        pytest.param(slowed(5, 10), False, FAULT, id="half"),
+        pytest.param(slowed(10, 10), False, FAULT, id="all"),
+        pytest.param(slowed(2, 4), False, OK, id="two are each judged alone, even if they are half"),
+        pytest.param(slowed(3, 4), False, FAULT, id="three of four"),
+        pytest.param(slowed(3, 10), True, FAULT, id="not yet cleared"),
+        pytest.param(slowed(2, 10), True, OK, id="cleared"),
+        pytest.param(slowed(10, 10, to=0.9), False, OK, id="at the limit"),
+        pytest.param(slowed(10, 10, to=0.89), False, FAULT, id="below it"),
+        pytest.param(slowed(2, 2), False, UNKNOWN, id="too few to compare"),
+        pytest.param(slowed(0, 0), False, UNKNOWN, id="nothing"),
+        pytest.param(slowed(10, 10, settled=False), False, UNKNOWN, id="rates not settled"),
+        pytest.param(slowed(10, 10, measured_hz=None), False, UNKNOWN, id="not measured"),
+        pytest.param(slowed(10, 10, measured_hz=0.0), False, UNKNOWN, id="silent is another alarm"),
+        pytest.param(slowed(10, 10, expected_hz=None), False, UNKNOWN, id="nothing expected"),
     ],
 )
 def test_verdict(snapshot: Snapshot, was_active: bool, verdict: Verdict) -> None:
@@ -57,7 +57,7 @@ def test_verdict(snapshot: Snapshot, was_active: bool, verdict: Verdict) -> None
 
 
 def test_what_the_operator_reads() -> None:
-    found = ask("all_slow", heard(7, 9))
+    found = ask("all_slow", slowed(7, 9))
     assert found.text == "7 of 9 signals come slower than expected, down to 50 %: bridge, radio or server overloaded"
     assert found.brief == "FAULT 7 of 9"
 
@@ -81,7 +81,7 @@ def test_a_single_slow_signal_is_still_its_own() -> None:
     assert car.announced == ["signal_slow.brake"]
 
 
-def test_what_stays_slow_when_the_rest_is_well_again_is_told_then() -> None:
+def test_what_stays_slow_when_the_rest_is_well_again_is_reported_then() -> None:
     car = Drive().open().to(12.0)
     usual = dict(car.hz)
     car.hz = {name: 0.6 * hz for name, hz in usual.items()}

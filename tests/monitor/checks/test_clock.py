@@ -1,4 +1,4 @@
-"""The car's clock: jumps told for a while, offsets of a running clock, and old stamps that are no fault."""
+"""The car's clock: jumps that are reported for a while; offsets of a running clock; old stamps without a fault."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def jumped(by_s: float, ago_s: float, **limits: float) -> Finding:
         pytest.param(-30.0, -5.0, FAULT, id="our own clock went back meanwhile"),
     ],
 )
-def test_a_jump_is_told_for_ten_seconds(by_s: float, ago_s: float, verdict: Verdict) -> None:
+def test_a_jump_is_reported_for_ten_seconds(by_s: float, ago_s: float, verdict: Verdict) -> None:
     assert jumped(by_s, ago_s).verdict is verdict
 
 
@@ -104,7 +104,7 @@ def test_without_a_jump_and_without_stamps() -> None:
         pytest.param([stamped(0.0, -9.0, age_s=2.0), stamped()], False, OK, id="one stale, one fresh"),
         pytest.param([stamped(0.0, -9.0, repeats=Repeats(stamp_n=3, stamp_s=9.0))], False, UNKNOWN, id="stuck stamp"),
         pytest.param([stamped(change_s=None)], False, UNKNOWN, id="no stamp"),
-        pytest.param([], False, UNKNOWN, id="nothing heard"),
+        pytest.param([], False, UNKNOWN, id="nothing received"),
     ],
 )
 def test_offset(readings: list[Reading[GpsFix]], was_active: bool, verdict: Verdict) -> None:
@@ -146,7 +146,7 @@ def test_stories() -> None:
     assert announced(lambda _: -5 * YEAR_S) == []
     assert announced(lambda _: -WALL_ZERO_S) == []
     assert announced(lambda s: -5 * YEAR_S - (30.0 if s >= 30 else 0.0)) == [(30.2, "clock_jump")]
-    # set back for good: the jump, and once it has been told for its time, that the clock is wrong
+    # set back for good: the jump, and once it has been reported for its time, that the clock is wrong
     assert announced(lambda s: -30.0 if s >= 20 else 0.0) == [
         (20.2, "clock_jump"),
         (pytest.approx(32.2, abs=0.15), "clock_offset"),

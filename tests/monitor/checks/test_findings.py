@@ -1,4 +1,4 @@
-"""What each check finds, word for word and number by number, kept in findings.json.
+"""The exact texts and numbers of each check's findings, kept in findings.json.
 
 Where a change is meant, `python -m tests.monitor.checks.test_findings` writes the file anew: read the difference.
 """
@@ -89,7 +89,7 @@ MORE: dict[str, dict[str, Snapshot]] = {
     "slow_down_rivals": {"four": slowed(0.0, rivals=("/a", "/b", "/c", "/d")), "two": slowed(0.0, rivals=("/a", "/b"))},
     "slow_down_hold_ended": {
         "just over": slowed(0.0, ended_at_longest_s=NOW_S - 60.0, ordered_s=NOW_S - 700.0),
-        "not told any more": slowed(0.0, ended_at_longest_s=NOW_S - 1000.0, ordered_s=None),
+        "not reported any more": slowed(0.0, ended_at_longest_s=NOW_S - 1000.0, ordered_s=None),
     },
     "phone_missing": {why: rode(why=why, usable_s=NOW_S - 11.0) for why in get_args(Why)},
     "phone_car": {"no car": with_more(known(), phone=view()), "nobody": known(position=FIX)},
@@ -113,7 +113,7 @@ MORE: dict[str, dict[str, Snapshot]] = {
     },
     "gps_fix": {
         "error too large": known(position=replace(FIX, sigma_m=30.0)),
-        "no error told": known(position=replace(FIX, sigma_m=None)),
+        "no error reported": known(position=replace(FIX, sigma_m=None)),
         "no place": known(position=replace(FIX, lat_deg=math.nan)),
         "not set": known(position=replace(FIX, lat_deg=math.nan, lon_deg=math.nan, status=-1, is_unset=True)),
     },

@@ -1,4 +1,4 @@
-"""Signals that talk and always say the same: which may, which may not, and what is not known."""
+"""Signals whose messages never change: which may, which may not, and where it is unknown."""
 
 from __future__ import annotations
 
@@ -201,12 +201,12 @@ def test_a_value_held_from_the_first_message_on_proves_nothing(signal: str) -> N
 
 @pytest.mark.parametrize("signal", BY_NOISE)
 def test_a_coarse_signal_that_often_repeats_itself_proves_nothing(signal: str) -> None:
-    """Whole kilometres an hour, say."""
+    """For example whole kilometres an hour."""
     found = Ride(signal).vary(20.0, RESTING[signal], every=4).go(5.0, noisy(RESTING[signal], 9_999)).ask()
     assert (found.verdict, found.applies) == (UNKNOWN, False)
 
 
-def test_a_car_at_rest_says_0_for_ever() -> None:
+def test_a_car_at_rest_reports_0_for_ever() -> None:
     ride = Ride("speed").vary(5.0, RESTING["speed"]).go(60.0, Twist(speed_mps=0.0))
     assert (ride.ask().verdict, ride.ask().brief) == (UNKNOWN, "not checked: stands")
 
@@ -218,7 +218,7 @@ def test_how_long_is_a_setting() -> None:
 
 
 @pytest.mark.parametrize("signal", SIGNALS)
-def test_what_is_not_heard_or_silent(signal: str) -> None:
+def test_what_is_not_received_or_silent(signal: str) -> None:
     assert not ask(f"signal_frozen.{signal}", known()).applies
     silent = known(age_s=2.0, **{signal: RESTING[signal]})
     assert ask(f"signal_frozen.{signal}", silent).brief == "not checked: stale"
@@ -238,7 +238,7 @@ def test_a_frozen_speed_explains_what_is_reckoned_from_it() -> None:
     assert "signal_frozen.speed" in check_of("no_response").alarm.inhibited_by
 
 
-def test_it_is_told_once_and_ends_two_seconds_after_the_signal_moves_again() -> None:
+def test_it_is_reported_once_and_ends_two_seconds_after_the_signal_moves_again() -> None:
     monitor, ride, log = Monitor(), Ride("position"), []
     ride.state.link(LinkFacts(phase="monitoring", connected_s=0.0, published=frozenset({"position", "speed"})))
     for n in range(300):

@@ -1,4 +1,4 @@
-"""Fuel: low, not low, not published, in a unit that says nothing."""
+"""Fuel: low, not low, not published, in a unit without a meaning."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def test_a_level_that_is_no_number_is_no_alarm(percent: float) -> None:
     assert ask("fuel_low", known(fuel=Level(value=percent, unit="%"))).verdict == "unknown"
 
 
-def test_it_is_told_once() -> None:
+def test_it_is_reported_once() -> None:
     """fuel_low: the tank runs empty by a percent in ten seconds."""
     car = Drive({"speed": 20.0}).open()
     for second in range(100):
-        car.say("fuel", Level(value=14.0 - 0.1 * second, unit="%")).to(float(second))
+        car.send("fuel", Level(value=14.0 - 0.1 * second, unit="%")).to(float(second))
     assert car.announced == ["fuel_low"]
     assert 45.0 <= car.happened[0].at_s <= 47.0

@@ -109,7 +109,7 @@ def test_drift_is_not_checked_while_moving_and_the_anchor_is_taken_anew() -> Non
     assert walk.ask("gps_drift") == "ok"
 
 
-def test_a_car_that_has_only_just_stopped_is_not_said_to_move() -> None:
+def test_a_car_that_has_only_just_stopped_is_not_reported_as_moving() -> None:
     walk = Walk(sigma_m=0.2).go(5.0, speed_mps=3.0).go(1.0)
     assert ask("gps_drift", walk.state.snapshot(walk.now_s)).text == "The car has just stopped"
     walk.go(1.0, speed_mps=3.0)
@@ -142,7 +142,7 @@ def test_not_published_and_silent(id: str) -> None:
 
 @pytest.mark.parametrize(("status", "brief"), [(-1, "FAULT: no fix"), (-2, "FAULT: fix unset"), (-3, "FAULT: no fix")])
 def test_without_a_fix_nothing_else_is_judged(status: int, brief: str) -> None:
-    """−2 is "status is not yet set" of ROS 2's NavSatStatus: nobody says that there is no fix."""
+    """−2 is "status is not yet set" of ROS 2's NavSatStatus: it does not mean that there is no fix."""
     fix = GpsFix(lat_deg=math.nan, lon_deg=math.nan, status=status)
     snapshot = known(position=fix, speed=Twist(speed_mps=0.0, yaw_rate_radps=None))
     found = ask("gps_fix", snapshot)
@@ -153,13 +153,13 @@ def test_without_a_fix_nothing_else_is_judged(status: int, brief: str) -> None:
 
 @pytest.mark.parametrize("kind", [0, 1, 2, 3])
 def test_quality_of_every_covariance_type(kind: int) -> None:
-    """Unknown quality is not checked, said, and rejected where the operator wants the report's strict mode."""
-    unsaid = known(position=replace(moved(HERE, 0, 0), covariance_type=kind))
-    assert ask("gps_fix", unsaid).verdict == "ok"
-    assert ask("gps_quality", unsaid).verdict == "unknown"
-    assert ask("gps_quality", unsaid, strict=1.0).verdict == "fault"
-    said = known(position=replace(moved(HERE, 0, 0, 1.5), covariance_type=kind))
-    assert ask("gps_quality", said, strict=1.0).verdict == "ok"
+    """Unknown quality is not checked, is reported, and is a fault in the strict mode."""
+    without_quality = known(position=replace(moved(HERE, 0, 0), covariance_type=kind))
+    assert ask("gps_fix", without_quality).verdict == "ok"
+    assert ask("gps_quality", without_quality).verdict == "unknown"
+    assert ask("gps_quality", without_quality, strict=1.0).verdict == "fault"
+    with_quality = known(position=replace(moved(HERE, 0, 0, 1.5), covariance_type=kind))
+    assert ask("gps_quality", with_quality, strict=1.0).verdict == "ok"
 
 
 @pytest.mark.parametrize(
@@ -193,12 +193,12 @@ def test_the_real_fault_of_2016_07_28_is_a_jump_within_half_a_second(recordings:
 def test_the_healthy_drive_raises_no_gps_alarm(recordings: Path) -> None:
     monitor = Monitor([check for check in CHECKS if check.id in GPS])
     state = State()
-    heard = [(at_s, "speed", Twist(speed_mps=v, yaw_rate_radps=None)) for at_s, v in drive_speeds(recordings)]
-    heard += [(at_s, "position", fix) for at_s, fix in drive_fixes(recordings)]
-    heard.sort(key=lambda row: row[0])
-    start_s = heard[0][0]
+    received = [(at_s, "speed", Twist(speed_mps=v, yaw_rate_radps=None)) for at_s, v in drive_speeds(recordings)]
+    received += [(at_s, "position", fix) for at_s, fix in drive_fixes(recordings)]
+    received.sort(key=lambda row: row[0])
+    start_s = received[0][0]
     state.link(LinkFacts(phase="monitoring", connected_s=0.0))
-    for at_s, signal, value in heard:
+    for at_s, signal, value in received:
         now_s = at_s - start_s + 1.0
         state.receive(signal, value, now_s, at_s)
         assert monitor.step(state.snapshot(now_s), {signal}) == ()

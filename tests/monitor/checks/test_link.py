@@ -28,13 +28,13 @@ def found(check: str, link: LinkFacts, now_s: float = 100.0, heard_s: float | No
         ("lost", OK, FAULT),
     ],
 )
-def test_each_phase_says_its_own(phase: Phase, failed: Verdict, lost: Verdict) -> None:
+def test_each_phase_has_its_own_verdict(phase: Phase, failed: Verdict, lost: Verdict) -> None:
     link = LinkFacts(phase=phase, since_s=90.0)
     assert found("connect_failed", link).verdict is failed
     assert found("link_lost", link).verdict is lost
 
 
-def test_case_01_the_reason_of_a_failure_is_said() -> None:
+def test_case_01_the_reason_of_a_failure_is_reported() -> None:
     link = LinkFacts(
         phase="failed",
         problem_title="192.168.4.1 is there, but nothing listens on port 9090.",
@@ -46,7 +46,7 @@ def test_case_01_the_reason_of_a_failure_is_said() -> None:
     assert found("connect_failed", LinkFacts(phase="failed")).text == "The car cannot be reached."
 
 
-def test_case_12_a_lost_link_says_what_fell_silent_and_for_how_long() -> None:
+def test_case_12_a_lost_link_reports_what_fell_silent_and_for_how_long() -> None:
     lost = found("link_lost", LinkFacts(phase="lost", since_s=93.8, problem_title="The bridge stopped answering."))
     assert lost.text == "The bridge stopped answering."
     assert lost.measured is not None
@@ -122,15 +122,15 @@ def silent(
     ("finding", "verdict"),
     [
         pytest.param(silent(0.01, 0.02, 0.03), OK, id="all fresh"),
-        pytest.param(silent(9.0, 9.0, 0.03), OK, id="one still speaks"),
+        pytest.param(silent(9.0, 9.0, 0.03), OK, id="one still comes"),
         pytest.param(silent(1.01, 1.02, 1.03, bridge_s=99.5), FAULT, id="all stale, the bridge lives"),
         pytest.param(silent(1.0, 1.02, 1.03, bridge_s=99.5), OK, id="one just not stale"),
-        pytest.param(silent(1.5, 1.5, 1.5, bridge_s=98.6), UNKNOWN, id="the bridge was not heard since either"),
+        pytest.param(silent(1.5, 1.5, 1.5, bridge_s=98.6), UNKNOWN, id="nothing from the bridge since either"),
         pytest.param(silent(1.5, 1.5, 1.5), UNKNOWN, id="nothing known of the bridge"),
-        pytest.param(silent(2.7, 2.7, 2.7), FAULT, id="whatever the bridge, it must be said"),
+        pytest.param(silent(2.7, 2.7, 2.7), FAULT, id="whatever the bridge, it must be reported"),
         pytest.param(silent(1.5, 1.5, 1.5, was_active=True), FAULT, id="active, it stays"),
         pytest.param(silent(1.5, 1.5, 1.5, slow_s=0.1), FAULT, id="diagnostics alone are not a car"),
-        pytest.param(silent(1.5, 1.5, 1.5, command_s=0.1), FAULT, id="what the car is ordered is not what it says"),
+        pytest.param(silent(1.5, 1.5, 1.5, command_s=0.1), FAULT, id="a command to the car is no message of the car"),
         pytest.param(silent(1.5, slow_s=0.1), OK, id="one fast signal alone is the signal's own alarm"),
         pytest.param(silent(1.5, slow_s=2.0, bridge_s=99.9), FAULT, id="one fast signal and nothing since"),
         pytest.param(silent(), UNKNOWN, id="never spoke"),
@@ -155,7 +155,7 @@ def test_what_came_before_the_link_was_lost_does_not_count() -> None:
     assert ask("car_silent", Snapshot(now_s=100.0, readings={"speed": old}, link=OPEN, heard_s=40.0)).verdict is UNKNOWN
 
 
-def test_who_is_silent_is_said() -> None:
+def test_who_is_silent_is_reported() -> None:
     assert (
         silent(3.4, 3.4, 3.4, bridge_s=99.5).text
         == "No message for 3.4 s: the bridge answers, no signal of the car comes"

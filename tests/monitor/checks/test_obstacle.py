@@ -72,7 +72,7 @@ def test_no_object_of_the_estimator_is_nothing_in_the_way() -> None:
     assert ask("obstacle_nearest", estimated(None, 8.0)).verdict == "ok"
 
 
-def test_a_blind_laser_says_nothing_of_obstacles() -> None:
+def test_a_blind_laser_shows_nothing_of_obstacles() -> None:
     assert ask("obstacle", known(scan=sweep([]), speed=Twist(speed_mps=0.0, yaw_rate_radps=None))).verdict == "unknown"
 
 
@@ -99,7 +99,7 @@ def test_what_is_not_published_does_not_apply_and_what_is_silent_is_unknown(id: 
     assert ask(id, make(3.0, 0.0, age_s=1.5)).verdict == "unknown"
 
 
-def test_the_text_says_what_where_and_against_what() -> None:
+def test_the_text_states_what_where_and_against_what() -> None:
     snapshot = estimated(4.2, 0.0, bearing=Bearing(bearing_rad=-0.09))
     assert ask("obstacle_nearest", snapshot).text == "Obstacle 4.2 m ahead, 5° right, 5.0 m needed"
 

@@ -1,4 +1,4 @@
-"""A pause that somebody forgot: said after some minutes, and then ever more seldom."""
+"""A pause that somebody forgot: reported after some minutes, and then ever more seldom."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_verdict(for_s: float | None, verdict: Verdict, level: int) -> None:
 
 
 @pytest.mark.parametrize("phase", ["monitoring", "lost", "failed"])
-def test_it_is_told_with_and_without_a_link_and_although_it_is_paused(phase: Phase) -> None:
+def test_it_is_reported_with_and_without_a_link_and_although_it_is_paused(phase: Phase) -> None:
     monitor = Monitor()
     announced = [t for t in monitor.step(paused(400.0, phase)) if t.announces and t.alarm_id == "paused_long"]
     assert [t.text for t in announced] == ["Monitoring paused for 7 min: no alarm is raised"]
@@ -52,8 +52,8 @@ def test_how_long_is_a_setting() -> None:
     assert ask("paused_long", paused(100.0), after_min=2.0).verdict is OK
 
 
-def test_a_forgotten_pause_is_told_ever_more_seldom() -> None:
-    """paused_long: after 5, 10, 20, 40 minutes, acknowledged or not, and to go on ends it without a word."""
+def test_a_forgotten_pause_is_reported_ever_more_seldom() -> None:
+    """paused_long: after 5, 10, 20, 40 minutes, acknowledged or not, and resuming ends it without an announcement."""
     monitor, state, announced = Monitor(), State(), []
     state.link(LinkFacts(phase="monitoring", connected_s=0.0))
     state.snapshot(0.0)

@@ -1,4 +1,4 @@
-"""Whether anybody would hear an alarm while the car moves, and that a reload is no reason to speak of it."""
+"""Whether anybody would hear an alarm while the car moves, and that a reload raises no alarm."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.monitor.checks.known import ask, check_of, known
 OK, FAULT, UNKNOWN = Verdict.OK, Verdict.FAULT, Verdict.UNKNOWN
 DEAF = ReachFacts(can=0, of=3, why="2 × sound off, no contact")
 ALONE = ReachFacts()
-HEARD = ReachFacts(can=2, of=3, why="sound off")
+AUDIBLE = ReachFacts(can=2, of=3, why="sound off")
 
 
 def at(facts: ReachFacts | None, speed_mps: float | None = 4.2, **more: Any) -> Snapshot:
@@ -27,10 +27,10 @@ def at(facts: ReachFacts | None, speed_mps: float | None = 4.2, **more: Any) -> 
 
 
 @pytest.mark.parametrize(
-    ("facts", "speed_mps", "was_active", "verdict", "says"),
+    ("facts", "speed_mps", "was_active", "verdict", "text"),
     [
-        (HEARD, 4.2, False, OK, "Alarms audible on 2 of 3 operator pages"),
-        (HEARD, None, False, OK, "Alarms audible on 2 of 3 operator pages"),
+        (AUDIBLE, 4.2, False, OK, "Alarms audible on 2 of 3 operator pages"),
+        (AUDIBLE, None, False, OK, "Alarms audible on 2 of 3 operator pages"),
         (DEAF, 4.2, False, FAULT, "The car moves at 4.2 m/s and nobody can hear alarms: none of 3 (2 × sound off, no"),
         (DEAF, -1.0, False, FAULT, "moves at 1.0 m/s"),  # backwards
         (ALONE, 4.2, False, FAULT, "nobody can hear alarms: no operator's phone is connected"),
@@ -43,18 +43,18 @@ def at(facts: ReachFacts | None, speed_mps: float | None = 4.2, **more: Any) -> 
         (None, 4.2, True, UNKNOWN, "not monitored here"),
     ],
 )
-def test_who_hears(
-    facts: ReachFacts | None, speed_mps: float | None, was_active: bool, verdict: Verdict, says: str
+def test_who_can_hear_alarms(
+    facts: ReachFacts | None, speed_mps: float | None, was_active: bool, verdict: Verdict, text: str
 ) -> None:
     found = ask("reach", at(facts, speed_mps), was_active=was_active)
     assert found.verdict is verdict
-    assert says in found.text
+    assert text in found.text
 
 
 @pytest.mark.parametrize(
     ("facts", "ended"),
     [
-        (HEARD, "Alarms can be heard again"),
+        (AUDIBLE, "Alarms are audible again"),
         (ALONE, "Nobody can hear alarms, car stands"),  # it ended, and still nobody can
     ],
 )
@@ -66,7 +66,7 @@ def test_it_is_over_once_the_car_rests() -> None:
     assert ask("reach", at(ALONE, 0.0, standing_since_s=97.0), was_active=True).verdict is OK
 
 
-def test_an_old_speed_says_nothing_of_now() -> None:
+def test_an_old_speed_proves_nothing_of_now() -> None:
     snapshot = replace(known(speed=Twist(speed_mps=4.2), age_s=1.1), reach=ALONE)
     found = ask("reach", snapshot)
     assert (found.verdict, found.brief) == (UNKNOWN, "not checked: no speed")
@@ -83,10 +83,10 @@ def raised(monitor: Monitor, facts: ReachFacts, seconds: float, begin_s: float) 
 
 def test_a_reload_and_a_tap_raise_nothing_and_15_s_of_silence_do() -> None:
     monitor = Monitor([check_of("reach")])
-    assert raised(monitor, HEARD, 2.0, 0.0) == []
+    assert raised(monitor, AUDIBLE, 2.0, 0.0) == []
     assert raised(monitor, DEAF, 14.5, 2.0) == []
-    assert raised(monitor, HEARD, 2.0, 16.5) == []
+    assert raised(monitor, AUDIBLE, 2.0, 16.5) == []
     assert raised(monitor, ALONE, 14.5, 18.5) == []
     assert raised(monitor, ALONE, 1.0, 33.0) == ["raised"]
-    assert raised(monitor, HEARD, 3.0, 34.0) == ["cleared"]
+    assert raised(monitor, AUDIBLE, 3.0, 34.0) == ["cleared"]
     assert monitor.alarms["reach"].state == "RTN_UNACKED"  # whoever comes back must know

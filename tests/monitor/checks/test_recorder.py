@@ -20,7 +20,7 @@ def at(**facts: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("facts", "was_active", "verdict", "says"),
+    ("facts", "was_active", "verdict", "text"),
     [
         ({"behind_s": 2.0}, False, OK, ""),
         ({"behind_s": 2.1}, False, FAULT, "wait 2.1 s"),
@@ -35,10 +35,10 @@ def at(**facts: Any) -> Any:
         ({"state": "stopped", "behind_s": 9.0}, False, UNKNOWN, ""),
     ],
 )
-def test_it_keeps_up(facts: dict[str, Any], was_active: bool, verdict: Verdict, says: str) -> None:
+def test_it_keeps_up(facts: dict[str, Any], was_active: bool, verdict: Verdict, text: str) -> None:
     found = ask("recorder_behind", at(**facts), was_active=was_active)
     assert found.verdict is verdict
-    assert says in found.text
+    assert text in found.text
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_it_records(facts: dict[str, Any], verdict: Verdict, text: str) -> None:
     assert (found.verdict, found.text) == (verdict, text)
 
 
-def test_a_stopped_recorder_is_told_at_once_and_alone_and_while_paused() -> None:
+def test_a_stopped_recorder_is_reported_at_once_and_alone_and_while_paused() -> None:
     monitor = Monitor()
     announced = []
     for tenth in range(100):

@@ -18,7 +18,7 @@ NOW_S = 100.0
 OPEN = LinkFacts(phase="monitoring", since_s=0.0, connected_s=0.0, published=frozenset(SIGNALS))
 
 
-def heard(
+def received(
     age_s: float, period_s: float = 0.05, horizon_s: float = 1.0, derived_from: str | None = None
 ) -> Reading[int]:
     return Reading(
@@ -32,8 +32,8 @@ def heard(
 
 
 def snapshot(link: LinkFacts = OPEN, rates: dict[str, Rate] | None = None, **readings: Reading[int]) -> Snapshot:
-    """At 100 s, while `steering` and `position` go on speaking, so that the car as a whole is not silent."""
-    known = {"steering": heard(0.01), "position": heard(0.05, 0.1), **readings}
+    """At 100 s, while `steering` and `position` keep coming, so that the car as a whole is not silent."""
+    known = {"steering": received(0.01), "position": received(0.05, 0.1), **readings}
     newest_s = max(reading.received_s for reading in known.values())
     return Snapshot(now_s=NOW_S, readings=known, link=link, heard_s=newest_s, rates=rates or {})
 
@@ -53,7 +53,7 @@ def stale(signal: str, of: Snapshot, **limits: float) -> Finding:
     ],
 )
 def test_silent(age_s: float, horizon_s: float, verdict: Verdict) -> None:
-    assert stale("brake", snapshot(brake=heard(age_s, horizon_s=horizon_s))).verdict is verdict
+    assert stale("brake", snapshot(brake=received(age_s, horizon_s=horizon_s))).verdict is verdict
 
 
 @pytest.mark.parametrize(
@@ -74,10 +74,10 @@ def test_diagnostics_of_which_nothing_came_are_never_called_fine(
     assert (found.verdict, found.text) == (verdict, f"Diagnostics: {text}")
 
 
-def test_what_is_said_of_a_silent_signal() -> None:
-    found = stale("brake", snapshot(brake=heard(3.4)))
+def test_what_is_reported_of_a_silent_signal() -> None:
+    found = stale("brake", snapshot(brake=received(3.4)))
     assert (found.text, found.brief, found.causes) == ("Brake: no message for 3.4 s", "FAULT: Brake 3 s", ("brake",))
-    assert stale("distance", snapshot(distance=heard(3.4))).brief == "FAULT: Nearest object"
+    assert stale("distance", snapshot(distance=received(3.4))).brief == "FAULT: Nearest object"
 
 
 NOT_FOUND = replace(OPEN, published=frozenset())
@@ -105,13 +105,13 @@ def test_an_optional_signal_whose_rate_the_operator_set_is_wanted() -> None:
     assert stale("odometry", snapshot(), odometry_hz=10.0).verdict is FAULT
 
 
-def test_a_derived_signal_is_not_heard_at_all() -> None:
-    found = stale("acceleration", snapshot(NOT_FOUND, acceleration=heard(5.0, derived_from="speed")))
+def test_a_derived_signal_is_not_received_at_all() -> None:
+    found = stale("acceleration", snapshot(NOT_FOUND, acceleration=received(5.0, derived_from="speed")))
     assert (found.verdict, found.applies) == (UNKNOWN, False)
 
 
-def test_what_speaks_when_it_has_something_to_say_is_not_missed_unless_the_operator_says_so() -> None:
-    quiet = snapshot(command=heard(60.0))
+def test_an_event_like_signal_is_not_missed_unless_the_operator_sets_its_rate() -> None:
+    quiet = snapshot(command=received(60.0))
     assert stale("command", quiet).verdict is OK
     assert stale("command", quiet, command_hz=5.0).verdict is FAULT
 
@@ -125,27 +125,29 @@ def test_what_speaks_when_it_has_something_to_say_is_not_missed_unless_the_opera
     ],
 )
 def test_after_the_link_came_back_it_has_its_time_anew(since_s: float, verdict: Verdict) -> None:
-    assert stale("brake", snapshot(replace(OPEN, since_s=since_s), brake=heard(20.0))).verdict is verdict
+    assert stale("brake", snapshot(replace(OPEN, since_s=since_s), brake=received(20.0))).verdict is verdict
 
 
 def test_a_slow_signal_has_its_own_horizon_after_the_link_came_back() -> None:
     back = replace(OPEN, since_s=92.0)
-    assert stale("diagnostics", snapshot(back, diagnostics=heard(30.0, 1.0, 10.0))).verdict is UNKNOWN
+    assert stale("diagnostics", snapshot(back, diagnostics=received(30.0, 1.0, 10.0))).verdict is UNKNOWN
 
 
 def test_while_the_whole_car_is_silent_no_signal_is_blamed() -> None:
-    together = snapshot(brake=heard(1.2), steering=heard(1.3), position=heard(1.1))
+    together = snapshot(brake=received(1.2), steering=received(1.3), position=received(1.1))
     assert stale("brake", together).brief == "not checked: silent"
 
 
 def test_the_first_of_a_silent_crowd_is_not_blamed_though_diagnostics_still_come() -> None:
-    crowd = snapshot(brake=heard(1.1), steering=heard(0.9), position=heard(0.8, 0.1), diagnostics=heard(0.1, 1.0, 10.0))
+    crowd = snapshot(
+        brake=received(1.1), steering=received(0.9), position=received(0.8, 0.1), diagnostics=received(0.1, 1.0, 10.0)
+    )
     assert stale("brake", crowd).brief == "not checked: silent"
 
 
 def test_a_reading_from_the_future_is_waited_for() -> None:
     """The clock went back, and nothing came since."""
-    assert stale("brake", snapshot(brake=heard(-50.0))).verdict is UNKNOWN
+    assert stale("brake", snapshot(brake=received(-50.0))).verdict is UNKNOWN
 
 
 def rate(measured_hz: float | None, expected_hz: float | None = 20.0, settled: bool = True) -> Rate:
@@ -153,7 +155,7 @@ def rate(measured_hz: float | None, expected_hz: float | None = 20.0, settled: b
 
 
 def slow(of: Rate, *, was_active: bool = False, age_s: float = 0.05, **limits: float) -> Finding:
-    known = snapshot(brake=heard(age_s), rates={"brake": of})
+    known = snapshot(brake=received(age_s), rates={"brake": of})
     return ask("signal_slow.brake", known, was_active=was_active, **limits)
 
 
@@ -176,7 +178,7 @@ def test_slow(of: Rate, was_active: bool, age_s: float, verdict: Verdict) -> Non
     assert slow(of, was_active=was_active, age_s=age_s).verdict is verdict
 
 
-def test_what_is_said_of_a_slow_signal() -> None:
+def test_what_is_reported_of_a_slow_signal() -> None:
     found = slow(rate(12.0))
     assert (found.text, found.brief) == ("Brake: 12.0 Hz, expected 20.0 Hz", "FAULT: Brake 12 Hz")
 
@@ -196,6 +198,6 @@ def test_a_signal_that_keeps_no_rate_is_not_held_to_one() -> None:
 
 
 @pytest.mark.parametrize(("set_hz", "verdict"), [(0.0, UNKNOWN), (5.0, FAULT)])
-def test_an_event_like_signal_has_a_rate_only_when_the_operator_says_so(set_hz: float, verdict: Verdict) -> None:
-    known = snapshot(command=heard(0.05), rates={"command": rate(2.0, 5.0)})
+def test_an_event_like_signal_has_a_rate_only_when_the_operator_sets_it(set_hz: float, verdict: Verdict) -> None:
+    known = snapshot(command=received(0.05), rates={"command": rate(2.0, 5.0)})
     assert ask("signal_slow.command", known, command_hz=set_hz).verdict is verdict

@@ -61,7 +61,7 @@ class Car:
     state: State = field(default_factory=State)
     now_s: float = 0.0
     announced: list[tuple[float, str, str]] = field(default_factory=list)
-    asked: list[str] = field(default_factory=list)
+    verdicts: list[str] = field(default_factory=list)
 
     def go(self, seconds: float) -> Car:
         noise, way_m, pose_m, sent_m = random.Random(self.seed), 0.0, 0.0, [0.0] * 100
@@ -85,7 +85,7 @@ class Car:
                 for one in self.monitor.step(self.state.snapshot(now_s)):
                     if one.announces and (one.alarm_id.startswith("gps_") or one.alarm_id == ID):
                         self.announced.append((t, one.alarm_id, one.text))
-                self.asked.append(str(self.monitor.findings[ID].verdict))
+                self.verdicts.append(str(self.monitor.findings[ID].verdict))
         return self
 
     def _fix(self, t: float, way_m: float, noise: random.Random) -> None:
@@ -149,7 +149,7 @@ def test_limits_and_deadband() -> None:
     assert ask(ID, paced(5.8, 4.0), was_active=True).verdict == "fault"
 
 
-def test_one_source_is_not_checked_and_says_so() -> None:
+def test_one_source_is_not_checked_and_reports_it() -> None:
     found = ask(ID, known(speed=Twist(speed_mps=3.0), link=facts()))
     assert (found.verdict, found.brief, found.applies) == ("unknown", "one source", False)
     assert ask(ID, known(speed=Twist(speed_mps=3.0), link=facts()), was_active=True).verdict == "ok"
@@ -201,7 +201,7 @@ def test_a_position_that_repeats_itself_is_left_to_frozen() -> None:
 def test_a_healthy_drive_raises_nothing(car: Car) -> None:
     car.go(45.0)
     assert ID not in car.alarms
-    assert car.asked.count("ok") > 100
+    assert car.verdicts.count("ok") > 100
 
 
 @pytest.mark.parametrize(
@@ -266,14 +266,14 @@ def test_a_slow_start_that_stays_slow_is_drift() -> None:
 def test_in_a_tunnel_nothing_is_compared_and_after_it_again() -> None:
     car = Car(truth=trip, wheels=trip, status=lambda t: -1 if 17.0 < t < 25.0 else 0).go(45.0)
     assert car.alarms == ["gps_fix"]
-    assert {"unknown"} == set(car.asked[int(18.0 * 5) : int(25.0 * 5)])
-    assert {"ok"} == set(car.asked[int(29.0 * 5) :])
+    assert {"unknown"} == set(car.verdicts[int(18.0 * 5) : int(25.0 * 5)])
+    assert {"ok"} == set(car.verdicts[int(29.0 * 5) :])
 
 
 def test_a_poor_receiver_is_not_compared() -> None:
     car = Car(truth=trip, wheels=trip, sigma_m=5.0, noise_m=5.0).go(45.0)
     assert ID not in car.alarms
-    assert set(car.asked) == {"unknown"}
+    assert set(car.verdicts) == {"unknown"}
     assert "GPS is too poor" in car.finding.text
 
 
@@ -300,7 +300,7 @@ def test_sources_that_agree_within_their_noise_never_alarm(
         seed=seed,
     ).go(40.0)
     assert ID not in car.alarms
-    assert "ok" in car.asked
+    assert "ok" in car.verdicts
 
 
 @settings(max_examples=25, deadline=None)
@@ -383,7 +383,7 @@ def test_another_odometry_and_a_receivers_velocity_are_compared() -> None:
     assert "/gps/vel is 35 s old" in silent.text
 
 
-def test_a_speed_that_hovers_about_the_limit_is_told_seldom() -> None:
+def test_a_speed_that_hovers_about_the_limit_is_reported_seldom() -> None:
     """1.5 m/s more than the position shows, and what its error may make, give or take."""
     car = Car(truth=lambda t: 4.0, wheels=lambda t: 5.94 + 0.1 * math.sin(t / 3.0), noise_m=0.05).go(60.0)
     assert car.alarms.count(ID) == 1

@@ -1,6 +1,6 @@
 """Each check gives each of its answers: a row for every check there is, so that a new one without its row fails.
 
-A check that cannot be in doubt says why.
+A check that is never in doubt states why.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def late(late_s: float) -> Snapshot:
 
 
 def useless(*signals: str, for_s: float) -> Snapshot:
-    """These signals come, and nothing they say can be used."""
+    """These signals come, and none of their values can be used."""
     one = Unusable(
         reason="linear.x is not a number", at_s=NOW_S, since_s=NOW_S - for_s, count=20, horizon_s=1.0, period_s=0.05
     )
@@ -83,17 +83,17 @@ def one(name: str, *, age_s: float = 0.0, stamp_s: float | None = None, **more: 
     return made if stamp_s is None else replace(made, stamp_s=stamp_s)
 
 
-def heard(**readings: Reading[Any]) -> Snapshot:
+def received(**readings: Reading[Any]) -> Snapshot:
     return Snapshot(now_s=NOW_S, readings=readings, link=LINK)
 
 
 def stale(name: str) -> Row:
-    """Silent while another one speaks; in doubt while nothing has come yet."""
+    """Silent while messages of another one arrive; in doubt while nothing has come yet."""
     other = "brake" if name != "brake" else "speed"
     waiting = replace(LINK, published=frozenset({name}), connected_s=NOW_S - 1.0)
     return Row(
-        ok=heard(**{name: one(name)}),
-        fault=heard(**{name: one(name, age_s=2.0), other: one(other)}),
+        ok=received(**{name: one(name)}),
+        fault=received(**{name: one(name, age_s=2.0), other: one(other)}),
         unknown=Snapshot(now_s=NOW_S, link=waiting),
         limits={f"{name}_hz": 20.0},  # so that those which may be silent are missed too
     )
@@ -102,7 +102,7 @@ def stale(name: str) -> Row:
 def slow(name: str) -> Row:
     def at(measured_hz: float, *, settled: bool = True) -> Snapshot:
         rate = Rate(measured_hz=measured_hz, expected_hz=20.0, settled=settled, learning=not settled)
-        return with_more(heard(**{name: one(name)}), rates={name: rate})
+        return with_more(received(**{name: one(name)}), rates={name: rate})
 
     return Row(ok=at(20.0), fault=at(10.0), unknown=at(10.0, settled=False), limits={f"{name}_hz": 20.0})
 
@@ -110,7 +110,7 @@ def slow(name: str) -> Row:
 def frozen(name: str) -> Row:
     def at(stamp_n: int, age_s: float = 0.0) -> Snapshot:
         repeats = Repeats(stamp_n=stamp_n, stamp_s=stamp_n * 0.1)
-        return heard(**{name: one(name, age_s=age_s, stamp_s=1.0, repeats=repeats)})
+        return received(**{name: one(name, age_s=age_s, stamp_s=1.0, repeats=repeats)})
 
     return Row(ok=at(0), fault=at(40), unknown=at(40, age_s=1.5))
 
@@ -118,12 +118,12 @@ def frozen(name: str) -> Row:
 def all_rates(*hz: float) -> Snapshot:
     names = ("speed", "brake", "accelerator", "steering")[: len(hz)]
     rates = {n: Rate(measured_hz=h, expected_hz=20.0, settled=True) for n, h in zip(names, hz, strict=True)}
-    return with_more(heard(**{name: one(name) for name in names}), rates=rates)
+    return with_more(received(**{name: one(name) for name in names}), rates=rates)
 
 
 def clock(offset_s: float) -> Snapshot:
     position = one("position", stamp_s=1.79e9 + NOW_S + offset_s, stamp_change_s=0.0)
-    return with_more(heard(position=position), link=replace(LINK, wall_zero_s=1.79e9))
+    return with_more(received(position=position), link=replace(LINK, wall_zero_s=1.79e9))
 
 
 def drifted(metres: float) -> Snapshot:
@@ -150,7 +150,7 @@ def ordered(mps: float, slope_mps2: float | None = 0.0, *, age_s: float = 0.0) -
 
 def slowed(slope_mps2: float, *, shown: bool = True, **facts: Any) -> Snapshot:
     """A car that drives 5 m/s while 2 m/s are ordered; `shown`: its speed has shown that the order slows it."""
-    said: dict[str, Any] = {
+    ordered: dict[str, Any] = {
         "is_armed": True,
         "topic": "/cmd_vel",
         "ordered_s": NOW_S - 2.0,
@@ -158,7 +158,7 @@ def slowed(slope_mps2: float, *, shown: bool = True, **facts: Any) -> Snapshot:
         "deceleration_mps2": 1.5,
         "commanded_mps": 2.0,
     }
-    order = SlowingFacts(**said | facts)
+    order = SlowingFacts(**ordered | facts)
     proof = SlowProof(ordered_s=order.ordered_s, shown="slows" if shown else None, shown_s=NOW_S - 1.2)
     return with_more(known(NOW_S, speed=DRIVES), speed_slope_mps2=slope_mps2, slowing=order, slow_proof=proof)
 
@@ -262,7 +262,9 @@ ROWS: dict[str, Row | Callable[[str], Row]] = {
         unknown=known(fuel=Level(value=5.0, unit="l")),
     ),
     "log_not_kept": Row(
-        ok=linked(), fault=linked(log_trouble="The disk is full."), unknown="the disk's own word, which is there or not"
+        ok=linked(),
+        fault=linked(log_trouble="The disk is full."),
+        unknown="the disk's own report, which is there or not",
     ),
     "recording_stopped": Row(
         ok=taped(state="recording"),
@@ -296,7 +298,7 @@ ROWS: dict[str, Row | Callable[[str], Row]] = {
     "paused_long": Row(
         ok=known(),
         fault=with_more(known(), paused=True, paused_since_s=NOW_S - 301.0),
-        unknown="the server knows whether it is paused",
+        unknown="whether it is paused is always known",
     ),
 }
 

@@ -145,18 +145,18 @@ SHAPES: dict[str, tuple[str, str, Any]] = {
     ),
     "BatteryState": ("fuel", "sensor_msgs/BatteryState", Level(value=0.72, unit="")),
     "Float32   ": ("fuel", "std_msgs/Float32", Level(value=14.550000190734863, unit="")),
-    "Bool": ("mode", "std_msgs/Bool", DriveMode(mode="autonomous", said="true")),
-    "UInt8": ("mode", "std_msgs/UInt8", DriveMode(mode="unknown", said="1", number=1)),
-    "String": ("mode", "std_msgs/String", DriveMode(mode="autonomous", said="autonomous")),
+    "Bool": ("mode", "std_msgs/Bool", DriveMode(mode="autonomous", text="true")),
+    "UInt8": ("mode", "std_msgs/UInt8", DriveMode(mode="unknown", text="1", number=1)),
+    "String": ("mode", "std_msgs/String", DriveMode(mode="autonomous", text="autonomous")),
     "ControlModeReport": (
         "mode",
         "autoware_vehicle_msgs/ControlModeReport",
-        DriveMode(mode="manual", said="manual"),
+        DriveMode(mode="manual", text="manual"),
     ),
     "ControlModeReport.auto": (
         "mode",
         "autoware_auto_vehicle_msgs/ControlModeReport",
-        DriveMode(mode="manual", said="manual"),
+        DriveMode(mode="manual", text="manual"),
     ),
 }
 DECODERS = {read for row in TOPICS for read in row.types.values()}

@@ -80,8 +80,8 @@ MAY_FOLLOW = {
 ELSEWHERE = {
     "connect_failed": "tests/monitor/test_judge.py::test_case_01_connecting_failed_and_then_succeeded",
     "no_message": "tests/monitor/test_judge.py::test_case_03_nothing_published_is_one_announcement",
-    "paused_long": "tests/monitor/checks/test_paused_long.py::test_a_forgotten_pause_is_told_ever_more_seldom",
-    "fuel_low": "tests/monitor/checks/test_fuel_low.py::test_it_is_told_once",  # the car publishes none
+    "paused_long": "tests/monitor/checks/test_paused_long.py::test_a_forgotten_pause_is_reported_ever_more_seldom",
+    "fuel_low": "tests/monitor/checks/test_fuel_low.py::test_it_is_reported_once",  # the car publishes none
     "gps_quality": "tests/server/judge/test_judged.py::test_the_strict_setting_rejects_the_cars_own_receiver",
     "reach": "tests/monitor/checks/test_reach.py::test_a_reload_and_a_tap_raise_nothing_and_15_s_of_silence_do",
     "log_not_kept": "tests/monitor/checks/test_log_not_kept.py",

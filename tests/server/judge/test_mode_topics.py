@@ -53,7 +53,7 @@ def test_a_message_becomes_a_mode_or_is_rejected(type: str, message: Any, mode: 
         return
     found = decode(message)
     assert found.mode == mode
-    assert 0 < len(found.said) <= 40
+    assert 0 < len(found.text) <= 40
 
 
 def test_a_report_is_found_by_its_type_and_other_topics_only_by_name_or_choice() -> None:
@@ -74,7 +74,7 @@ def test_a_kind_of_car_has_words_and_numbers_of_its_own() -> None:
         pipeline.receive(
             sources, message, float(at), None, reception=reception, state=state, profile=own, tyre_rad_per_unit=0.0
         )
-    assert [heard.value.mode for heard in state.snapshot(3.0).modes_heard] == ["autonomous", "manual", "autonomous"]
+    assert [one.value.mode for one in state.snapshot(3.0).modes_received] == ["autonomous", "manual", "autonomous"]
     reading = state.get("mode")
     assert reading is not None
-    assert reading.value == DriveMode(mode="autonomous", said="3")
+    assert reading.value == DriveMode(mode="autonomous", text="3")
