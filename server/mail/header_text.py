@@ -25,7 +25,7 @@ def one_line(text: str) -> str:
 
 
 def needs_encoding(text: str) -> bool:
-    """Return whether a text must go out as encoded words (RFC 2047)."""
+    """Return whether a text must be sent as encoded words (RFC 2047)."""
     return not text.isascii() or "=?" in text
 
 

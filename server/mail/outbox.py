@@ -109,10 +109,10 @@ class Outbox:
             )
         return True
 
-    def prepare_failed(self, n: int, said: str) -> None:
+    def prepare_failed(self, n: int, reason: str) -> None:
         with transaction(self._database) as database:
             database.execute(
-                "UPDATE letter SET stage = 'failed', said = ? WHERE n = ? AND stage = 'preparing'", (said, n)
+                "UPDATE letter SET stage = 'failed', said = ? WHERE n = ? AND stage = 'preparing'", (reason, n)
             )
 
     def discard(self, key: str) -> None:
