@@ -39,7 +39,7 @@ class EncodedText:
     def __init__(self, name: str, text: str, rest: str = "") -> None:
         self.name = name
         self._text = one_line(text)
-        self._rest = rest  # what stands behind it on a line of its own
+        self._rest = rest  # what follows on a line of its own
 
     def fold(self, *, policy: Policy) -> str:
         """Return the lines of the header."""

@@ -176,7 +176,7 @@ class Outbox:
         )
 
     def _forget_old(self, database: sqlite3.Connection) -> None:
-        """Letters that are over and stand far down; what failed stays until somebody has decided."""
+        """Delete old finished letters; failed ones stay until an operator has decided."""
         database.execute(
             "DELETE FROM letter WHERE n IN (SELECT n FROM letter WHERE stage = 'cancelled' OR (stage = 'ready' AND NOT "
             "EXISTS (SELECT 1 FROM mail WHERE mail.letter = letter.n AND state IN ('queued', 'sending', 'failed'))) "

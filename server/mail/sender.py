@@ -1,4 +1,4 @@
-"""Sends the mails of the outbox when they are due, over one connection, and keeps what became of each attempt."""
+"""Sends the mails of the outbox when they are due, over one connection, and stores the outcome of each attempt."""
 
 from __future__ import annotations
 
