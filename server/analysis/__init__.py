@@ -1,1 +1,1 @@
-"""Every check over a recording, faster than it happened and by the same road as live."""
+"""Runs every check over a recording, faster than real time and with the same code as live."""

@@ -1,4 +1,4 @@
-"""How much the alarms ask of one operator, measured after EEMUA 191."""
+"""The alarm load of one operator, measured after EEMUA 191."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class Load:
 
     @property
     def in_10_min(self) -> float:
-        """On average; a shorter run is not scaled up, for nobody knows what the rest would have brought."""
+        """The average per 10 min; a shorter run is not scaled up, because its rest is not known."""
         return self.announced * WINDOW_S / max(self.judged_s, WINDOW_S)
 
     @property
     def verdict(self) -> str:
-        """In one word: bearable, demanding or flood."""
+        """The rating: bearable, demanding or flood."""
         if self.most_in_10_min > FLOOD_IN_10_MIN:
             return "flood"
         return "bearable" if self.in_10_min <= BEARABLE_IN_10_MIN else "demanding"

@@ -70,7 +70,7 @@ def _judged(report: Report) -> dict[str, Any]:
 
 
 def _settings(report: Report) -> dict[str, Any]:
-    """By which settings it was judged."""
+    """The settings of the run."""
     run = report.run
     return {
         "file": run.override.name or None,
@@ -105,7 +105,7 @@ def _signals(report: Report) -> list[dict[str, Any]]:
 
 
 def _slow_downs(run: Rehearsed) -> list[dict[str, Any]]:
-    """When the car would have been slowed, by the settings."""
+    """The times at which the settings would have slowed the car."""
     return [
         {
             "trigger": one.trigger,
@@ -119,19 +119,19 @@ def _slow_downs(run: Rehearsed) -> list[dict[str, Any]]:
 
 
 def _checks(run: Rehearsed) -> list[dict[str, Any]]:
-    """How long each check found what."""
+    """The time of each check in each verdict."""
     return [
         {
-            "label": ribbon.label,
-            **{f"{verdict}_s": _number(ribbon.seconds(verdict), 1) for verdict in Verdict},
-            "not_checked_why": ribbon.why_not or None,
+            "label": timeline.label,
+            **{f"{verdict}_s": _number(timeline.seconds(verdict), 1) for verdict in Verdict},
+            "not_checked_why": timeline.why_not or None,
         }
-        for ribbon in run.ribbons
+        for timeline in run.timelines
     ]
 
 
 def _load(run: Rehearsed) -> dict[str, Any]:
-    """How many alarms an operator had."""
+    """The alarm load."""
     return {
         "announced": run.load.announced,
         "in_10_min": _number(run.load.in_10_min, 2),

@@ -31,7 +31,7 @@ def cores() -> int:
 def check_each(
     recordings: Sequence[Sequence[Path]], options: CheckOptions, on_progress: OnProgress
 ) -> Iterator[Checked]:
-    """Check recordings, each in one or several files, and yield what became of them in their order.
+    """Check recordings, each in one or several files, and yield their results in their order.
 
     `on_progress` receives the part of all bytes that is done, and the seconds of recordings judged. Closing the
     iterator ends the processes.
@@ -97,7 +97,7 @@ def _ctrl_c_later() -> Iterator[None]:
 
 
 def _size(path: Path) -> int:
-    """In bytes, of a file or a folder; 0 where it cannot be read."""
+    """The size of a file or folder [B]; 0 where it cannot be read."""
     try:
         return path.stat().st_size if not path.is_dir() else sum(one.stat().st_size for one in path.rglob("*"))
     except OSError:

@@ -38,7 +38,7 @@ class Impossible(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckOptions:
-    """How recordings are checked."""
+    """The options of a check."""
 
     overrides: Sequence[SettingsOverride | None] = (None,)  # two: they are compared
     extract: Extract = field(default_factory=Extract)
@@ -49,7 +49,7 @@ class CheckOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
-    """What became of one recording."""
+    """The result for one recording."""
 
     code: int  # NO_CRITICAL, CRITICAL or CANNOT
     errors: Sequence[str] = ()  # sentences

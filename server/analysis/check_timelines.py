@@ -1,4 +1,4 @@
-"""How each tile of the home tab stood over time: in order, at fault, or not checked and why."""
+"""The state of each tile of the home tab over time: OK, fault, or not checked with a reason."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from monitor.runner import Monitor
 
 
 @dataclass(slots=True)
-class Ribbon:
+class CheckTimeline:
     """One tile over one run. Times are seconds since the beginning of the recording."""
 
     label: str
     priority: Priority  # of the most urgent alarm among its checks
-    spans: list[tuple[float, float, Verdict, str]] = field(default_factory=list)  # from, to, verdict, what it said
+    spans: list[tuple[float, float, Verdict, str]] = field(default_factory=list)  # from, to, verdict, text
 
     def seconds(self, verdict: Verdict) -> float:
         return sum(to_s - from_s for from_s, to_s, found, _ in self.spans if found is verdict)
@@ -31,22 +31,22 @@ class Ribbon:
         return max(reasons, key=lambda text: reasons[text], default="")
 
 
-class Ribbons:
-    """Sampled about once a second: a tile is for the eye, and the alarms have their own exact times."""
+class CheckTimelines:
+    """The timelines of all tiles, sampled about once a second; the alarms have their own exact times."""
 
     def __init__(self) -> None:
-        self._by_label: dict[str, Ribbon] = {}
+        self._by_label: dict[str, CheckTimeline] = {}
 
     def sample(self, monitor: Monitor, now_s: float) -> None:
         for tile in monitor.tiles():
-            ribbon = self._by_label.get(tile.label)
-            if ribbon is None:
+            timeline = self._by_label.get(tile.label)
+            if timeline is None:
                 priorities = [monitor.alarms[check_id].spec.priority for check_id in tile.checks]
                 priority = min(priorities, key=lambda priority: priority.rank)
-                ribbon = self._by_label[tile.label] = Ribbon(label=tile.label, priority=priority)
-            # What an OK says changes with every number; only why something is not checked is worth keeping.
+                timeline = self._by_label[tile.label] = CheckTimeline(label=tile.label, priority=priority)
+            # The text of an OK changes with every number; only the reason of an unchecked tile is kept.
             text = tile.text if tile.verdict is not Verdict.OK else ""
-            spans = ribbon.spans
+            spans = timeline.spans
             if spans:
                 from_s, _, verdict, before = spans[-1]
                 if verdict is tile.verdict and (before == text or verdict is Verdict.FAULT):
@@ -54,16 +54,16 @@ class Ribbons:
                 spans[-1] = (from_s, now_s, verdict, before)
             spans.append((now_s, now_s, tile.verdict, text))
 
-    def finish(self, end_s: float) -> tuple[Ribbon, ...]:
-        for ribbon in self._by_label.values():
-            from_s, _, verdict, text = ribbon.spans[-1]
-            ribbon.spans[-1] = (from_s, max(from_s, end_s), verdict, text)
+    def finish(self, end_s: float) -> tuple[CheckTimeline, ...]:
+        for timeline in self._by_label.values():
+            from_s, _, verdict, text = timeline.spans[-1]
+            timeline.spans[-1] = (from_s, max(from_s, end_s), verdict, text)
         return tuple(self._by_label.values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unchecked:
-    """A check that could never be made, so that no alarm of its means nothing."""
+    """A check that never had a result, so that the absence of its alarm proves nothing."""
 
     check_id: str
     label: str
@@ -71,7 +71,7 @@ class Unchecked:
 
 
 class Coverage:
-    """Which checks were ever answered; sampled as the ribbons are."""
+    """Which checks ever had a result; sampled like the timelines."""
 
     def __init__(self) -> None:
         self._answered: set[str] = set()

@@ -1,4 +1,4 @@
-"""What one run raised and another did not: alarms which appear, vanish or move."""
+"""The differences between the alarms of two runs: alarms that appear, vanish or move."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Kind = Literal["appears", "vanishes", "moves"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """One alarm that is not as it was."""
+    """One alarm that differs between the runs."""
 
     kind: Kind
     before: Episode | None  # None: appears

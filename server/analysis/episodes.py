@@ -1,4 +1,4 @@
-"""What became of each alarm: from the transitions of a run to one entry for each time an alarm stood."""
+"""Turns the transitions of a run into episodes: one for each time that an alarm was active."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Episode:
     raised_s: float
     cleared_s: float | None  # None: it stood at the end
     until_s: float  # cleared, or the end of what was judged
-    trip_text: str  # what the check said when it raised
+    trip_text: str  # text of the check when it raised
     worst: Finding | None  # furthest beyond its limit, where it measures against one
     causes: tuple[str, ...] = ()
     advice: str = ""
@@ -42,7 +42,7 @@ class Episode:
 
     @property
     def worst_text(self) -> str:
-        """What the check said at the worst, where that differs from what it said at first."""
+        """The text of the check at the worst moment, if it differs from the first one; else empty."""
         return self.worst.text if self.worst is not None and self.worst.text != self.trip_text else ""
 
 
@@ -56,13 +56,13 @@ class Diary:
         self._closed: list[Episode] = []
 
     def note(self, transitions: Sequence[Transition], alarms: dict[str, Alarm]) -> None:
-        """What one judgement brought; `alarms` are all of them after it."""
+        """Take the transitions of one judgement; `alarms` are all alarms after it."""
         for transition in transitions:
             self.transitions.append(transition)
             self._note(transition, alarms[transition.alarm_id])
 
     def episodes(self, alarms: dict[str, Alarm], end_s: float) -> tuple[Episode, ...]:
-        """All of them in the order of their raising, those that stand included; `end_s` ended the judging."""
+        """All episodes in the order of their raising, with those still active at `end_s`, the end of the run."""
         standing = [
             replace(self._with_worst(episode, alarms[alarm_id], end_s), until_s=end_s)
             for alarm_id, episode in self._open.items()

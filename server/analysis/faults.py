@@ -1,4 +1,4 @@
-"""Lays the simulator's faults over a recording, so that it can be seen which alarms would have come."""
+"""Injects the simulator's faults into a recording, to show which alarms they would raise."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from server.system.page_files import check_vendor, static_dir
 from server.version import catgraph_version
 
 _SCRIPTS = ("layout", "elements", "view", "alarms", "plots", "track", "overview")  # each imports earlier ones only
-_RIBBON_TEXTS = 400  # reasons in one file; more would not be read
+_TIMELINE_TEXTS = 400  # reasons in one file; more would not be read
 
 
 def page(report: Report, drive: FirstPart | None = None) -> str:
@@ -64,14 +64,14 @@ class FirstPart(Protocol):
         ...
 
 
-def _page_foot(words: str) -> str:
+def _page_foot(text: str) -> str:
     """A style of plain letters only: nothing in them can end the text."""
-    plain = re.sub(r"[^A-Za-z0-9 .,·]", "", words)
+    plain = re.sub(r"[^A-Za-z0-9 .,·]", "", text)
     return f'\n@page {{ @bottom-left {{ content: "{plain}"; font: 12px system-ui, sans-serif; }} }}\n'
 
 
 def _policy(script: str, style: str) -> str:
-    """What the page may do: run this script, look like this, and nothing from anywhere."""
+    """The content security policy: this script, these styles, and nothing from elsewhere."""
     return (
         f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; font-src data:; "
         "img-src data:; media-src data:; "
@@ -80,7 +80,7 @@ def _policy(script: str, style: str) -> str:
 
 
 def _facts(report: Report) -> dict[str, Any]:
-    """What the template shows without any script."""
+    """The variables of the template."""
     run, recording = report.run, report.recording
     counts = {priority: sum(one.priority is priority for one in run.episodes) for priority in Priority}
     worst = next((priority for priority in Priority if counts[priority]), None)
@@ -112,7 +112,7 @@ def _facts(report: Report) -> dict[str, Any]:
 
 
 def _data(report: Report) -> dict[str, Any]:
-    """What the script draws."""
+    """The data that the script draws."""
     run = report.run
     traces = run.traces
     return {
@@ -123,7 +123,7 @@ def _data(report: Report) -> dict[str, Any]:
         "track": None if traces is None else plots.track(traces),
         "episodes": [_bar(episode) for episode in run.episodes],
         "before": [_bar(change.before) for change in report.changes if change.before is not None],
-        "ribbons": _ribbons(report),
+        "timelines": _timelines(report),
         "injected": [[laid.name, round(laid.from_s, 2), round(laid.to_s, 2)] for laid in run.faults],
     }
 
@@ -136,22 +136,22 @@ def _bar(episode: Episode) -> dict[str, Any]:
         "from": round(episode.raised_s, 3),
         "to": round(episode.until_s, 3),
         "open": episode.cleared_s is None,
-        "said": [round(said.at_s, 3) for said in episode.announcements],
+        "announced": [round(one.at_s, 3) for one in episode.announcements],
         "hidden": [[round(from_s, 3), round(to_s, 3)] for from_s, to_s in episode.suppressed],
     }
 
 
-def _ribbons(report: Report) -> list[dict[str, Any]]:
-    left = _RIBBON_TEXTS
+def _timelines(report: Report) -> list[dict[str, Any]]:
+    left = _TIMELINE_TEXTS
     rows = []
-    for ribbon in report.run.ribbons:
+    for timeline in report.run.timelines:
         spans = []
-        for from_s, to_s, verdict, text in ribbon.spans:
+        for from_s, to_s, verdict, text in timeline.spans:
             left -= 1
             spans.append(
                 [round(from_s, 2), round(to_s, 2), str(verdict), report_text.printable(text, 160) if left > 0 else ""]
             )
-        rows.append({"label": ribbon.label, "priority": str(ribbon.priority), "spans": spans})
+        rows.append({"label": timeline.label, "priority": str(timeline.priority), "spans": spans})
     return rows
 
 

@@ -1,4 +1,4 @@
-"""Which curves the page draws, chosen by signal; nothing here knows a particular check."""
+"""The curves of the page, chosen by signal and independent of the particular checks."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ PANELS = (
 
 
 def panels(traces: Traces) -> list[dict[str, Any]]:
-    """What the page's script draws; only panels with something in them."""
+    """The panels that the page's script draws; empty ones are left out."""
     left = {
         name: measure
         for name, measure in traces.measures.items()

@@ -36,7 +36,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedLog:
-    """All of it. Times are seconds since the beginning of the recording."""
+    """The whole log. Times are seconds since the beginning of the recording."""
 
     entries: Sequence[Entry]
     left_out: int  # entries beyond the first MOST_ENTRIES
@@ -49,7 +49,7 @@ class RecordedLog:
 
 
 def read_recorded_log(recording: Recording) -> RecordedLog | None:
-    """None where the recording is not ours."""
+    """Read the log; None where the recording was not made by catgraph."""
     if not recording.metadata:
         return None
     start_s = recording.start_s

@@ -1,4 +1,4 @@
-"""Judges a recording as live would have judged the drive, in virtual time."""
+"""Judges a recording as a live session would have judged the drive, in virtual time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from monitor.alarm import Alarm, Transition
 from monitor.runner import Crash, Monitor
 from monitor.state import LinkFacts, Snapshot, State
 from server.analysis.alarm_load import Load, load_of
-from server.analysis.check_timelines import Coverage, Ribbon, Ribbons, Unchecked
+from server.analysis.check_timelines import CheckTimeline, CheckTimelines, Coverage, Unchecked
 from server.analysis.episodes import Diary, Episode
 from server.analysis.faults import Faults, Laid
 from server.analysis.simulated_slowdown import SimulatedOrder, SimulatedSlowDown
@@ -45,7 +45,7 @@ class Extract:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rehearsed:
-    """All that one run found. Times are seconds since the beginning of the recording."""
+    """All results of one run. Times are seconds since the beginning of the recording."""
 
     tuning: ActiveSettings  # at the end
     override: SettingsOverride
@@ -60,7 +60,7 @@ class Rehearsed:
     episodes: Sequence[Episode]
     transitions: Sequence[Transition]
     titles: Mapping[str, str]  # of every alarm, by id
-    ribbons: Sequence[Ribbon]
+    timelines: Sequence[CheckTimeline]
     unchecked: Sequence[Unchecked]
     load: Load
     crashes: Sequence[Crash]
@@ -125,7 +125,7 @@ class _Injected:
 
 
 class _Rehearsal(Observer):
-    """Collects what a run through a recording brings."""
+    """Collects the results of a run through a recording."""
 
     def __init__(
         self,
@@ -149,7 +149,7 @@ class _Rehearsal(Observer):
         self._messages = 0
         self._last_s = extract.start_s
         self._diary = Diary()
-        self._ribbons = Ribbons()
+        self._timelines = CheckTimelines()
         self._coverage = Coverage()
         self._traces = Traces() if with_traces else None
         self._simulated = SimulatedSlowDown(self._drive.epochs[0].tuning.limits.slow_down)
@@ -201,7 +201,7 @@ class _Rehearsal(Observer):
             episodes=self._diary.episodes(alarms, to_s),
             transitions=self._diary.transitions,
             titles={alarm_id: alarm.spec.title for alarm_id, alarm in alarms.items()},
-            ribbons=self._ribbons.finish(to_s) if self._messages else (),
+            timelines=self._timelines.finish(to_s) if self._messages else (),
             unchecked=self._coverage.unchecked(state.monitor),
             load=load_of(self._diary.transitions, to_s - from_s, sum(alarm.active for alarm in alarms.values())),
             crashes=tuple(self._crashes.values()),
@@ -229,7 +229,7 @@ class _Rehearsal(Observer):
             self._traces.take(changed, state.get, now_s)
 
     def judged(self, transitions: Sequence[Transition], now_s: float) -> None:
-        """Writes down what happened to alarms."""
+        """Record the transitions of alarms."""
         self._diary.note(transitions, self._alarms)
 
     def ticked(self, run: OfflineRun, now_s: float) -> None:
@@ -255,7 +255,7 @@ class _Rehearsal(Observer):
         return self._faults.link(facts, now_s)
 
     def _sample(self, monitor: Monitor, now_s: float) -> None:
-        self._ribbons.sample(monitor, now_s)
+        self._timelines.sample(monitor, now_s)
         self._coverage.sample(monitor)
 
     def _others(self, epoch: SettingsEpoch) -> dict[str, str]:
@@ -279,7 +279,7 @@ class _Rehearsal(Observer):
 
 @contextlib.contextmanager
 def _fewer_collections() -> Iterator[None]:
-    """The judge makes many short-lived values and hardly a circle: looking for circles 20 times a second is in vain."""
+    """Collect garbage less often: the judge makes many short-lived values and hardly any reference cycles."""
     before = gc.get_threshold()
     gc.set_threshold(100_000, 50, 100)
     try:

@@ -1,4 +1,4 @@
-"""What one call of `catgraph check` found, of all its runs, for the writers of text, JSON and HTML."""
+"""The results of one call of `catgraph check`, of all its runs, for the writers of text, JSON and HTML."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Report:
 
     @property
     def recorded(self) -> datetime | None:
-        """When the recording began; None where its clock says nothing sensible."""
+        """When the recording began; None where its clock has no valid time."""
         try:
             return datetime.fromtimestamp(self.recording.start_s, UTC) if self.recording.count else None
         except (OverflowError, ValueError, OSError):
@@ -84,7 +84,7 @@ class Report:
 
     @property
     def event_log(self) -> list[tuple[str, str, bool]]:
-        """Whether each file is as it was recorded: a few words, all of it, and whether it is not."""
+        """Whether each file is as it was recorded: a short text, the whole sentence, and whether it is not."""
         several = len(self.verified) > 1
         return [
             (f"{one.path.name}: {one.short}" if several else one.short, one.sentence, one.is_broken)
@@ -100,7 +100,7 @@ class Report:
 
 
 def why_nothing(run: Rehearsed, recording: Recording) -> str | None:
-    """A run in which no message of any signal could be read says nothing of the car, whatever it raised."""
+    """Why the run shows nothing of the car: no message of any signal could be read. None: one could."""
     if any(tally.received > tally.rejected + tally.not_measured for tally in run.reception.by_signal.values()):
         return None
     if not recording.count:
@@ -143,7 +143,7 @@ def differences(before: Rehearsed, after: Rehearsed) -> list[tuple[str, float, f
 
 
 def not_checked(run: Rehearsed) -> list[tuple[str, list[str]]]:
-    """Why, and which checks could never be made for that reason: no alarm of theirs means nothing."""
+    """Each reason, with the checks that never had a result because of it."""
     by_reason: dict[str, list[str]] = {}
     for one in run.unchecked:
         by_reason.setdefault(one.why, []).append(one.label)
@@ -152,9 +152,9 @@ def not_checked(run: Rehearsed) -> list[tuple[str, list[str]]]:
 
 def to_choose(run: Rehearsed) -> list[str]:
     """What could not be judged because no topic carries it, and how to choose one, in sentences."""
-    asked = [f"{_shown(question)} {_answer(question)}" for question in run.questions]
+    questions = [f"{_shown(question)} {_answer(question)}" for question in run.questions]
     picked = run.tuning.settings.topics  # what was picked and is not there is noted already
-    return asked + [
+    return questions + [
         f"{SIGNALS[signal].label}: {run.undecided[signal]}." for signal in sorted(run.refused) if signal not in picked
     ]
 
@@ -201,7 +201,7 @@ def _row(run: Rehearsed, name: str) -> SignalRow:
 
 
 def _note(run: Rehearsed, name: str) -> str | None:
-    """What is to be known of a signal's source."""
+    """The notes on a signal's source."""
     source, tally = run.sources.get(name), run.reception.by_signal.get(name)
     notes = [] if source is None or source.note is None else [source.note]
     if tally is not None and tally.not_measured:

@@ -1,4 +1,4 @@
-"""How numbers, times and texts from a recording are put before a person."""
+"""Formats numbers, times and texts of a recording for display."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 
 def printable(text: str, most: int = 300) -> str:
-    """One line without control characters: what a recording says must not move a terminal's cursor."""
+    """One line without control characters: the text of a recording must not move a terminal's cursor."""
     flat = "".join(letter if letter.isprintable() else "�" for letter in text)
     return flat if len(flat) <= most else flat[: most - 1] + "…"
 

@@ -16,7 +16,7 @@ class SimulatedOrder:
 
     trigger: str
     title: str
-    text: str  # what the check said when the count-down began
+    text: str  # text of the check when the count-down began
     countdown_s: float
     at_s: float
 

@@ -71,15 +71,15 @@ def _signals(report: Report) -> Iterator[str]:
 def _signal(row: SignalRow, width: int) -> str:
     if row.topic is None:
         return "not published" if row.why is None else f"not chosen: {printable(row.why, 100)}"
-    said = [f"{printable(row.topic, 48):{width}}  {grouped(row.count):>9}"]
-    said.append(f"{row.rate_hz:7.1f} Hz" if row.rate_hz is not None else " " * 10)
+    parts = [f"{printable(row.topic, 48):{width}}  {grouped(row.count):>9}"]
+    parts.append(f"{row.rate_hz:7.1f} Hz" if row.rate_hz is not None else " " * 10)
     if row.lowest is not None and row.highest is not None:
-        said.append(f"{row.lowest:.2f} … {row.highest:.2f} {row.unit}".rstrip())
+        parts.append(f"{row.lowest:.2f} … {row.highest:.2f} {row.unit}".rstrip())
     if row.rejected:
-        said.append(f"{grouped(row.rejected)} rejected: {printable(row.why_rejected or '', 80)}")
+        parts.append(f"{grouped(row.rejected)} rejected: {printable(row.why_rejected or '', 80)}")
     if row.note:
-        said.append(f"({printable(row.note, 100)})")
-    return "  ".join(said).rstrip()
+        parts.append(f"({printable(row.note, 100)})")
+    return "  ".join(parts).rstrip()
 
 
 def _alarms(report: Report) -> Iterator[str]:
@@ -103,8 +103,8 @@ def _episode(episode: Episode) -> Iterator[str]:
     yield f"{'':23}{printable(episode.trip_text)}"
     if episode.worst_text:
         yield f"{'':23}worst: {printable(episode.worst_text)}"
-    for said in episode.announcements[1:4]:
-        yield f"{'':23}again at {clock(said.at_s)}: {printable(said.text)}"
+    for one in episode.announcements[1:4]:
+        yield f"{'':23}again at {clock(one.at_s)}: {printable(one.text)}"
     if len(episode.announcements) > 4:
         yield f"{'':23}and {len(episode.announcements) - 4} times more"
 
@@ -134,14 +134,14 @@ def _load(report: Report) -> Iterator[str]:
     if not report.run.messages:
         return
     load = report.run.load
-    words = {
+    ratings = {
         "bearable": f"acceptable (at most {BEARABLE_IN_10_MIN:g} in 10 min)",
         "demanding": f"demanding (acceptable is {BEARABLE_IN_10_MIN:g} in 10 min)",
         "flood": f"a flood (more than {FLOOD_IN_10_MIN} in 10 min)",
     }
     yield (
         f"Alarm load after EEMUA 191: {load.announced} announced in {length(load.judged_s)}, "
-        f"at most {load.most_in_10_min} within 10 min: {words[load.verdict]}"
+        f"at most {load.most_in_10_min} within 10 min: {ratings[load.verdict]}"
     )
     if load.chattering:
         titles = ", ".join(printable(report.run.titles[name]) for name in load.chattering)

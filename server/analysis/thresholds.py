@@ -1,4 +1,4 @@
-"""Reads a file of settings to rehearse with, and says of each key that is wrong what is wrong with it."""
+"""Reads a settings file for an analysis, and reports what is wrong with each invalid key."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class Traces:
         self._headlines = {name: signal.headline for name, signal in SIGNALS.items()}
 
     def take(self, changed: Iterable[str], reading: Callable[[str], Reading[Any] | None], now_s: float) -> None:
-        """What a message changed."""
+        """Record the values that a message changed."""
         for signal in changed:
             found = reading(signal)
             if found is None:
@@ -80,7 +80,7 @@ class Traces:
                 series.add(now_s, math.nan if number is None else float(number))
 
     def judged(self, monitor: Monitor, now_s: float) -> None:
-        """What all checks found at a tick."""
+        """Record the findings of all checks at a tick."""
         for check in monitor.checks:
             finding = monitor.findings.get(check.id)
             if finding is None or (finding.measured is None and finding.limit is None):

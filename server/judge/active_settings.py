@@ -111,7 +111,7 @@ class ActiveSettings:
         return replace(read, version=self.settings.version + 1)
 
     def number_on(self, version: int) -> bool:
-        """Counts on from a version that the log knows: a number names one set of settings for ever. True where what
+        """Continue from a version of the log, because a number identifies one set of settings for ever. True where what
         was kept is older than that, so that something was lost."""
         if version <= self.settings.version:
             return False

@@ -19,7 +19,7 @@ from server.judge.topics import BY_SIGNAL, Source, candidates, plain_type
 from server.judge.units import FASTEST_KMH, plausible_speed
 from server.protocol.questions import TopicOffer
 
-Reasons = Mapping[str, Mapping[str, str]]  # signal → topic → what speaks for it and against it
+Reasons = Mapping[str, Mapping[str, str]]  # signal → topic → reasons for and against it
 
 MOST = 4  # further topics of one signal
 FIX, ODOMETRY = "sensor_msgs/NavSatFix", "nav_msgs/Odometry"
@@ -53,7 +53,7 @@ def size_of_twist(message: Any) -> Twist:
 
 
 def odometry_that_is_not_lost(message: Any) -> Odometry:
-    """Raises NotMeasured where the covariance of the pose says that nothing is known of it."""
+    """Raises NotMeasured where the covariance marks the pose as unknown."""
     if is_lost(inner(message, "pose")):
         raise NotMeasured("lost")
     return odometry(message)

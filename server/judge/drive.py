@@ -49,7 +49,7 @@ class MessageSource(Protocol):
 
     def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
         """From `start_s` after the beginning on, in time order; messages of topics not named may be empty, and with a
-        mapping, those that hold none of the words of their topic (None: any)."""
+        mapping, those that contain none of the byte strings given for their topic (None: any)."""
         ...
 
     def only(self, topics: Collection[str]) -> Iterator[Row]:
@@ -98,7 +98,7 @@ class SettingsEpoch:
 
     @property
     def questions(self) -> Sequence[Question]:
-        """What the operator would be asked."""
+        """The questions to the operator."""
         return self.choice.questions
 
 

@@ -51,7 +51,7 @@ BY_NAME, BY_TRANSFORMS = "by its name", "by transforms"
 class Axes:
     """Of a frame in which a sensor gives vectors."""
 
-    turn: Rotation | None = None  # in the body frame; None: not turned, or no transform says
+    turn: Rotation | None = None  # in the body frame; None: not turned, or no transform gives it
     ground: str | None = None  # BY_NAME or BY_TRANSFORMS: it is fixed to the ground, and not to the car
     why_unknown: str | None = None
 
@@ -64,22 +64,22 @@ class Frames:
 
     def __init__(self) -> None:
         self._trees: dict[str, FrameTree] = {}  # by namespace
-        self._changes = 0  # of all trees: what is kept is worked out anew with each
+        self._changes = 0  # of all trees: what is kept is computed again after each
         self._kept: dict[tuple[str, str], tuple[int, Any, Mounting]] = {}  # by topic and frame
         self._axes: dict[tuple[str, str], tuple[int, Axes]] = {}  # by topic and frame
         self._located: dict[str, str] = {}  # topic → the frame whose place its transforms gave
-        self._asked: dict[tuple[str, str], None] = {}  # topics and frames that were asked for, the newest last
+        self._requested: dict[tuple[str, str], None] = {}  # topics and frames that were requested, the newest last
         self._growth = 0  # grows with each frame and each sensor that comes to be known
         self._noted = -1  # the growth when the needed names were noted
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = ("_trees", "_changes", "_located", "_asked", "_growth")
+        kept = ("_trees", "_changes", "_located", "_requested", "_growth")
         return {"_kept": {}, "_axes": {}, "_noted": -1} | {name: getattr(self, name) for name in kept}
 
     def forget(self) -> None:
         """The link opens again: what is latched is sent again, and may be of another calibration by now."""
         self._trees.clear()
-        self._asked.clear()
+        self._requested.clear()
         self._growth += 1
         self._changes += 1
 
@@ -111,7 +111,7 @@ class Frames:
         return None
 
     def locate(self, topic: str, frame: str) -> tuple[str, Pose] | None:
-        """The body frame of the car and the pose of a sensor's frame in it; None: no transform says. Raises
+        """The body frame of the car and the pose of a sensor's frame in it; None: no transform gives it. Raises
         Contradiction."""
         tree = self.tree_of(topic) or FrameTree()
         body = tree.body_of(frame)
@@ -127,8 +127,8 @@ class Frames:
 
     @property
     def needs_moving(self) -> bool:
-        """Whether transforms that move may place a sensor that was asked for."""
-        return not all(self.is_settled(topic, frame) for topic, frame in self._asked)
+        """Whether transforms that move may place a requested sensor."""
+        return not all(self.is_settled(topic, frame) for topic, frame in self._requested)
 
     def note_needed(self, names: set[bytes]) -> None:
         """Change `names` to those of which a serialized message of transforms that may count holds one, if it is not of
@@ -136,7 +136,8 @@ class Frames:
         if names and self._growth == self._noted:
             return
         self._noted = self._growth
-        needed = {name for topic, frame in self._asked for name in (self.tree_of(topic) or FrameTree()).needed(frame)}
+        trees = ((self.tree_of(topic) or FrameTree(), frame) for topic, frame in self._requested)
+        needed = {name for tree, frame in trees for name in tree.needed(frame)}
         found = {name.rpartition("/")[2].encode() if PLAIN.fullmatch(name) else b"" for name in needed}
         names.clear()
         names.update(found or {NOTHING})
@@ -144,17 +145,17 @@ class Frames:
     def ask(self, topic: str, frame: str) -> None:
         """A sensor's frame is to be placed."""
         frame = frame_name(frame)
-        self._ask(topic, frame)
+        self._request(topic, frame)
         with suppress(Contradiction):
             if self.locate(topic, frame) is not None and len(self._located) < MAX_SENSORS:
                 self._located[topic] = frame
 
-    def _ask(self, topic: str, frame: str) -> None:
-        if self._asked.pop((topic, frame), 0) is not None:
+    def _request(self, topic: str, frame: str) -> None:
+        if self._requested.pop((topic, frame), 0) is not None:
             self._growth += 1
-        self._asked[topic, frame] = None
-        if len(self._asked) > MAX_SENSORS:
-            del self._asked[next(iter(self._asked))]
+        self._requested[topic, frame] = None
+        if len(self._requested) > MAX_SENSORS:
+            del self._requested[next(iter(self._requested))]
         (self.tree_of(topic) or FrameTree()).place(frame)
 
     def axes(self, topic: str, frame: str) -> Axes:
@@ -164,7 +165,7 @@ class Frames:
             if len(self._axes) >= MAX_SENSORS:
                 self._axes.clear()
             name = frame_name(frame)
-            self._ask(topic, name)
+            self._request(topic, name)
             try:
                 found = self._find_axes(topic, name)
             except Contradiction as why:
@@ -189,9 +190,9 @@ class Frames:
         return Axes(turn=pose.rotation)
 
     def looks_ahead(self, topic: str, scan: LaserScan) -> bool | None:
-        """Whether the laser of a topic looks ahead, see the function; None: no transform says."""
+        """Whether the laser of a topic looks ahead, as `looks_ahead` finds it; None: no transform gives it."""
         tree = self.tree_of(topic)
-        self._ask(topic, frame_name(scan.frame_id))
+        self._request(topic, frame_name(scan.frame_id))
         return None if tree is None else looks_ahead(tree, frame_name(scan.frame_id), scan)
 
     def mounted(self, topic: str, scan: LaserScan, limits: AllLimits) -> LaserScan:
@@ -201,7 +202,7 @@ class Frames:
         if kept is None or kept[0] != self._changes or kept[1] is not limits:
             if len(self._kept) >= MAX_SENSORS:
                 self._kept.clear()
-            self._ask(topic, frame_name(scan.frame_id))
+            self._request(topic, frame_name(scan.frame_id))
             kept = self._kept[key] = self._changes, limits, self._mounting(topic, frame_name(scan.frame_id), limits)
         return mounted(scan, kept[2])
 
@@ -263,7 +264,7 @@ def _by_settings(found: Mounting, limits: AllLimits) -> Mounting:
         return found
     is_known = by_transforms and found.why_unknown is None and not all_count
     if by_transforms and not is_known and not turned and not all_count:
-        return found  # its place alone does not tell where it looks
+        return found  # its position does not give its direction
     base = found if is_known else Mounting(origin="settings")
     mounting = replace(
         base,
@@ -274,8 +275,8 @@ def _by_settings(found: Mounting, limits: AllLimits) -> Mounting:
         is_upside_down=ours.upside_down >= 0.5 if all_count or "upside_down" in turned else base.is_upside_down,
         note=None,
     )
-    words = f"mounted by the settings, {turn_words(mounting)}"
-    return replace(mounting, note=f"{words}, not by the car's transforms" if by_transforms else words)
+    note = f"mounted by the settings, {describe_turn(mounting)}"
+    return replace(mounting, note=f"{note}, not by the car's transforms" if by_transforms else note)
 
 
 def _from_bumper(found: Mounting, limits: AllLimits) -> Mounting:
@@ -289,22 +290,22 @@ def _from_bumper(found: Mounting, limits: AllLimits) -> Mounting:
 def place_words(mounting: Mounting) -> str:
     """ "turned by 180°, upside down, 0.30 m ahead"."""
     x_m = mounting.x_m or 0.0
-    return f"{turn_words(mounting)}, {abs(x_m):.2f} m {'behind' if x_m < 0 else 'ahead'}"
+    return f"{describe_turn(mounting)}, {abs(x_m):.2f} m {'behind' if x_m < 0 else 'ahead'}"
 
 
-def turn_words(mounting: Mounting) -> str:
+def describe_turn(mounting: Mounting) -> str:
     """ "turned by 90° to the left, upside down"."""
     degrees = round(math.degrees(mounting.yaw_rad)) % 360
-    words = ["looking ahead" if degrees == 0 else f"turned by {min(degrees, 360 - degrees)}°"]
+    parts = ["looking ahead" if degrees == 0 else f"turned by {min(degrees, 360 - degrees)}°"]
     if degrees not in (0, 180):
-        words[0] += " to the left" if degrees < 180 else " to the right"
+        parts[0] += " to the left" if degrees < 180 else " to the right"
     if mounting.is_upside_down:
-        words.append("upside down")
+        parts.append("upside down")
     if abs(mounting.y_m) >= 0.005:
-        words.append(f"{abs(mounting.y_m):.2f} m {'left' if mounting.y_m > 0 else 'right'} of the centre line")
+        parts.append(f"{abs(mounting.y_m):.2f} m {'left' if mounting.y_m > 0 else 'right'} of the centre line")
     if mounting.tilt_rad > math.radians(0.5):
-        words.append(f"tilted by {math.degrees(mounting.tilt_rad):.0f}°")
-    return ", ".join(words)
+        parts.append(f"tilted by {math.degrees(mounting.tilt_rad):.0f}°")
+    return ", ".join(parts)
 
 
 def mounted(scan: LaserScan, mounting: Mounting) -> LaserScan:
@@ -332,7 +333,7 @@ def mounted(scan: LaserScan, mounting: Mounting) -> LaserScan:
 
 def looks_ahead(tree: FrameTree, frame: str, scan: LaserScan) -> bool | None:
     """Whether a laser looks ahead by its transforms: the middle of its view is within 60° of ahead, or the view covers
-    the road ahead. None: they do not say. `scan` in the laser's own axes, as it is decoded."""
+    the road ahead. None: the transforms do not give it. `scan` in the laser's own axes, as it is decoded."""
     try:
         body = tree.body_of(frame)
         pose = None if body is None else tree.pose(frame, body)

@@ -46,11 +46,11 @@ def spec_of(event: Mapping[str, Any]) -> AlarmSpec:
     """The alarm as its event declares it. What the event leaves out is as in this version; an alarm or a priority that
     this version does not know is shown and sounds as the most urgent one."""
     known = _SPECS.get(alarm := str(event["alarm"]))
-    said = event.get("priority")
-    priority = known.priority if known is not None and said is None else priority_of(said)
+    declared = event.get("priority")
+    priority = known.priority if known is not None and declared is None else priority_of(declared)
     is_same = known is not None and known.priority is priority
     place, sound = (known.place, known.sound) if known is not None and is_same else _SHOWN[priority]
-    if said == priority:
+    if declared == priority:
         place, sound = _named(Place, event.get("place"), place), _named(Sound, event.get("sound"), sound)
     title = text_of(event.get("title")) or (known.title if known is not None else alarm)
     return replace(known or _UNKNOWN, title=title[:_LETTERS], priority=priority, place=place, sound=sound)

@@ -1,4 +1,4 @@
-"""What a source of messages hands on: a recording, a simulated car or a bridge, all the same."""
+"""A message as every source yields it: a recording, a simulated car or a bridge."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ Holds = Callable[[Any], bool]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rule:
-    """One value of one field, and what it stands for."""
+    """One value of one field, and its meaning."""
 
     type: str  # ROS 1 spelling
     field: str
@@ -103,7 +103,7 @@ def _is_absent(message: Any) -> bool:
 
 
 def _is_outside(message: Any) -> bool:
-    """Whether a beam is; they are told apart one by one, by `monitor.scan.usable`."""
+    """Whether any beam is outside the range of its laser; `monitor.scan.usable` distinguishes them beam by beam."""
     nearest, farthest = number(message, "range_min"), number(message, "range_max")
     return any(one is not None and (one < nearest or one > farthest) for one in message["ranges"])
 

@@ -25,7 +25,7 @@ from server.judge.run_state import RunState
 from server.judge.unit_watch import UnitWatch
 from server.judge.units import Unit
 
-SILENCE_S = 600.0  # after so long without a message nothing new can be said: the judge is not stepped through the rest
+SILENCE_S = 600.0  # after so long without a message no result can change: the judge skips the rest
 QUIET_S, QUIET_TICKS = 60.0, 20  # after so long without a message, every check is judged at one tick in so many
 STEPS_PER_CLOCK_READ = 24  # some 2 ms
 
@@ -299,7 +299,7 @@ class OfflineRun:
         self.run_state.recorded_alarms = restore(self.run_state.recorded_alarms, transitions)
 
     def _skip_events(self, from_s: float) -> None:
-        """A run that begins in the middle knows what was recorded before: what stood, who paused, which settings."""
+        """Restore what was recorded before a run that begins in the middle: alarms, pauses, settings."""
         events, run_state = self.drive.recorded.events, self.run_state
         before: list[Transition] = []
         while run_state.events_taken < len(events) and events[run_state.events_taken][0] < from_s:

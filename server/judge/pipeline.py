@@ -29,7 +29,7 @@ OnNumber = Callable[[str, float, Unit | None, float, float | None], None]
 
 
 class Delays(Protocol):
-    """Who knows how old a message was that came: TransportDelay, or a recording of its estimates."""
+    """The source of a message's age on arrival: TransportDelay, or a recording of its estimates."""
 
     def receive(self, topic: str, at_s: float, stamp_s: float | None = None) -> float: ...
 
@@ -123,7 +123,7 @@ def receive(
 
 
 def _of_the_car(value: Any, topic: str, profile: Profile, frames: Frames | None, limits: AllLimits | None) -> Any:
-    """A scan from where the laser is mounted, a mode by the words of this kind of car."""
+    """A scan from where the laser is mounted, a mode by the names in the profile of this kind of car."""
     if type(value) is LaserScan and frames is not None and limits is not None:
         return frames.mounted(topic, value, limits)
     if type(value) is DriveMode and (mode := profile.modes.get(value.text.casefold())) is not None:

@@ -216,7 +216,7 @@ class NewSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChosenPhone:
-    """The operator chose the phone that rides in the car; None: no phone any more."""
+    """The operator chose the phone that is in the car; None: no phone any more."""
 
     phone: str | None
 

@@ -22,7 +22,7 @@ from server.judge.unit_watch import PLACES, Key, UnitBasis, number_of, read
 from server.judge.units import UnitRule, rule_for
 
 MOST_STATIC = 1_000  # messages: a static transform that is sent again and again is read so often
-FIRST_MOVING = 200  # messages of those that move, from which a run knows where the laser is when it begins
+FIRST_MOVING = 200  # messages of those that move, which give the laser's pose at the beginning of a run
 FIRST_MEASURED = 20  # messages of each topic: the parts of a sweep may come from several lasers
 PLACED = {plain_type(kind) for kind in TYPES} | {"sensor_msgs/LaserScan"}  # types of what has a place on the car
 
@@ -41,7 +41,7 @@ class Rows(Protocol):
 class RecordedTransforms:
     """The transforms of a recording: read before it is judged, wherever in it they are.
 
-    A latched message is only at the beginning, and what it says holds for the whole drive.
+    A latched message is only at the beginning, and its content holds for the whole drive.
     """
 
     def __init__(self, source: Rows, names: Mapping[str, str], types: Mapping[str, str]) -> None:
@@ -58,7 +58,7 @@ class RecordedTransforms:
         self._learn(self.frames, self._static, MOST_STATIC)
 
     def looks_ahead(self, topic: str, scan: LaserScan) -> bool | None:
-        """Whether the laser of a topic, as a bridge would offer it, looks ahead; None: no transform says."""
+        """Whether the laser of a topic, as a bridge would offer it, looks ahead; None: no transform gives it."""
         found = self.frames.looks_ahead(topic, scan)
         return self._with_moving.looks_ahead(topic, scan) if found is None and self._moving else found
 

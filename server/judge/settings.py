@@ -43,7 +43,7 @@ class BadSetting(ValueError):
 
 
 class Conflict(Exception):
-    """Somebody else changed the settings in between."""
+    """The settings were changed by another client in between."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,7 +126,7 @@ def _validate(flat: Mapping[str, Any], *, named: Mapping[str, Any]) -> None:
 
 
 def _seen(name: str) -> str:
-    """Somebody's name as a sentence may repeat it: short, and nothing in it that cannot be seen or sent."""
+    """A person's name as a message may repeat it: short, with printable and encodable characters only."""
     return "".join(letter if letter.isprintable() else "?" for letter in name[:60])
 
 

@@ -21,7 +21,7 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     "autoware_vehicle_msgs/ControlModeReport": ("stamp", "mode"),
 }
 PLAIN = ("std_msgs/Bool", "std_msgs/String")
-NUMBERS = ("std_msgs/Float32", "std_msgs/UInt8")  # alike in JSON; which of them a topic may be, its name says
+NUMBERS = ("std_msgs/Float32", "std_msgs/UInt8")  # alike in JSON; the topic's name tells which of them are possible
 
 
 def type_of(message: Any, topic: str, signal: str | None = None) -> str:

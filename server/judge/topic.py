@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 # Takes one ROS message, as rosbridge spells it, and returns one value of `monitor.values`. Raises Rejected with the
-# reason in few words. Numbers that rosbridge had to flatten to null are NaN here; a value whose headline number is
+# reason, short. Numbers that rosbridge had to flatten to null are NaN here; a value whose headline number is
 # unknown is rejected, because a signal without a value must become stale.
 Decode = Callable[[Any], Any]
 

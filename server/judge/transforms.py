@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from server.judge.frame_words import words
+from server.judge.frame_words import name_parts
 from server.judge.message_fields import Rejected, finite
 from server.system.clean_text import clean
 
@@ -27,13 +27,13 @@ ROOTS = ("base", "body", "chassis", "vehicle", "car", "ego_vehicle", "base_frame
 
 BODY_WORDS = frozenset({"base", "footprint", "chassis", "body"})
 WORLD_WORDS = frozenset({"odom", "odometry", "map", "world", "earth", "utm", "ecef"})
-WORLDS = ("enu", "ned", "global", "local", "origin", "local_origin")  # as words they are in names of sensors too
+WORLDS = ("enu", "ned", "global", "local", "origin", "local_origin")  # as name parts they occur in names of sensors too
 
 Rotation = tuple[float, float, float, float]  # unit quaternion x, y, z, w
 
 
 class Contradiction(Exception):
-    """Where a frame is cannot be known; `str()` is the reason in a few words."""
+    """The pose of a frame cannot be determined; `str()` is a short reason."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,14 +121,14 @@ def frame_name(name: Any) -> str:
 @lru_cache(maxsize=1000)
 def is_body(frame: str) -> bool:
     """Whether a frame is one of the car's body, by its name."""
-    return _last(frame) in (*BODIES, *ROOTS) or not BODY_WORDS.isdisjoint(words(_last(frame)))
+    return _last(frame) in (*BODIES, *ROOTS) or not BODY_WORDS.isdisjoint(name_parts(_last(frame)))
 
 
 @lru_cache(maxsize=1000)
 def is_world(frame: str) -> bool:
     """Whether a frame is fixed to the ground, by its name: odom, map_frame, robot1/world; see REP-105."""
     last = _last(frame)
-    return not is_body(frame) and (last in WORLDS or not WORLD_WORDS.isdisjoint(words(last)))
+    return not is_body(frame) and (last in WORLDS or not WORLD_WORDS.isdisjoint(name_parts(last)))
 
 
 class FrameTree:
@@ -308,7 +308,7 @@ def _differ(pose: Pose | None, first: Pose | None) -> bool:
 
 
 def _contradiction(child: str, known: _Link, parent: str, pose: Pose | None, is_static: bool) -> str | None:
-    """What speaks against a further transform of a frame; None: it is the newest."""
+    """Why a further transform of a frame is refused; None: it is the newest."""
     if parent != known.parent:
         return f"the frame {child} is below {known.parent} and also below {parent}"
     if (is_static or known.is_static) and pose is not None and known.pose is not None and pose.differs(known.pose):

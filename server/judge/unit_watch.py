@@ -1,4 +1,4 @@
-"""The unit of every signal of one drive: decided once by all values so far, applied to each value, or asked for."""
+"""The unit of every signal of one drive: decided once by all values so far and applied to each, or a question."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from server.protocol.questions import Question
 
 PLACES = (Odometry, GpsFix)
 MOVES_MPS = 1.0
-MANY = 1000  # values: the question is asked of a car that does not move, or has no speed
+MANY = 1000  # values, after which a car that does not move, or has no speed, gets the question
 UNDECIDED = Decision(unit=None, why="")
 MOST_TOPICS = 200  # of one drive; what is beyond is judged by its definition alone
 
@@ -248,13 +248,13 @@ def _steered(number: float, unit: Unit | None, basis: UnitBasis) -> Steering:
 
 
 def unit_questions(units: UnitWatch, sources: Mapping[str, Source], chosen: Mapping[str, str]) -> tuple[Question, ...]:
-    """What the operator is asked of units.
+    """The questions about units to the operator.
 
     One for each signal whose unit the values do not show, in the order of the signals. `chosen`: the operator's
     answers, signal → name of the unit, which hold from the next value on.
     """
     found = []
-    for signal, source in _asked(units, sources):
+    for signal, source in _undecided(units, sources):
         decision = units.decision(signal, source.topic)
         assert decision is not None
         if chosen.get(signal) in [unit.name for unit in decision.fits]:
@@ -274,7 +274,7 @@ def unit_questions(units: UnitWatch, sources: Mapping[str, Source], chosen: Mapp
 
 def unit_sentences(units: UnitWatch, sources: Mapping[str, Source]) -> list[str]:
     """Of each signal of unknown unit: why, and how to choose one."""
-    asked = {signal for signal, _ in _asked(units, sources)}
+    undecided = {signal for signal, _ in _undecided(units, sources)}
     found = []
     for signal, source in sources.items():
         decision = units.decision(signal, source.topic)
@@ -282,15 +282,15 @@ def unit_sentences(units: UnitWatch, sources: Mapping[str, Source]) -> list[str]
             found.append(f"{SIGNALS[signal].label} ({source.topic}): {cannot_convert(decision.unit)}. {NOT_EVALUATED}")
         if decision is None or decision.unit is not None or decision.is_rest:
             continue
-        words = f"{SIGNALS[signal].label} ({source.topic}): {decision.why}. {NOT_EVALUATED}"
-        if signal in asked:
+        sentence = f"{SIGNALS[signal].label} ({source.topic}): {decision.why}. {NOT_EVALUATED}"
+        if signal in undecided:
             names = " or ".join(f'"{unit.name}"' for unit in decision.fits)
-            words += f" Choose it in the file for --settings: [units] {signal} = {names}."
-        found.append(words)
+            sentence += f" Choose it in the file for --settings: [units] {signal} = {names}."
+        found.append(sentence)
     return found
 
 
-def _asked(units: UnitWatch, sources: Mapping[str, Source]) -> list[tuple[str, Source]]:
+def _undecided(units: UnitWatch, sources: Mapping[str, Source]) -> list[tuple[str, Source]]:
     return [(name, sources[name]) for name in SIGNALS if name in sources and units.is_to_ask(name, sources[name].topic)]
 
 

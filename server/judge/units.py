@@ -108,7 +108,7 @@ _VALUES = (
 )
 _PEDAL_VALUES = (
     "not known unless chosen: all values at most 1 may be of both scales, above 1 they may be 0 to 100 %, Nm or bar; "
-    "in Nm or bar the pedal is not checked, for nothing says what share of it that is"
+    "in Nm or bar the pedal is not checked, because its full scale is not known"
 )
 _WAY = (
     "m/s; km/h where the way that follows from it is 3.6 times (±10 %) that of the odometry's pose or the receiver's "

@@ -22,7 +22,7 @@ _DOMAIN = re.compile(rf"(?=.{{1,253}}\Z){_LABEL}(\.{_LABEL})*")
 
 
 class BadAddress(ValueError):
-    """No address that is written to; `str()` is one sentence for the operator."""
+    """The text is no acceptable address; `str()` is one sentence for the operator."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,30 +39,30 @@ class MailAddress:
 
     @property
     def shown(self) -> str:
-        """As a person reads it: the domain in its own letters."""
+        """The address for display: the domain in its own script."""
         return f"{self.local}@{shown_domain(self.domain)}"
 
     @property
     def needs_utf8(self) -> bool:
-        """Only a server with SMTPUTF8 (RFC 6531) can take it."""
+        """Whether the server must support SMTPUTF8 (RFC 6531)."""
         return not self.local.isascii()
 
 
 def parse(text: str) -> MailAddress:
     """The one address in `text`. Raises BadAddress for anything else: none, two, a name beside it, quotes, controls."""
-    said = _seen(text)
+    shown = _seen(text)
     if not text:
         raise BadAddress("No address is given.")
     if len(text) > LONGEST or not text.isprintable() or any(letter.isspace() for letter in text):
-        raise BadAddress(f"“{said}” is not one address: it is too long or holds blanks or signs that are not seen.")
+        raise BadAddress(f"“{shown}” is not one address: it is too long or holds blanks or invisible characters.")
     if text.count("@") != 1:
-        raise BadAddress(f"“{said}” is not one address, such as name@example.org.")
+        raise BadAddress(f"“{shown}” is not one address, such as name@example.org.")
     local, _, domain = unicodedata.normalize("NFC", text).partition("@")
     if not _is_local(local):
-        raise BadAddress(f"“{said}” is not an address: before the @ it may have letters, digits, . _ + and -.")
+        raise BadAddress(f"“{shown}” is not an address: before the @ it may have letters, digits, . _ + and -.")
     address = MailAddress(local=local, domain=parse_domain(domain))
     if len(address.text.encode()) > LONGEST:
-        raise BadAddress(f"“{said}” is too long for an address.")
+        raise BadAddress(f"“{shown}” is too long for an address.")
     return address
 
 
@@ -78,7 +78,7 @@ def parse_domain(text: str) -> str:
 
 
 def shown_domain(domain: str) -> str:
-    """A domain in its own letters, where it has any."""
+    """A domain in its own script, where it has one."""
     try:
         return idna.decode(domain)
     except (idna.IDNAError, UnicodeError):
@@ -104,7 +104,7 @@ def parse_allowed(text: str) -> str:
 
 
 def is_allowed(address: MailAddress, allowed: Sequence[str]) -> bool:
-    """Whether it may be written to; an empty list allows everyone."""
+    """Whether mail may be sent to `address`; an empty list allows every address."""
     if not allowed:
         return True
     return any(
@@ -126,5 +126,5 @@ def _is_of_atom(letter: str) -> bool:
 
 
 def _seen(text: str) -> str:
-    """Somebody's text as a sentence may repeat it."""
+    """A text, cut and without control characters, as a message may repeat it."""
     return "".join(letter if letter.isprintable() else "?" for letter in text[:60])

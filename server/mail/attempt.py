@@ -1,4 +1,4 @@
-"""What one attempt to send a mail came to: who has it, who is refused, and whether and when it is tried again."""
+"""The outcome of one attempt to send a mail: accepted and refused recipients, and the time of the next attempt."""
 
 from __future__ import annotations
 
@@ -20,57 +20,59 @@ def answered(
     now_ms: int,
     pause_s: Callable[[int], float],
 ) -> Outcome:
-    """The server has answered: for each recipient, and for the mail where it took any."""
+    """Return the outcome of the server's replies: one for each recipient, and one for the mail if any was accepted."""
     recipients = tuple(_settled(one, answers.get(one.address), of_mail) for one in mail.recipients)
     waiting = [one for one in recipients if one.state == "waiting"]
     refused = [one for one in recipients if one.state == "refused"]
     if waiting:
-        said = waiting[0].said
+        detail = waiting[0].detail
         if len(recipients) > 1:
-            said = f"{_named(waiting)}; {_count(recipients)}"
-        return _again(mail, recipients, said, now_ms, pause_s)
+            detail = f"{_named(waiting)}; {_count(recipients)}"
+        return _again(mail, recipients, detail, now_ms, pause_s)
     if refused:
-        said = refused[0].said if len(recipients) == 1 else f"{_named(refused)}; {_count(recipients)}"
-        return Outcome(state="failed", said=said, recipients=recipients)
-    said = recipients[-1].said if recipients else ""
-    return Outcome(state="sent", said=said, recipients=recipients)
+        detail = refused[0].detail if len(recipients) == 1 else f"{_named(refused)}; {_count(recipients)}"
+        return Outcome(state="failed", detail=detail, recipients=recipients)
+    detail = recipients[-1].detail if recipients else ""
+    return Outcome(state="sent", detail=detail, recipients=recipients)
 
 
 def troubled(
     mail: Mail, trouble: Trouble, *, is_doubtful: bool, now_ms: int, pause_s: Callable[[int], float]
 ) -> Outcome:
-    """Nothing was settled."""
-    said = str(trouble)
+    """Return the outcome of an attempt that failed before the server's final reply."""
+    detail = str(trouble)
     if is_doubtful:
-        said = f"{said} It may have arrived; it is sent again under the same Message-ID."
+        detail = f"{detail} It may have arrived; it is sent again under the same Message-ID."
     if trouble.is_permanent:
-        return Outcome(state="failed", said=said, recipients=mail.recipients, of_account=trouble.is_of_account)
-    return _again(mail, mail.recipients, said, now_ms, pause_s)
+        return Outcome(state="failed", detail=detail, recipients=mail.recipients, of_account=trouble.is_of_account)
+    return _again(mail, mail.recipients, detail, now_ms, pause_s)
 
 
 def _settled(one: Recipient, answer: Reply | None, of_mail: Reply | None) -> Recipient:
     if one.state != "waiting" or answer is None:
-        return one  # it has it, or was refused before
+        return one  # already accepted or refused
     if answer.code >= 300:
-        return replace(one, state="refused" if answer.is_permanent else "waiting", said=answer.text)
+        return replace(one, state="refused" if answer.is_permanent else "waiting", detail=answer.text)
     if of_mail is None:
         return one
     if of_mail.code < 300:
-        return replace(one, state="accepted", said=of_mail.text)
-    return replace(one, state="refused" if of_mail.is_permanent else "waiting", said=of_mail.text)
+        return replace(one, state="accepted", detail=of_mail.text)
+    return replace(one, state="refused" if of_mail.is_permanent else "waiting", detail=of_mail.text)
 
 
 def _again(
-    mail: Mail, recipients: tuple[Recipient, ...], said: str, now_ms: int, pause_s: Callable[[int], float]
+    mail: Mail, recipients: tuple[Recipient, ...], detail: str, now_ms: int, pause_s: Callable[[int], float]
 ) -> Outcome:
     if mail.attempts >= MAX_ATTEMPTS:
-        return Outcome(state="failed", said=f"Given up after {mail.attempts} attempts: {said}", recipients=recipients)
+        return Outcome(
+            state="failed", detail=f"Given up after {mail.attempts} attempts: {detail}", recipients=recipients
+        )
     next_ms = now_ms + round(1000 * pause_s(mail.attempts))
-    return Outcome(state="queued", said=said, recipients=recipients, next_ms=next_ms)
+    return Outcome(state="queued", detail=detail, recipients=recipients, next_ms=next_ms)
 
 
 def _named(some: Sequence[Recipient]) -> str:
-    listed = ", ".join(f"{one.address}: {one.said}" if one.said else one.address for one in some[:_MOST_NAMED])
+    listed = ", ".join(f"{one.address}: {one.detail}" if one.detail else one.address for one in some[:_MOST_NAMED])
     return listed + (f" and {len(some) - _MOST_NAMED} more" if len(some) > _MOST_NAMED else "")
 
 

@@ -1,4 +1,4 @@
-"""Which mail is sent next, and what became of each attempt."""
+"""The queue of mails to send, and the outcome of each attempt."""
 
 from __future__ import annotations
 
@@ -69,31 +69,31 @@ class DeliveryQueue:
             state = "cancelled" if stage == "cancelled" and outcome.state != "sent" else outcome.state
             database.execute(
                 "UPDATE mail SET state = ?, said = ?, next_ms = ?, done_ms = ?, of_account = ? WHERE n = ?",
-                (state, outcome.said, outcome.next_ms, now_ms if state != "queued" else None, outcome.of_account, n),
+                (state, outcome.detail, outcome.next_ms, now_ms if state != "queued" else None, outcome.of_account, n),
             )
             for one in outcome.recipients:
                 database.execute(
                     "UPDATE recipient SET state = ?, said = ? WHERE mail = ? AND address = ?",
-                    (one.state, one.said, n, one.address),
+                    (one.state, one.detail, n, one.address),
                 )
         if state in ("sent", "cancelled"):
             (self._files / row["file"]).unlink(missing_ok=True)
 
-    def hold(self, said: str, next_ms: int, longest_ms: int) -> None:
-        """The server takes nothing now: no mail that waits is tried before that time."""
+    def hold(self, detail: str, next_ms: int, longest_ms: int) -> None:
+        """Postpone all queued mails to `next_ms`, because the server accepts nothing now."""
         with transaction(self._database) as database:
             database.execute(
                 "UPDATE mail SET next_ms = ?, said = ? WHERE state = 'queued' AND (next_ms < ? OR next_ms > ?)",
-                (next_ms, said, next_ms, next_ms + longest_ms),
+                (next_ms, detail, next_ms, next_ms + longest_ms),
             )
 
-    def refuse_all(self, said: str, now_ms: int) -> None:
-        """The server will take nothing from this account: what waits has failed, until the settings are changed."""
+    def refuse_all(self, detail: str, now_ms: int) -> None:
+        """Mark all queued mails as failed, because the server refuses this account; new settings try them again."""
         with transaction(self._database) as database:
             database.execute(
                 "UPDATE mail SET state = 'failed', next_ms = NULL, done_ms = ?, of_account = 1, said = ? "
                 "WHERE state = 'queued'",
-                (now_ms, said),
+                (now_ms, detail),
             )
 
     def try_all_again(self, sender: str, now_ms: int) -> None:

@@ -54,7 +54,7 @@ class DriveReports:
         self._quiet_s = quiet_s
         self._waiting: dict[tuple[Path, str], _Drive] = {}  # by folder of a car, and session
         self._kept: dict[str, list[str]] = {}  # folder → recordings, as the file has it
-        self._resumed: dict[tuple[Path, str], bool] = {}  # whether a session goes on with the drive before it
+        self._resumed: dict[tuple[Path, str], bool] = {}  # whether a session continues the drive before it
         self._loop: asyncio.AbstractEventLoop | None = None
         self._due = asyncio.Event()
         self._supervisor = Supervisor("drive reports")
@@ -125,7 +125,7 @@ class DriveReports:
         return is_quiet or (is_followed and not any(drive.is_refused for drive in drives))
 
     def _grouped(self, folder: Path, sessions: Iterable[str]) -> list[list[str]]:
-        """The sessions of each drive: one that goes on after a restart of the server is of the drive before it."""
+        """The sessions of each drive: one that continues after a restart of the server is of the drive before it."""
         groups: list[list[str]] = []
         for session in sessions:
             if groups and self._resumes(folder, session):

@@ -25,7 +25,7 @@ def one_line(text: str) -> str:
 
 
 def needs_encoding(text: str) -> bool:
-    """Return whether a text must go out as encoded words (RFC 2047)."""
+    """Return whether a text must be sent as encoded words (RFC 2047)."""
     return not text.isascii() or "=?" in text
 
 
@@ -39,7 +39,7 @@ class EncodedText:
     def __init__(self, name: str, text: str, rest: str = "") -> None:
         self.name = name
         self._text = one_line(text)
-        self._rest = rest  # what stands behind it on a line of its own
+        self._rest = rest  # what follows on a line of its own
 
     def fold(self, *, policy: Policy) -> str:
         """Return the lines of the header."""

@@ -121,7 +121,7 @@ def _locked(path: Path) -> int:
 
 
 def reason(why: BaseException) -> str:
-    """Why something failed, in few words."""
+    """A short reason of a failure."""
     if isinstance(why, OSError) and why.strerror:
         return why.strerror[:1].lower() + why.strerror[1:]
     return str(why)[:120] or type(why).__name__

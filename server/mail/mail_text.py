@@ -82,7 +82,7 @@ def _missing(sentences: Sequence[str]) -> str:
 
 
 def _heads(lines: Sequence[str]) -> str:
-    """To be held against the report, and against what `catgraph verify` says of the recording."""
+    """The heads of the hash chains, to compare with the report and with the output of `catgraph verify`."""
     return "\n".join(["Head of the hash chain of each recording:", *lines]) if lines else ""
 
 

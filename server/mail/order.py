@@ -1,4 +1,4 @@
-"""What was ordered to be mailed, what became of it, mail by mail and recipient by recipient."""
+"""Mail orders and their state, for each mail and each recipient."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Order:
 
     recordings: tuple[str, ...]
     format: Format
-    to: tuple[str, ...]  # addresses as they go over the wire
+    to: tuple[str, ...]  # addresses as transmitted
     subject: str
     text: str
     too_large: TooLarge
-    by: str = ""  # who asked
+    by: str = ""  # who ordered it
     base: str = ""  # the address by which the page reached this server, for links
 
 
@@ -31,7 +31,7 @@ class Recipient:
 
     address: str
     state: Literal["waiting", "accepted", "refused"] = "waiting"
-    said: str = ""  # the server's words
+    detail: str = ""  # the server's reply
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +49,7 @@ class Mail:
     attempts: int
     next_ms: int | None  # when it is tried again
     done_ms: int | None
-    said: str
+    detail: str
     recipients: tuple[Recipient, ...] = ()
 
 
@@ -58,12 +58,12 @@ class Letter:
     """One order and its mails."""
 
     n: int
-    key: str  # names it over restarts, and on the glass of who ordered it
+    key: str  # identifies it over restarts, and on the page that ordered it
     ordered_ms: int
     order: Order
     is_ready: bool  # its mails are composed
     state: State
-    said: str
+    detail: str
     sender: str = ""  # address the mails were composed for
     way: Way | None = None
     size_bytes: int | None = None  # of what is attached, all parts together
@@ -95,10 +95,10 @@ class Prepared:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What an attempt to send one mail came to."""
+    """The outcome of one attempt to send a mail."""
 
     state: State
-    said: str
+    detail: str
     recipients: tuple[Recipient, ...]
     next_ms: int | None = None
     of_account: bool = False
@@ -113,11 +113,11 @@ def state_of(mails: tuple[Mail, ...]) -> State:
     return "sent"
 
 
-def said_of(mails: tuple[Mail, ...]) -> str:
+def detail_of(mails: tuple[Mail, ...]) -> str:
     """The status text of a letter: the newest reply for the mail that determines its state."""
     state = state_of(mails)
-    with_reply = [mail for mail in mails if mail.state == state and mail.said]
+    with_reply = [mail for mail in mails if mail.state == state and mail.detail]
     if not with_reply:
         return ""
     mail = with_reply[0]
-    return f"Part {mail.part} of {mail.parts}: {mail.said}" if mail.parts > 1 else mail.said
+    return f"Part {mail.part} of {mail.parts}: {mail.detail}" if mail.parts > 1 else mail.detail

@@ -109,10 +109,10 @@ class Outbox:
             )
         return True
 
-    def prepare_failed(self, n: int, said: str) -> None:
+    def prepare_failed(self, n: int, reason: str) -> None:
         with transaction(self._database) as database:
             database.execute(
-                "UPDATE letter SET stage = 'failed', said = ? WHERE n = ? AND stage = 'preparing'", (said, n)
+                "UPDATE letter SET stage = 'failed', said = ? WHERE n = ? AND stage = 'preparing'", (reason, n)
             )
 
     def discard(self, key: str) -> None:
@@ -176,7 +176,7 @@ class Outbox:
         )
 
     def _forget_old(self, database: sqlite3.Connection) -> None:
-        """Letters that are over and stand far down; what failed stays until somebody has decided."""
+        """Delete old finished letters; failed ones stay until an operator has decided."""
         database.execute(
             "DELETE FROM letter WHERE n IN (SELECT n FROM letter WHERE stage = 'cancelled' OR (stage = 'ready' AND NOT "
             "EXISTS (SELECT 1 FROM mail WHERE mail.letter = letter.n AND state IN ('queued', 'sending', 'failed'))) "

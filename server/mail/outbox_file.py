@@ -106,7 +106,7 @@ def _open(path: Path) -> sqlite3.Connection:
 
 
 def _set_aside(folder: Path, path: Path) -> Path:
-    """Moves a damaged outbox and every composed mail into a folder of their own, whence they can be sent by hand."""
+    """Move a damaged outbox and its composed mails into a separate folder, from which they can be sent by hand."""
     number = 1
     while (aside := folder / f"damaged-{number}").exists():
         number += 1

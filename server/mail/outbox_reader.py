@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import orjson
 
-from server.mail.order import Letter, Mail, Order, Recipient, said_of, state_of
+from server.mail.order import Letter, Mail, Order, Recipient, detail_of, state_of
 
 
 class OutboxReader:
@@ -72,7 +72,7 @@ class OutboxReader:
             order=order,
             is_ready=row["stage"] == "ready",
             state="queued",
-            said=row["said"],
+            detail=row["said"],
             sender=row["sender"],
             way=row["way"],
             size_bytes=row["size"],
@@ -81,14 +81,14 @@ class OutboxReader:
         )
         match row["stage"]:
             case "ready":
-                return replace(bare, state=state_of(bare.mails), said=said_of(bare.mails))
+                return replace(bare, state=state_of(bare.mails), detail=detail_of(bare.mails))
             case "cancelled":
                 is_under_way = any(mail.state == "sending" for mail in bare.mails)
                 sent = sum(mail.state == "sent" for mail in bare.mails)
                 if sent and sent == len(bare.mails):
-                    return replace(bare, state="sent", said="It was sent before it could be cancelled.")
-                said = f"{sent} of {len(bare.mails)} mails were sent before." if sent else ""
-                return replace(bare, state="sending" if is_under_way else "cancelled", said=said)
+                    return replace(bare, state="sent", detail="It was sent before it could be cancelled.")
+                detail = f"{sent} of {len(bare.mails)} mails were sent before." if sent else ""
+                return replace(bare, state="sending" if is_under_way else "cancelled", detail=detail)
             case "failed":
                 return replace(bare, state="failed")
         return bare
@@ -111,8 +111,8 @@ class OutboxReader:
             attempts=row["attempts"],
             next_ms=row["next_ms"],
             done_ms=row["done_ms"],
-            said=row["said"],
+            detail=row["said"],
             recipients=tuple(
-                Recipient(address=one["address"], state=one["state"], said=one["said"]) for one in recipients
+                Recipient(address=one["address"], state=one["state"], detail=one["said"]) for one in recipients
             ),
         )

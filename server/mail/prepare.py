@@ -124,8 +124,8 @@ def _drive_of(letter: Letter, source: Source, recording: str) -> Sequence[str]:
     return source.drive_of(recording) if form is not None and form.of_drive else [recording]
 
 
-def _paths(recordings: Sequence[str], source: Source, asked: str, path_of_it: Path) -> list[Path]:
-    found = (path_of_it if recording == asked else source.path_of(recording) for recording in recordings)
+def _paths(recordings: Sequence[str], source: Source, requested: str, path: Path) -> list[Path]:
+    found = (path if recording == requested else source.path_of(recording) for recording in recordings)
     return [path for path in found if path is not None]
 
 

@@ -63,15 +63,15 @@ class Preparer:
             await self._folder.ask(lambda outbox: outbox.discard(letter.key))
             self._is_made()
         except (CannotPrepare, OSError) as why:
-            said = str(why) if isinstance(why, CannotPrepare) else f"It could not be prepared: {reason(why)}."
-            log.warning("mail %d: %s", letter.n, said)
-            await self._folder.ask(lambda outbox: outbox.prepare_failed(letter.n, said))
+            text = str(why) if isinstance(why, CannotPrepare) else f"It could not be prepared: {reason(why)}."
+            log.warning("mail %d: %s", letter.n, text)
+            await self._folder.ask(lambda outbox: outbox.prepare_failed(letter.n, text))
         except MailRefused:
             raise  # the disk; it is made again
         except Exception:
             log.exception("mail not prepared: mail=%d", letter.n)
-            said = "It could not be prepared: internal server error; the server's log has the details."
-            await self._folder.ask(lambda outbox: outbox.prepare_failed(letter.n, said))
+            text = "It could not be prepared: internal server error; the server's log has the details."
+            await self._folder.ask(lambda outbox: outbox.prepare_failed(letter.n, text))
         finally:
             self.under_way = None
             under_way.over.set()

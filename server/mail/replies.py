@@ -11,7 +11,7 @@ _BASE64 = re.compile(r"[A-Za-z0-9+/]{4,}={0,2}")
 
 
 class Trouble(Exception):
-    """Nothing was handed over; `str()` is one sentence, with the server's words where it said any."""
+    """No mail was accepted; `str()` is one sentence, with the server's reply if there was one."""
 
     def __init__(self, sentence: str, *, is_permanent: bool = False, is_of_account: bool = False) -> None:
         super().__init__(sentence)
@@ -19,12 +19,12 @@ class Trouble(Exception):
         self.is_of_account = is_of_account  # it holds for every mail, not for this one
 
 
-def clean(words: str, password: str) -> str:
-    """A server's words on one line, cut, without what cannot be seen; a password that it repeats is not shown."""
+def clean(text: str, password: str) -> str:
+    """A server's reply on one line, cut, without control characters; a password that it repeats is masked."""
     if password:
-        words = _BASE64.sub(lambda found: "•••" if _holds(found[0], password) else found[0], words)
-        words = words.replace(password, "•••")
-    line = "".join(letter if letter.isprintable() else " " for letter in words[: 8 * _LONGEST])
+        text = _BASE64.sub(lambda found: "•••" if _holds(found[0], password) else found[0], text)
+        text = text.replace(password, "•••")
+    line = "".join(letter if letter.isprintable() else " " for letter in text[: 8 * _LONGEST])
     return " ".join(line.split())[:_LONGEST]
 
 

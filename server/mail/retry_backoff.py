@@ -5,7 +5,7 @@ from __future__ import annotations
 _PAUSES_S = (10, 30, 60, 120, 300, 600, 1200, 1800)
 LONGEST_S = 3600.0
 AGAIN_S = 5.0  # until a failed task is restarted, and a failed disk is tried again
-# Three days, as RFC 5321 4.5.4.1 asks at least four to five of relays that nobody watches: here somebody does. Counted
+# Three days, though RFC 5321 4.5.4.1 wants four to five from relays that nobody watches: an operator does here. Counted
 # in attempts, not by the clock: a computer in a car may only learn the date after a day.
 MAX_ATTEMPTS = len(_PAUSES_S) + 72
 

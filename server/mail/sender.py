@@ -1,4 +1,4 @@
-"""Sends the mails of the outbox when they are due, over one connection, and keeps what became of each attempt."""
+"""Sends the mails of the outbox when they are due, over one connection, and stores the outcome of each attempt."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LONGEST_MS = round(1000 * retry_backoff.LONGEST_S)
 
 
 class Sender:
-    """Takes mails from the outbox and hands them to the SMTP server."""
+    """Takes mails from the outbox and sends them to the SMTP server."""
 
     def __init__(
         self,
@@ -43,11 +43,11 @@ class Sender:
         self._held: tuple[int, str] | None = None  # no attempt before this time [ms], and why
 
     def look(self) -> None:
-        """Something may be due: a clock was moved, or mail was ordered."""
+        """Wake up: a mail may be due, because a clock was set or a mail was ordered."""
         self._due.set()
 
     def release(self) -> None:
-        """Ask the server again at once, whatever it said before."""
+        """End a back-off of the account: try the server again at once."""
         self._held = None
 
     def forget_failures(self) -> None:
@@ -78,7 +78,7 @@ class Sender:
                 connection.drop()
 
     async def _wait(self) -> None:
-        """Until something is due, or somebody calls."""
+        """Wait until a mail is due, or until woken up."""
         earliest = await self._folder.ask(lambda outbox: outbox.queue.earliest_ms())
         timeout = None if earliest is None else max(0.0, (earliest - self._wall_ms()) / 1000)
         if timeout is not None:
@@ -88,10 +88,10 @@ class Sender:
                 await self._due.wait()
 
     async def _send(self, mail: Mail, connection: Connection | None) -> Connection | None:
-        """One attempt, and what came of it on the disk; the connection where it can be used again."""
+        """Make one attempt and store its outcome; return the connection if it can be used again."""
         refused = self._refusal(mail)
         if refused is not None:
-            await self._settle(mail, Outcome(state="failed", said=refused, recipients=mail.recipients))
+            await self._settle(mail, Outcome(state="failed", detail=refused, recipients=mail.recipients))
             return connection
         begun = await self._folder.ask(lambda outbox: outbox.queue.begin(mail.n))
         if begun is None:
@@ -110,7 +110,7 @@ class Sender:
             under_way.over.set()
 
     async def _finish(self, mail: Mail, under_way: Underway) -> Connection | None:
-        """Waits for an attempt and keeps what came of it, though the server be ended meanwhile."""
+        """Wait for an attempt and store its outcome, even if the server is ended meanwhile."""
         is_ended = False
         try:
             await joined(under_way.task)
@@ -120,7 +120,7 @@ class Sender:
         if task.cancelled():
             if is_ended:
                 raise asyncio.CancelledError  # it is sent again at the next start
-            outcome = Outcome(state="cancelled", said="", recipients=mail.recipients)
+            outcome = Outcome(state="cancelled", detail="", recipients=mail.recipients)
         elif (error := task.exception()) is None:
             answers, of_mail = task.result()
             outcome = attempt.answered(mail, answers, of_mail, now_ms, self._pause_s)
@@ -140,7 +140,7 @@ class Sender:
         return connection
 
     def _fault(self, mail: Mail, error: BaseException) -> Trouble:
-        """A fault of ours must not keep a mail "sending" for ever."""
+        """Turn an internal error into a Trouble, so that no mail stays "sending" for ever."""
         log.error("mail not sent: mail=%d", mail.letter, exc_info=error)
         return Trouble(f"Internal server error ({type(error).__name__}); the server's log has the details.")
 
@@ -172,7 +172,7 @@ class Sender:
             raise Trouble("Its file is missing from the outbox: send it again.", is_permanent=True) from None
 
     def _refusal(self, mail: Mail) -> str | None:
-        """Why it may not be sent any more."""
+        """Why a mail may not be sent any more; None if it may."""
         if not self._settings().is_complete:
             return "Mail is not set up: enter SMTP host and sender in Settings, E-mail."
         for one in mail.recipients:
@@ -203,8 +203,8 @@ class Sender:
         return 0 < left_ms <= _LONGEST_MS  # more: the clock was set back
 
     async def _settle(self, mail: Mail, outcome: Outcome) -> None:
-        """Keeps what came of an attempt, however long the disk takes: forgetting it would send the mail again."""
-        log.info("mail %d part %d of %d: %s. %s", mail.letter, mail.part, mail.parts, outcome.state, outcome.said)
+        """Store the outcome of an attempt, however long the disk takes: without it the mail would be sent again."""
+        log.info("mail %d part %d of %d: %s. %s", mail.letter, mail.part, mail.parts, outcome.state, outcome.detail)
         while True:
             try:
                 await self._folder.ask(lambda outbox: outbox.queue.settle(mail.n, outcome, self._wall_ms()))

@@ -18,7 +18,7 @@ import aiosmtplib
 
 from server.mail.replies import Trouble, clean
 from server.mail.smtp_dial import DIAL_S, Account, dial, own_name
-from server.mail.smtp_errors import in_words
+from server.mail.smtp_errors import as_trouble
 from server.mail.smtp_stream import next_piece, opened, write
 
 REPLY_S = 60.0  # RFC 5321 4.5.3.2 has minutes; a server that thinks so long is tried again
@@ -27,7 +27,7 @@ END_S = 300.0  # for the reply to a whole mail, which a server may take apart an
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Envelope:
-    """One mail as it is handed over."""
+    """One mail and its SMTP envelope."""
 
     sender: str
     to: Sequence[str]
@@ -38,10 +38,10 @@ class Envelope:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reply:
-    """What the server said to one thing."""
+    """The server's reply to one command."""
 
     code: int
-    words: str
+    message: str
 
     @property
     def is_permanent(self) -> bool:
@@ -49,11 +49,11 @@ class Reply:
 
     @property
     def text(self) -> str:
-        return f"{self.code} {self.words}".strip()
+        return f"{self.code} {self.message}".strip()
 
 
 class Connection:
-    """An open connection; mails go one after the other."""
+    """An open connection; mails are sent one after the other."""
 
     def __init__(self, smtp: aiosmtplib.SMTP, account: Account) -> None:
         self._smtp = smtp
@@ -79,7 +79,7 @@ class Connection:
         `is_doubtful` is true the mail may have arrived.
         """
         self.is_doubtful = False
-        with self._in_words("while the mail was sent"):
+        with self._as_trouble("while the mail was sent"):
             await self._sender(mail)
             answers = {one: await self._recipient(one, mail.needs_utf8) for one in mail.to}
             if any(answer.code in (421, 0) for answer in answers.values()) and not self._smtp.is_connected:
@@ -128,7 +128,7 @@ class Connection:
         protocol = self._smtp.protocol
         if protocol is None:
             raise Trouble("The connection was lost.")
-        # A server may refuse in the midst of it: its answer is listened for from the start.
+        # A server may refuse during the transfer: its reply is awaited from the start.
         answer = asyncio.ensure_future(protocol.read_response(timeout=None))
         try:
             async with opened(mail.file) as file:
@@ -145,14 +145,14 @@ class Connection:
                 self.is_doubtful = True
                 protocol.write(b".\r\n")
             async with asyncio.timeout(END_S):
-                said = await answer
+                final = await answer
         finally:
             if not answer.done():
                 answer.cancel()
             elif not answer.cancelled():
                 answer.exception()
         self.is_doubtful = False
-        return self._reply(said.code, said.message)
+        return self._reply(final.code, final.message)
 
     async def close(self) -> None:
         """Send QUIT if the connection is open."""
@@ -161,19 +161,19 @@ class Connection:
         self._smtp.close()
 
     def drop(self) -> None:
-        """Breaks off at once: a mail that is not whole is not taken."""
+        """Abort the connection: the server discards an incomplete mail."""
         transport = self._smtp.transport
         if isinstance(transport, asyncio.Transport) or hasattr(transport, "abort"):
             transport.abort()  # type: ignore[union-attr]
         self._smtp.close()
 
     @contextmanager
-    def _in_words(self, when: str) -> Iterator[None]:
-        with in_words(self._account, when):
+    def _as_trouble(self, when: str) -> Iterator[None]:
+        with as_trouble(self._account, when):
             yield
 
     def _reply(self, code: int, message: str) -> Reply:
-        return Reply(code=code, words=clean(message, self._account.password))
+        return Reply(code=code, message=clean(message, self._account.password))
 
 
 @asynccontextmanager
@@ -189,7 +189,7 @@ async def connected(account: Account) -> AsyncIterator[Connection]:
 async def connect(account: Account) -> Connection:
     """Dials, encrypts, logs in. Raises Trouble of the account."""
     context = await asyncio.to_thread(_context, account.ca) if account.security != "none" else None
-    with in_words(account, ""):
+    with as_trouble(account, ""):
         dialled = await dial(account)
         smtp = aiosmtplib.SMTP(
             hostname=account.host,
@@ -216,7 +216,7 @@ async def connect(account: Account) -> Connection:
             if account.user:
                 await _log_in(smtp, account)
         except BaseException:
-            smtp.close()  # and with it the socket, which is its transport's now
+            smtp.close()  # and its transport with the socket
             raise
     return connection
 
@@ -225,9 +225,9 @@ async def _log_in(smtp: aiosmtplib.SMTP, account: Account) -> None:
     try:
         await smtp.login(account.user, account.password, timeout=REPLY_S)
     except aiosmtplib.SMTPAuthenticationError as refused:
-        words = f"{refused.code} {clean(refused.message, account.password)}"
+        reply = f"{refused.code} {clean(refused.message, account.password)}"
         raise Trouble(
-            f"{account.shown} refuses the login of {account.user}: {words}",
+            f"{account.shown} refuses the login of {account.user}: {reply}",
             is_permanent=refused.code >= 500,
             is_of_account=True,
         ) from None

@@ -1,4 +1,4 @@
-"""What a connection to an SMTP server fails with, as a sentence for the operator."""
+"""Failures of a connection to an SMTP server, as sentences for the operator."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from server.mail.smtp_dial import Account
 
 
 @contextmanager
-def in_words(account: Account, when: str) -> Iterator[None]:
-    """Whatever a connection may fail with, as a Trouble with a sentence."""
+def as_trouble(account: Account, when: str) -> Iterator[None]:
+    """Turn every failure of a connection into a Trouble with a sentence."""
     is_dialling = not when
     try:
         yield
     except Trouble:
         raise
     except aiosmtplib.SMTPResponseException as answer:
-        words = f"{answer.code} {clean(answer.message, account.password)}"
+        reply = f"{answer.code} {clean(answer.message, account.password)}"
         raise Trouble(
-            f"{account.shown} says{'' if is_dialling else f' {when}'}: {words}",
+            f"{account.shown} replied{'' if is_dialling else f' {when}'}: {reply}",
             is_permanent=answer.code >= 500,
             is_of_account=is_dialling,
         ) from None
@@ -39,7 +39,7 @@ def in_words(account: Account, when: str) -> Iterator[None]:
 
 
 def _of_trust(error: BaseException) -> str | None:
-    """Why a certificate is not believed, where that is what it was."""
+    """Why the certificate is not trusted; None if the failure had another cause."""
     one: BaseException | None = error
     while one is not None:
         if isinstance(one, ssl.SSLCertVerificationError):

@@ -1,4 +1,4 @@
-"""Where the recordings come from that are mailed: the catalog and the exports, as the mailer needs them."""
+"""The source of the recordings that are mailed: the catalog and the exports, as the mailer needs them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A trial of the settings: dialled, encrypted, logged in, and a short mail sent at once, past the outbox."""
+"""A test of the mail settings: connect, encrypt, log in, and send a short mail at once, bypassing the outbox."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ WITHIN_S = 45.0
 
 
 class MailTestFailed(Exception):
-    """It did not work; `str()` is a sentence with the server's words."""
+    """The test failed; `str()` is a sentence with the server's reply."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """It worked."""
+    """The result of a test that succeeded."""
 
     sentence: str
     said: str
@@ -34,29 +34,29 @@ class Trial:
 
 
 async def try_out(settings: MailSettings, to: MailAddress | None, now_ms: int) -> Trial:
-    """Raises MailTestFailed."""
+    """Test the settings, and send a mail to `to` if it is given. Raises MailTestFailed."""
     account = Account.of(settings)
     try:
         async with asyncio.timeout(WITHIN_S), connected(account) as connection:
             how = f"{account.shown} answers" + (", encrypted" if settings.security != "none" else ", NOT encrypted")
             how += f", and accepts the login of {settings.user}." if settings.user else "."
-            said = ""
+            reply = ""
             if to is not None:
                 with tempfile.TemporaryDirectory(prefix="catgraph-mail-") as folder:
                     mail = await asyncio.to_thread(_written, settings, to, now_ms, Path(folder))
                     answers, of_mail = await connection.hand_over(mail, lambda _: None)
                 refused = of_mail is None or of_mail.code >= 300
                 answer = answers[to.text] if of_mail is None else of_mail
-                said = answer.text
+                reply = answer.text
                 if refused:
-                    raise MailTestFailed(f"{account.shown} refuses the mail to {to.shown}: {said}")
+                    raise MailTestFailed(f"{account.shown} refuses the mail to {to.shown}: {reply}")
                 how += f" It accepted a mail to {to.shown}."
             largest = connection.largest_bytes
             if largest is not None and largest < settings.limit_bytes * 1.37:
                 how += (
                     f" It accepts mails of at most {largest / 1e6:.1f} MB: set the limit to {largest / 1.4e6:.1f} MB."
                 )
-            return Trial(sentence=how, said=said, is_encrypted=settings.security != "none", largest_bytes=largest)
+            return Trial(sentence=how, said=reply, is_encrypted=settings.security != "none", largest_bytes=largest)
     except Trouble as why:
         raise MailTestFailed(str(why)) from None
     except TimeoutError:

@@ -32,7 +32,7 @@ ENDED = "The replay failed; the server's log has the reason."
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplaySource:
-    """A finished recording, and what the catalog knows of it."""
+    """A finished recording, with its data of the catalog."""
 
     path: Path
     vehicle: str
@@ -62,7 +62,7 @@ class ReplayClient:
         self._position: ReplayPosition | None = None  # None: nothing received yet
         self._now = now
         self._on_new = on_new
-        self._heard_s = now()
+        self._last_message_s = now()
         self._asked = itertools.count(1)
         self._waiting: dict[int, asyncio.Future[dict[str, Any]]] = {}
         self._ready = asyncio.Event()
@@ -143,11 +143,11 @@ class ReplayClient:
 
     @property
     def silent_s(self) -> float:
-        """Since its process said anything."""
-        return self._now() - self._heard_s
+        """Seconds since the last message of its process."""
+        return self._now() - self._last_message_s
 
     def source_facts(self) -> dict[str, str]:
-        """What the catalog knows of the recording, for a page elsewhere."""
+        """The catalog's data of the recording, for a page elsewhere."""
         assert self._source is not None
         return {"vehicle": self._source.vehicle, "title": self._source.title}
 
@@ -206,7 +206,7 @@ class ReplayClient:
                 self._fail(ENDED)
 
     def _take(self, kind: str, payload: bytes) -> None:
-        self._heard_s = self._now()
+        self._last_message_s = self._now()
         match kind:
             case "state":
                 self._state = payload

@@ -33,7 +33,7 @@ BEHIND_S = 0.3  # wall time: further behind, it does not reach the requested rat
 
 
 class Playback:
-    """Times without a suffix are seconds since the beginning of the recording; `now_s` is the clock of whoever looks.
+    """Times without a suffix are seconds since the beginning of the recording; `now_s` is the viewer's clock.
 
     `open_again` gives the recording a second time, for the time line; `sketch` is its speed in equal steps, `trends`
     all its signals in few buckets, to be shown until the time line is made. Raises RecordingUnreadable.
@@ -229,12 +229,12 @@ class Playback:
 
     def timeline(self, events: TimelineEvents = NOTHING) -> Timeline:
         """The time line so far, the recorded events of the drive, and the notes on the recording."""
-        said = [*self.drive.notes, *self.index.empty_stretches(EMPTY_S)]
+        notes = [*self.drive.notes, *self.index.empty_stretches(EMPTY_S)]
         if self.index.is_done:
-            said += [f"{sentence}." for sentence in self._index_recording.damage]
+            notes += [f"{sentence}." for sentence in self._index_recording.damage]
         broken = (why for why in (self.index.broke_off, self.broke_off) if why is not None)
-        said += [f"Not all of it can be read: {why}." for why in broken]
-        notes = list(dict.fromkeys(said))[:20]
+        notes += [f"Not all of it can be read: {why}." for why in broken]
+        notes = list(dict.fromkeys(notes))[:20]
         return {
             "kind": "timeline", **self.index.as_json(), "notes": notes, "flags": list(events.flags[:MOST]),
             "interventions": list(events.interventions), "modes": list(events.modes),

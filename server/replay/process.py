@@ -94,11 +94,11 @@ class _Process:
             with contextlib.closing(playback):
                 self._play(playback, lambda: read_timeline_events(lambda: open_recording(paths)))
         except RecordingUnreadable as error:
-            said = str(error).replace(str(paths[0]), paths[0].name)  # the path on the server is not disclosed
-            self._say("failed", {"reason": _sentence(said)})
+            text = str(error).replace(str(paths[0]), paths[0].name)  # the path on the server is not disclosed
+            self._send_json("failed", {"reason": _sentence(text)})
             return 2
         except MemoryError:
-            self._say("failed", {"reason": "This recording needs more memory than a replay may use."})
+            self._send_json("failed", {"reason": "This recording needs more memory than a replay may use."})
             return 3
         return 0
 
@@ -111,7 +111,7 @@ class _Process:
                 self._reading = _begun(read)
             is_busy = playback.is_seeking or not playback.index.is_done
             due_s = 0.0 if is_busy else max(0.0, began_s + PORTION_S - time.monotonic())
-            if not self._obey_all(playback, due_s):
+            if not self._run_orders(playback, due_s):
                 return
 
     # -- orders ------------------------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ class _Process:
         *lines, self._unread = self._unread.split(b"\n")
         return lines
 
-    def _obey_all(self, playback: Playback, within_s: float) -> bool:
+    def _run_orders(self, playback: Playback, within_s: float) -> bool:
         lines = self._read_lines(within_s)
         if lines is None:
             return False
@@ -145,14 +145,14 @@ class _Process:
             order = orjson.loads(line)
             now_s = time.monotonic()
             try:
-                answer = self._obey(playback, order, now_s)
+                answer = self._run_order(playback, order, now_s)
             except ValueError as why:
                 answer = {"ok": False, "reason": str(why)}
             if order.get("n") is not None:
-                self._say("reply", {"n": order["n"], "answer": answer})
+                self._send_json("reply", {"n": order["n"], "answer": answer})
         return True
 
-    def _obey(self, playback: Playback, order: dict[str, Any], now_s: float) -> Mapping[str, Any]:
+    def _run_order(self, playback: Playback, order: dict[str, Any], now_s: float) -> Mapping[str, Any]:
         self._is_urgent = True
         match order["kind"]:
             case "seek":
@@ -209,7 +209,7 @@ class _Process:
             self._scan_key = key
             self._send("scan", scan if scan is not None else b"", now_s)
 
-    def _say(self, kind: Kind, body: dict[str, Any]) -> None:
+    def _send_json(self, kind: Kind, body: dict[str, Any]) -> None:
         self._send(kind, orjson.dumps(body), time.monotonic())
 
     def _send(self, kind: Kind, payload: bytes, now_s: float) -> None:

@@ -1,4 +1,4 @@
-"""How a server and the process of one replay talk: orders as lines of JSON, answers as records with a length."""
+"""The protocol between a server and the process of one replay: JSON lines of orders, length-prefixed answers."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ TRENDS_A_FRAME = 4
 
 
 def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, track_number: int) -> RecordedState:
-    """The state of docs/protocol.md at this moment, without `server`, `replay` and `live`. Looking changes nothing
+    """The state of docs/protocol.md at this moment, without `server`, `replay` and `live`. Reading it changes nothing
     of what is judged later."""
     run_state, epoch = run.run_state, run.epoch
     now_s = run_state.at_s

@@ -74,7 +74,7 @@ class AlarmHistory:
 
 
 def save_checkpoint(run_state: RunState) -> bytes:
-    """Keeps what a run knew at a moment as bytes, so that it can go on from there as often as somebody wants.
+    """Return the state of a run at a moment as bytes, from which the run can continue any number of times.
 
     A copy that later steps do not change; some 20 kB.
     """
@@ -109,7 +109,7 @@ def _view(mapping: dict[Any, Any]) -> MappingProxyType[Any, Any]:
 
 
 def behind_gap(run: OfflineRun, length_s: float) -> float | None:
-    """Where playing goes on [s since the beginning], in the middle of a gap; None: it is in none."""
+    """Where playing continues [s since the beginning], in the middle of a gap; None: it is in none."""
     last_s = run.run_state.last_message_s
     is_shown = run.at_s - (0.0 if last_s is None else last_s) >= SHOWN_S
     next_s = min(run.next_s, length_s)
@@ -120,7 +120,7 @@ class Index(Observer):
     """Times are seconds since the beginning of the recording."""
 
     def __init__(self, recording: Recording, drive: Drive, sketch: Sequence[float | None] = ()) -> None:
-        """`sketch`: the speed as the catalog has it, in equal steps; it stands where nothing has been read yet."""
+        """`sketch`: the speed as the catalog has it, in equal steps; it is shown where nothing has been read yet."""
         self._drive = drive
         self._sketch = sketch
         self._every_s = max(LEAST_KEYFRAME_S, drive.length_s / KEYFRAMES)
@@ -184,7 +184,7 @@ class Index(Observer):
         return self._history.until(alarm, at_s) if is_read else None
 
     def as_json(self) -> IndexedTimeline:
-        """What docs/protocol.md calls the time line; without what only its session knows."""
+        """The time line of docs/protocol.md, without the fields that only its session has."""
         marks = sorted(self._marks, key=lambda mark: (mark[0], mark[1]))[:MOST_MARKS]
         done_s = self._drive.length_s if self.is_done else self.at_s
         return {

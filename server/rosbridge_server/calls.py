@@ -56,7 +56,7 @@ class Providers:
         return True
 
     def close(self) -> None:
-        """The client is gone: its services end, and whoever waits for one of them is told."""
+        """End the services of a client that is gone; pending calls of them fail."""
         self._end(list(self.names), "the client that offers the service has gone")
 
     def _end(self, names: Collection[str], why: str) -> None:

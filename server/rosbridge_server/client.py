@@ -1,4 +1,4 @@
-"""One client of the bridge: understands its operations, keeps its subscriptions, answers it."""
+"""One client of the bridge: handles its operations, keeps its subscriptions, sends replies."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MOST_SUBSCRIPTIONS = 1_000
 MOST_WISHES = 100  # subscribe operations for one topic under different ids
 MOST_OFFERED = 100  # services
 BACKLOG_BYTES = 16_000_000  # messages that may wait for one client
-REPLY_BYTES = 1_000_000  # answers that may wait before we stop listening to the client
+REPLY_BYTES = 1_000_000  # replies that may wait before reading from the client stops
 TURN_S = 0.005  # one client's flood holds the loop no longer than this
 NOT_OURS = {
     "advertise_action", "unadvertise_action", "send_action_goal", "cancel_action_goal",

@@ -30,7 +30,7 @@ class Say(Protocol):
 
 
 class Publications:
-    """What one client advertises and publishes.
+    """The topics that one client advertises and publishes.
 
     The operations raise Refused, and what makes a message unfit to be sent.
     """

@@ -168,7 +168,7 @@ class Outgoing:
         self._frames: dict[tuple[str, Encoding, int | None], bytes] = {}
 
     def frames(self, topic: str, encoding: Encoding, fragment_size: int | None = None) -> bytes:
-        """The WebSocket frame for clients which write the topic so ("chatter" and "/chatter" may both be in use).
+        """The WebSocket frame for clients that spell the topic this way ("chatter" and "/chatter" may both be in use).
 
         Text that is longer than `fragment_size` becomes the frames of its fragments, one after another.
         Raises Unencodable, and Lost where a recorded message cannot be decoded, or one without raw bytes is not of

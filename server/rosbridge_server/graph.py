@@ -1,4 +1,4 @@
-"""The topics and services of one bridge: who publishes and who listens, of which type they are, and who offers them."""
+"""The topics and services of one bridge: their types, publishers, subscribers and providers."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class Topic:
     name: str
     type: str | None  # canonical; None: only subscribed to, by clients that named no type
     latches: bool = False
-    latched: Outgoing | None = None  # the newest message, for those who come later
+    latched: Outgoing | None = None  # the newest message, for later subscribers
     published: int = 0  # messages of clients: the seq of their headers in ROS 1
     publishers: set[object] = field(default_factory=set)  # SOURCE and clients
     subscribers: dict[Subscriber, Owner] = field(default_factory=dict)
 
     def distribute(self, message: Outgoing) -> None:
-        """Hands a message to every subscriber; none can hold up another."""
+        """Send a message to every subscriber; none can block another."""
         if self.latches:
             self.latched = message
         for subscription in self.subscribers:
@@ -95,8 +95,8 @@ class Service:
     handler: Handler
     arguments: tuple[str, ...] = ()  # names of the arguments in order, for callers that send a list
     request: str | None = None  # .msg text of the request, by which the arguments are checked
-    response: str | None = None  # .msg text of the response, for those who ask rosapi
-    node: str = ""  # who offers it
+    response: str | None = None  # .msg text of the response, for queries of rosapi
+    node: str = ""  # the provider
 
 
 class Services:

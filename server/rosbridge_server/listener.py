@@ -19,18 +19,18 @@ from server.rosbridge_server.connection import Connection, WriteTogether
 WRITE_LIMIT = 65_536  # bytes in a socket's own buffer before its client counts as slow
 EXTRA_SOCKETS = 32  # sockets beyond the clients: handshakes on their way, and refusals
 
-# What strangers do to a port is no news for the person at the terminal.
+# Failed handshakes of unknown clients are not worth a line on the terminal.
 _quiet = logging.getLogger("catgraph.bridge.wire")
 _quiet.addHandler(logging.NullHandler())
 _quiet.propagate = False
 
 
 class CannotListen(Exception):
-    """The address or port cannot be had; the text is one sentence for a person."""
+    """The address or port is not available; the text is one sentence for a person."""
 
 
 class Listener:
-    """Accepts WebSocket clients on one address and hands each to `serve_client`."""
+    """Accepts WebSocket clients on one address and passes each to `serve_client`."""
 
     def __init__(
         self,
@@ -54,7 +54,7 @@ class Listener:
         return self._clients
 
     async def open(self, host: str, port: int) -> int:
-        """Listens; answers the port, which is a free one where `port` is 0. Raises CannotListen."""
+        """Start to listen and return the port, a free one where `port` is 0. Raises CannotListen."""
         if self._server is not None:
             raise RuntimeError("already listening")
         if not 0 <= port <= 65535:
@@ -81,7 +81,7 @@ class Listener:
         return int(sockets[0].getsockname()[1])
 
     async def close(self, *, abruptly: bool) -> None:
-        """Ends every connection: with a closing handshake, or as a killed process would."""
+        """End every connection: with a closing handshake, or as a killed process would."""
         server, self._server = self._server, None
         if server is None:
             return

@@ -82,7 +82,7 @@ class RosBridge:
         return self._listener.clients
 
     async def start(self, host: str = "127.0.0.1", port: int = 0) -> int:
-        """Listens and answers the port, a free one for 0. Raises CannotListen with one sentence for a person."""
+        """Start to listen and return the port, a free one for 0. Raises CannotListen with one sentence for a person."""
         self.types.load()
         port = await self._listener.open(host, port)
         self._address = (host, port)
@@ -98,7 +98,7 @@ class RosBridge:
         await self._listener.close(abruptly=True)
 
     async def revive(self) -> None:
-        """Listens again on the same port. Raises CannotListen."""
+        """Start to listen again on the same port. Raises CannotListen."""
         if self._address is None:
             raise RuntimeError("the bridge was not started")
         await self._listener.open(*self._address)
@@ -116,7 +116,7 @@ class RosBridge:
         return canonical_type(name, self.ros_version)
 
     def advertise(self, topic: str, type: str, definition: str | None = None, *, latch: bool = False) -> None:
-        """Makes a topic exist. `latch`: newcomers get the last message at once. Raises BadName.
+        """Advertise a topic. `latch`: newcomers get the last message at once. Raises BadName.
 
         `definition` is the type's .msg text with all it contains; standard types need none.
         """
@@ -136,14 +136,14 @@ class RosBridge:
             self.advertise(ROSOUT, _LOG_TYPES[self.ros_version])
 
     def unadvertise(self, topic: str) -> None:
-        """The topic's source is gone; those who listen go on listening."""
+        """Remove the source of a topic; its subscribers stay subscribed."""
         found = self.graph.find(topic)
         if found is not None:
             found.publishers.discard(SOURCE)
             self.graph.tidy(found)
 
     def publish(self, topic: str, message: Json | Outgoing) -> None:
-        """Sends a message to all who listen, without ever waiting. The message must not change afterwards.
+        """Send a message to all subscribers, without ever waiting. The message must not change afterwards.
 
         Raises LookupError where the topic was not advertised, Unencodable where it cannot be sent.
         """
@@ -151,7 +151,7 @@ class RosBridge:
         found.distribute(message if isinstance(message, Outgoing) else Outgoing(self, type, message))
 
     def prepare(self, topic: str, message: Json) -> Outgoing:
-        """Encodes a message for those who listen now; it is to be published soon. Raises LookupError."""
+        """Encode a message for the current subscribers; it is to be published soon. Raises LookupError."""
         found, type = self._published_here(topic)
         outgoing = Outgoing(self, type, message)
         for subscription in found.subscribers:
@@ -181,7 +181,7 @@ class RosBridge:
         response: str | None = None,
         node: str | None = None,
     ) -> None:
-        """Offers a service. `handler(args)` answers the values, now or as an awaitable; what it raises is passed on.
+        """Offer a service. `handler(args)` returns the values, now or as an awaitable; what it raises is passed on.
 
         `arguments` are their names in order, for the callers that send a list; `request` and `response` the .msg text
         of both.

@@ -1,4 +1,4 @@
-"""The message types a bridge knows: the standard ones, and those whose definitions came with the topics."""
+"""The message types of a bridge: the standard ones, and those whose definitions came with the topics."""
 
 from __future__ import annotations
 

@@ -41,13 +41,11 @@ from server.simulator.vehicle import (
     wheel_speed_mps,
 )
 
-START_S = 1_790_000_000.0  # seconds since 1970, when nobody says otherwise
+START_S = 1_790_000_000.0  # seconds since 1970, unless another start is given
 START_STATION_M = 300.0  # half a minute before the bends and the stop
 STEP_HZ = 100  # of the motion
 CONTROL_HZ = 20  # commands, and the by-wire readings
-RIVAL_HZ = (
-    100  # of a driver who competes: at the rate of another, mere chance would say whose command is mostly the last
-)
+RIVAL_HZ = 100  # of a driver who competes: at an equal rate, chance would decide whose command is mostly the last
 GPS_HZ = 10
 GPS_LATENCY_S = 0.02
 
@@ -65,7 +63,7 @@ class Step:
 
 
 class SimulatedCar:
-    """Drives for ever. Time is virtual: it passes as steps are taken, however fast that is.
+    """A car that drives without end. Time is virtual: it passes as steps are taken, however fast that is.
 
     `plan` holds scenarios to come. `scan_beams` replaces the interlaced SICK by so many beams round the whole circle at
     20 Hz. `start_s` is the car's clock at the beginning [s since 1970]. `has_stopper`: whether an obstacle
@@ -130,11 +128,11 @@ class SimulatedCar:
         self.scenarios.start(scenario, self._elapsed_s, duration_s)
 
     def stop(self, name: str | None = None) -> None:
-        """Ends a scenario, or all of them, now."""
+        """End a scenario, or all of them, now."""
         self.scenarios.stop(name)
 
-    def obey(self, message: Json) -> None:
-        """Takes a Twist from somebody on the bridge: linear.x in m/s, angular.z as tyre angle in rad.
+    def follow(self, message: Json) -> None:
+        """Apply a Twist that a client of the bridge published: linear.x in m/s, angular.z as tyre angle in rad.
 
         The last message wins. The lap's driver gives way meanwhile, if that is its manner, and takes over when no
         more come. An unknown tyre angle (NaN, null) keeps the tyres as they are; without a speed the message is
@@ -145,7 +143,7 @@ class SimulatedCar:
             return
         tyre_rad = _inner(message, "angular", "z")
         command = MotionCommand(speed_mps=speed_mps, tyre_rad=self._stack.tyre_rad if tyre_rad is None else tyre_rad)
-        self._stack.hear(command, self._elapsed_s)
+        self._stack.receive(command, self._elapsed_s)
         self._client_until_s = self._elapsed_s + CLIENT_HOLDS_S
 
     def messages(self) -> Iterator[Message]:
@@ -185,7 +183,7 @@ class SimulatedCar:
         }
 
     def _schedule(self) -> list[tuple[float, str]]:
-        """One second: when each group of sensors speaks. Groups never speak at the same moment."""
+        """The schedule of one second: when each group of sensors publishes, no two at the same moment."""
         groups = [("control", CONTROL_HZ, 0.0021), ("gps", GPS_HZ, 0.0312), ("diagnostics", 1, 0.5005)]
         if self._dense is None:
             groups.append(("laser", SICK_HZ, 0.0047))
@@ -196,7 +194,7 @@ class SimulatedCar:
         return sorted((phase + tick / rate, name) for name, rate, phase in groups for tick in range(rate))
 
     def _go_on(self, until_s: float) -> None:
-        """Moves the car to a moment: the motion in fixed steps, whoever looks at it and when."""
+        """Move the car to a moment, in fixed steps, so that the motion does not depend on the calls."""
         while (self._steps_done + 1) / STEP_HZ <= until_s:
             self.motion = drive(self.motion, self._stack.passed(self._steps_done / STEP_HZ), 1 / STEP_HZ)
             self._steps_done += 1
@@ -255,21 +253,21 @@ class SimulatedCar:
             command = self._driver.command(now, self._elapsed_s, 1 / CONTROL_HZ, orders, self._stage.blocked_at_m)
             tyre_rad = command.tyre_rad
             if person.mode == "manual":
-                self._driver.resume(now)  # its controller commands nothing meanwhile, and goes on from here
+                self._driver.resume(now)  # its controller commands nothing meanwhile, and continues from here
                 self._insists_on = None
             else:
-                self._stack.hear(command, self._elapsed_s)
+                self._stack.receive(command, self._elapsed_s)
                 self._insists_on = command
                 messages.append(writer.twist(CMD_VEL, at_s, command.speed_mps, command.tyre_rad))
         self._stack.hand = person.hand(tyre_rad)
         return messages
 
     def _continue_commands(self) -> Iterable[Message]:
-        """A driver who competes says the last command again and again."""
+        """Repeat the last command, as a competing driver does."""
         command = self._insists_on
         if command is None:
             return ()
-        self._stack.hear(command, self._elapsed_s)
+        self._stack.receive(command, self._elapsed_s)
         return (self._writer.twist(CMD_VEL, self.now_s, command.speed_mps, command.tyre_rad),)
 
     def _next_turn(self) -> Beams:

@@ -16,10 +16,10 @@ LONGEST_LINE = 4096
 AGAIN_S = 1.0
 
 
-def obey(service: CarService, line: str) -> str:
-    """Does what one typed line asks and answers in words; empty for an empty line."""
-    words = line.split()
-    match [word.lower() for word in words]:
+def run_line(service: CarService, line: str) -> str:
+    """Run one typed line and return the answer as text; empty for an empty line."""
+    parts = line.split()
+    match [part.lower() for part in parts]:
         case []:
             return ""
         case ["list" | "help" | "?"]:
@@ -35,7 +35,7 @@ def obey(service: CarService, line: str) -> str:
             try:
                 duration_s = float(seconds)
             except ValueError:
-                return f"“{words[1][:40]}” is not a number of seconds. {HELP}"
+                return f"“{parts[1][:40]}” is not a number of seconds. {HELP}"
             return _tried(lambda: service.start_scenario(name, duration_s), f"{name} started for {duration_s:g} s.")
         case _:
             return HELP
@@ -79,7 +79,7 @@ class Console:
         return cls(service, 0, say)
 
     def open(self) -> None:
-        """Begins to listen; where there is nothing to listen to, nothing happens."""
+        """Start to read the input; without an input, do nothing."""
         with contextlib.suppress(OSError, ValueError):  # closed, or of a kind that cannot be waited for
             if stat.S_ISREG(os.fstat(self._file).st_mode):
                 self._read()
@@ -107,7 +107,7 @@ class Console:
         if not data or len(self._rest) > LONGEST_LINE:
             lines, self._rest = [*lines, self._rest], b""
         for line in lines:
-            answer = obey(self._service, line.decode("utf-8", "replace")[:LONGEST_LINE])
+            answer = run_line(self._service, line.decode("utf-8", "replace")[:LONGEST_LINE])
             if answer:
                 self._say(answer)
 

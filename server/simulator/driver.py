@@ -1,4 +1,4 @@
-"""Whoever drives the simulated car: the driver round its lap, and the person at the wheel who brakes and takes over."""
+"""The drivers of the simulated car: the lap's driver, and the person at the wheel who brakes and takes over."""
 
 from __future__ import annotations
 
@@ -21,31 +21,31 @@ Floats = npt.NDArray[np.float64]
 
 SLOW_ZONES = ((140.0, 205.0, 5.5), (370.0, 440.0, 6.5))  # stations in m and the speed there, past the parked cars
 ANSWER_S = 0.4  # the car answers to a command about so late
-STOP_FOR_S = 5.0  # short of the ten seconds after which a standing car is worth a word
+STOP_FOR_S = 5.0  # less than the 10 s after which a standing car is reported
 STANDING_BRAKING_MPS2 = 1.5
 HARD_BRAKING_MPS2 = 3.0
 KEPT_GAP_M = 4.2  # from the laser to whatever stands in the way
 
-# The driver goes no faster than this allows, so that a healthy drive never comes near an obstacle alarm.
+# The driver drives no faster than this allows, so that a healthy drive never comes near an obstacle alarm.
 ALARM_REACTION_S = 1.0
 ALARM_BRAKING_MPS2 = 1.5
 ALARM_COLLISION_S = 2.0
 ALARM_STANDOFF_M = 5.0
 SPARE_M = 1.5
 
-CONE_RAD = 0.12  # the distance estimator looks ±0.1 rad ahead
+CONE_RAD = 0.12  # the distance estimator covers ±0.1 rad ahead
 CORRIDOR_M = 1.6  # the corridor is ±1.2 m wide
 
 # Of the person at the wheel.
 PEDAL_PERCENT = 46.0
 HAND_BRAKING_MPS2 = 2.0
-CREEP_MPS = 2.2  # by hand the car goes on at a slow pace
+CREEP_MPS = 2.2  # driven by hand the car continues at a slow pace
 SWITCH_S = 0.2  # the by-wire unit turns to manual so long after the pedal
 KEPT_TRUTHS = 20
 
 
 class Order(enum.StrEnum):
-    """What a scenario asks of the driver."""
+    """What a scenario requests from the driver."""
 
     HURRY = "hurry"
     STAND = "stand"
@@ -77,7 +77,7 @@ def fastest_mps(sight_m: float) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _DrivingStyle:
-    """How somebody drives."""
+    """The style of a driver."""
 
     cruise_mps: float
     sideways_mps2: float
@@ -153,14 +153,14 @@ class Driver:
             _plan_mps(temper)
 
     def resume(self, motion: Motion) -> None:
-        """Takes the wheel again after somebody else has driven."""
+        """Continue after another driver has driven."""
         self._target_mps = motion.speed_mps
 
     def command(
         self, motion: Motion, now_s: float, step_s: float, orders: Set[Order], blocked_at_m: float | None
     ) -> MotionCommand:
         """What to do now. `blocked_at_m` is the station where something stands in the way."""
-        self.station_m = lap().nearest_m(motion.x_m, motion.y_m, guess_m=self.station_m)
+        self.station_m = lap().nearest_m(motion.x_m, motion.y_m, near_m=self.station_m)
         if self._is_lost(motion):
             self.station_m = lap().nearest_m(motion.x_m, motion.y_m)
         temper = HASTY if Order.HURRY in orders else CALM
@@ -219,7 +219,7 @@ class Driver:
         x, y = goal.x_m - motion.x_m, goal.y_m - motion.y_m
         left_m = y * math.cos(motion.yaw_rad) - x * math.sin(motion.yaw_rad)
         curvature = 2 * left_m / (x * x + y * y)
-        # nobody holds a wheel quite still
+        # no hand keeps a wheel quite still
         self._tremor_rad += -0.7 * self._tremor_rad * step_s + 0.0015 * math.sqrt(step_s) * self._rng.standard_normal()
         return math.atan(WHEELBASE_M * curvature) + self._tremor_rad
 
@@ -248,7 +248,7 @@ class Truth:
 
 
 class SafetyDriver:
-    """The person at the wheel: brakes and takes over when a scenario says so.
+    """The person at the wheel: brakes and takes over when a scenario requests it.
 
     `step` first, then `mode`, `pedal_percent` and `hand` are those of this moment.
     """

@@ -1,4 +1,4 @@
-"""Faults laid over a stream of messages: each effect takes one message and answers what becomes of it.
+"""Faults laid over a stream of messages: each effect takes one message and returns what replaces it.
 
 An effect knows no clock and no topic: time is the message's own, and it is given the signal that message carries, as
 the topic table names signals. So the same faults go over the simulated car and over any recording.
@@ -139,9 +139,9 @@ class BothPedals(Effect):
 class GpsOffset(Effect):
     """The position moves away from the truth, in position and odometry alike.
 
-    It moves eastward and a little to the north at `pace_mps`, up to `most_m`, while the car is as `during` says, for
-    standing cars `after_s` after they stopped. Afterwards it comes back at `back_mps` while the car moves, or at once
-    where that is None.
+    It moves eastward and a little to the north at `pace_mps`, up to `most_m`, while the state of the car matches
+    `during`, for standing cars `after_s` after they stopped. Afterwards it comes back at `back_mps` while the car
+    moves, or at once where that is None.
     """
 
     EAST, NORTH = math.sin(math.radians(70)), math.cos(math.radians(70))

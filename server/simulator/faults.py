@@ -1,4 +1,4 @@
-"""Faults of single sensors, of the car's clock and of the topic that says who drives, as effects."""
+"""Faults of single sensors, of the car's clock and of the topic of the driving mode, as effects."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _other(value: Any) -> Any:
 
 
 class OtherClock(Effect):
-    """The car's clock is another: set forward or back by some seconds at once, or running slower or faster.
+    """A wrong clock of the car: set forward or back by some seconds at once, or running slower or faster.
 
     `pace` is by how much it gains on a true clock [s/s], up to `most_s`. Afterwards it is right again, in the same
     manner: at once after a step, at the same pace after a drift.

@@ -46,6 +46,6 @@ def _found(fields: Any, path: tuple[str, ...]) -> Any:
 
 
 def changed(fields: Mapping[str, Any], path: tuple[str, ...], value: Any) -> dict[str, Any]:
-    """A copy with one inner value changed; what lies beside the path is shared with the original."""
+    """A copy with one inner value changed; everything else is shared with the original."""
     name, *rest = path
     return {**fields, name: changed(fields[name], tuple(rest), value) if rest else value}

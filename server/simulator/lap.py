@@ -1,4 +1,4 @@
-"""The closed lap the simulated car drives, and where on Earth it lies: in WGS84 and in UTM zone 12N.
+"""The closed lap of the simulated car, and its place on Earth: in WGS84 and in UTM zone 12N.
 
 The lap is a long fast sweep and a notch with three bends and a stop. Local metres, x east, y north, origin at the
 centre of the sweep; driven counter-clockwise; stations are metres of way from the beginning of the sweep, in base_link
@@ -65,9 +65,7 @@ _PIECES = (
 )
 LENGTH_M = sum(length for length, _ in _PIECES)
 
-_START_YAW = (
-    GAP_RAD / 2 + math.pi / 2
-)  # the notch lies to the east: the sweep begins 30° north of it, heading north-west
+_START_YAW = GAP_RAD / 2 + math.pi / 2  # the notch is in the east: the sweep begins 30° north of it, heading north-west
 
 
 def metres_per_degree(lat_deg: float) -> tuple[float, float]:
@@ -146,14 +144,14 @@ class Lap:
         piece = bisect.bisect_right(self._begins_m, station_m) - 1
         return _along(self._begin_poses[piece], station_m - self._begins_m[piece])
 
-    def nearest_m(self, x_m: float, y_m: float, *, guess_m: float | None = None) -> float:
-        """The station nearest to a point. With a guess only 10 m around it are looked at, so that the notch's two
-        straights are not taken for each other."""
+    def nearest_m(self, x_m: float, y_m: float, *, near_m: float | None = None) -> float:
+        """The station nearest to a point. With `near_m` only 10 m around it are searched, so that the notch's two
+        straights are not confused."""
         count = len(self.stations_m)
-        if guess_m is None:
+        if near_m is None:
             index = int(np.argmin((self._x - x_m) ** 2 + (self._y - y_m) ** 2))
         else:
-            middle = round(guess_m / STEP_M)
+            middle = round(near_m / STEP_M)
             window = np.arange(middle - 20, middle + 21) % count
             near = (self._x[window] - x_m) ** 2 + (self._y[window] - y_m) ** 2
             index = int(window[int(np.argmin(near))])

@@ -35,12 +35,12 @@ RANGE_MAX_M = 81.0
 NOISE_M = 0.008
 RESOLUTION_M = 0.01
 INVALID_SHARE = 0.004  # of the beams: dazzled, or too little light back
-CONE_RAD = 0.1  # the distance estimator looks this far to either side
+CONE_RAD = 0.1  # the distance estimator covers this angle to either side
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Beams:
-    """One scan: beam i stands at angle_min + i · increment, counter-clockwise, 0 ahead [rad]."""
+    """One scan: beam i is at angle_min + i · increment, counter-clockwise, 0 ahead [rad]."""
 
     angle_min_rad: float
     angle_max_rad: float

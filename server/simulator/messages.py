@@ -74,9 +74,9 @@ class Writer:
     def number(self, published: Published, at_s: float, value: float) -> Message:
         return self._message(published, at_s, {"data": value})
 
-    def mode(self, at_s: float, word: str) -> Message:
-        """Who drives, in a word."""
-        return self._message(MODE, at_s, {"data": word})
+    def mode(self, at_s: float, mode: str) -> Message:
+        """The driving mode."""
+        return self._message(MODE, at_s, {"data": mode})
 
     def fix(self, at_s: float, stamp_s: float, lat_deg: float, lon_deg: float, alt_m: float) -> Message:
         """A NavSatFix as the real car's driver marks it: a fix, with a covariance of zeros called type 2."""

@@ -45,7 +45,7 @@ class Running:
 
 
 class Scenarios:
-    """Starts and ends scenarios as time goes on. Several may run at once; each at most once."""
+    """Starts and ends scenarios as time passes. Several may run at once; each at most once."""
 
     def __init__(self, plan: Iterable[Planned] = ()) -> None:
         self._waiting = sorted(plan, key=lambda planned: planned.after_s)
@@ -104,7 +104,7 @@ class Scenarios:
         return laid_over((message,), effects, signal) if effects else [message]
 
     def state(self, now_s: float) -> list[dict[str, Any]]:
-        """Every scenario there is, for a person or a program to choose from, and how it stands."""
+        """Every scenario there is, for a person or a program to choose from, and its state."""
         rows = []
         for scenario in SCENARIOS.values():
             running = self._running.get(scenario.name)
@@ -125,7 +125,7 @@ class Scenarios:
 
 
 class Stage:
-    """What the scenarios put around the car: the obstacle across its way, and the end of a hurry.
+    """Objects that the scenarios put around the car: the obstacle across its way, and the end of a hurry.
 
     Of one car. `blocked_at_m`: the station on the lap where an obstacle stands; None: the way is free.
     """

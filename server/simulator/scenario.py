@@ -1,4 +1,4 @@
-"""What a scenario is: a fault, or a person's doing, that can be asked for by name."""
+"""A scenario: a fault, or an action of a person, that can be started by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every fault that can be asked for by name: what it is, how long it lasts, and which alarm it should raise."""
+"""Every fault that can be started by name: what it is, how long it lasts, and which alarm it should raise."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _SCENARIOS = (
         sentence="The car drives 12 m/s for some seconds, as soon as the lap allows it (at most half a minute).",
         duration_s=60.0,  # at most; it ends by itself after some seconds above the limit
         alarm="speed above limit",
-        # over a recording, where only the sent speed is another: nobody ordered it, nobody keeps distance for it, and
+        # over a recording, where only the sent speed differs: nobody ordered it, nobody keeps distance for it, and
         # the position does not follow it
         consequences=("command without response", "nearest object", "speed sources"),
         effect=Speeding,
@@ -104,7 +104,7 @@ _SCENARIOS = (
         sentence="The position drifts 60 m aside while the car drives; a phone in the car stays correct.",
         duration_s=90.0,
         alarm="phone and car disagree",
-        # 60 m lies beyond the gate of the worst phone fix that is used (50 m)
+        # 60 m is beyond the gate of the worst phone fix that is used (50 m)
         effect=lambda: GpsOffset(pace_mps=2.0, most_m=60.0, during="moving", back_mps=2.0),
     ),
     Scenario(
@@ -158,7 +158,7 @@ _SCENARIOS = (
         sentence="The car keeps driving, but its positions repeat one place, with new stamps.",
         duration_s=10.0,
         alarm="signal frozen: position",
-        consequences=("phone and car disagree", "GPS drift at standstill"),  # it ends with a leap
+        consequences=("phone and car disagree", "GPS drift at standstill"),  # it ends with a jump
         effect=faults.FrozenPosition,
     ),
     Scenario(

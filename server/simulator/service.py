@@ -72,7 +72,7 @@ class CarService:
         self._driving: asyncio.Task[None] | None = None
 
     async def start(self) -> int:
-        """Listens and drives off; answers the port. Raises CannotListen with one sentence for a person."""
+        """Start to listen and to drive; return the port. Raises CannotListen with one sentence for a person."""
         port = await self.bridge.start(self._host, self._port)
         self._driving = asyncio.create_task(self._drive())
         return port
@@ -103,7 +103,7 @@ class CarService:
         self.car.stop(None if name is None else find(name).name)
 
     def state(self) -> dict[str, Any]:
-        """Every scenario and how it stands, and the truth about the car."""
+        """Every scenario with its state, and the truth about the car."""
         return {**self.car.state(), "rate": self._rate, "clients": self.bridge.clients}
 
     async def _drive(self) -> None:
@@ -162,7 +162,7 @@ class CarService:
         kind = type.rpartition("/")[2]
         twist = message.get("twist") if kind == "TwistStamped" else message if kind == "Twist" else None
         if isinstance(twist, dict):
-            self.car.obey(twist)
+            self.car.follow(twist)
 
     def _scenario_called(self, args: Json) -> Json:
         name, stop, duration_s = args.get("name", ""), args.get("stop", False), args.get("duration_s")
@@ -189,6 +189,6 @@ def _said(name: str, stop: bool) -> str:
 async def serve_car(
     host: str = "127.0.0.1", port: int = 0, *, seed: int = 0, scenarios: Iterable[str | Planned] = ()
 ) -> tuple[CarService, int]:
-    """A simulated car that drives already, and its port. Raises CannotListen and what CarService raises."""
+    """A simulated car that is driving, and its port. Raises CannotListen and what CarService raises."""
     service = CarService(host=host, port=port, seed=seed, scenarios=scenarios)
     return service, await service.start()

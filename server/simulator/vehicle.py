@@ -19,7 +19,7 @@ TYRE_RATE_RADPS = 0.5
 ACCELERATION_MPS2 = 1.5
 BRAKING_MPS2 = 4.6
 JERK_MPS3 = 8.0
-SPEED_GAIN = 2.5  # 1/s: acceleration asked for a metre per second of difference
+SPEED_GAIN = 2.5  # 1/s: requested acceleration per metre per second of difference
 LEAST_STOPPING_MPS2 = 0.5  # so that a stop ends in a stop and not in an ever slower crawl
 
 HOLD_PERCENT = 40 * 100 / 255  # brake held at standstill, as on the real drive
@@ -55,7 +55,7 @@ class MotionCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
-    """How the car stands and moves: base_link in the lap's metres, yaw counter-clockwise from east."""
+    """The pose and motion of the car: base_link in the lap's metres, yaw counter-clockwise from east."""
 
     x_m: float
     y_m: float
@@ -125,12 +125,12 @@ STANDING = MotionCommand(speed_mps=0.0, tyre_rad=0.0)
 
 
 class Stack:
-    """The last command on the command topic, whoever sent it, and what of it reaches the wheels."""
+    """The last command on the command topic, whoever sent it, and the part of it that the car carries out."""
 
     def __init__(self, *, has_stopper: bool = True) -> None:
         self.has_stopper = has_stopper
         self._command = STANDING
-        self._heard_s = -math.inf
+        self._received_s = -math.inf
         self._distance_m = math.inf
         self.hand: MotionCommand | None = None  # of a person at wheel and brake, before whom everything gives way
 
@@ -139,9 +139,9 @@ class Stack:
         """The tyre angle of the last command: what a message without one leaves as it is."""
         return self._command.tyre_rad
 
-    def hear(self, command: MotionCommand, now_s: float) -> None:
-        """A message on the command topic: the last one wins, and nobody is asked who he is."""
-        self._command, self._heard_s = command, now_s
+    def receive(self, command: MotionCommand, now_s: float) -> None:
+        """Take a message of the command topic, whoever sent it; the last one counts."""
+        self._command, self._received_s = command, now_s
 
     def see(self, distance_m: float) -> None:
         """What the distance estimator reports of the nearest object ahead. Until then the way is free."""
@@ -151,7 +151,7 @@ class Stack:
         """What the vehicle receives now: the command, or zero speed with its tyre angle where the stopper steps in."""
         if self.hand is not None:
             return self.hand
-        is_silent = now_s - self._heard_s > DEAD_MAN_S
+        is_silent = now_s - self._received_s > DEAD_MAN_S
         if self.has_stopper and (is_silent or self._distance_m <= STANDOFF_M):
             return MotionCommand(speed_mps=0.0, tyre_rad=self._command.tyre_rad)
         return self._command

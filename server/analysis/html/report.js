@@ -4,14 +4,14 @@
 import { mountChoices, mountLanes } from './report/alarms.js';
 import { colours, must } from './report/elements.js';
 import { mountOverview } from './report/overview.js';
-import { mountPanel, mountRibbons } from './report/plots.js';
+import { mountPanel, mountCheckTimelines } from './report/plots.js';
 import { mountTrack } from './report/track.js';
 import { data, followers, go, repaints, show, timeAt, timeline, view, xOf } from './report/view.js';
 
 await Promise.allSettled([document.fonts.load('14px "catgraph numerals"'), document.fonts.load('700 14px "catgraph numerals"')]);
 mountLanes();
 data.panels.forEach(mountPanel);
-mountRibbons();
+mountCheckTimelines();
 mountTrack();
 mountOverview();
 mountChoices();

@@ -23,7 +23,7 @@ class Profile:
     title: str
     steering: SteeringUnit = "unknown"  # what torque.z of the steering topic means; its ratio is a threshold
     units: Mapping[str, str] = field(default_factory=dict)  # signal → name of the unit that a car of this kind has
-    modes: Mapping[str, Mode] = field(default_factory=dict)  # words and numbers of its mode topic, in lower case
+    modes: Mapping[str, Mode] = field(default_factory=dict)  # names and numbers of its mode topic, in lower case
     limits: Mapping[str, float] = field(default_factory=dict)  # thresholds that differ from the checks' own defaults
     has: tuple[str, ...] = ()  # topics that a car of this kind has, whatever the case of their letters
     lacks: tuple[str, ...] = ()
@@ -68,7 +68,7 @@ def _read(name: str, body: Mapping[str, Any]) -> Profile:
         title=body["title"],
         steering=body.get("steering", "unknown"),
         units=units,
-        modes={word.casefold(): mode for mode in get_args(Mode) for word in body.get("mode", {}).get(mode, ())},
+        modes={name.casefold(): mode for mode in get_args(Mode) for name in body.get("mode", {}).get(mode, ())},
         limits=limits,
         has=tuple(match.get("has", ())),
         lacks=tuple(match.get("lacks", ())),

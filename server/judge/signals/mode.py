@@ -1,4 +1,4 @@
-"""Who drives: a Bool, a number, a word, or the report of Autoware."""
+"""The driving mode: a Bool, a number, a string, or the report of Autoware."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from monitor.values import DriveMode, Mode
 from server.judge.message_fields import Rejected, text
 from server.judge.topic import Topic
 
-# ControlModeReport.msg of Autoware. Where a hand drives a part of the car, nobody can say that it drives itself; the
-# car that is not ready, or has no command, does not say who drives.
+# ControlModeReport.msg of Autoware. With one part driven by hand the car does not drive itself for certain; a car
+# that is not ready, or has no command, does not report who drives.
 AUTOWARE: Mapping[int, tuple[str, Mode]] = {
     0: ("no command", "unknown"),
     1: ("autonomous", "autonomous"),
@@ -21,12 +21,12 @@ AUTOWARE: Mapping[int, tuple[str, Mode]] = {
     6: ("not ready", "unknown"),
 }
 
-# Whole words, whatever the case of their letters; a kind of car may have more of them in its profile.
-WORDS: Mapping[str, Mode] = {
+# Whole values, in any case; the profile of a kind of car may add more.
+MODES: Mapping[str, Mode] = {
     **dict.fromkeys(("autonomous", "auto", "automatic", "autopilot"), "autonomous"),
     **dict.fromkeys(("manual", "driver", "human", "disengaged"), "manual"),
 }
-LONGEST_WORD = 40
+LONGEST_NAME = 40
 
 
 def of_bool(message: Any) -> DriveMode:
@@ -43,8 +43,8 @@ def of_number(message: Any) -> DriveMode:
     return DriveMode(mode="unknown", text=str(number), number=number)
 
 
-def of_word(message: Any) -> DriveMode:
-    """A word; an empty one is a word that says nothing. Without rosapi the type is not known: a topic that is read by
+def of_string(message: Any) -> DriveMode:
+    """A string; an empty one is an unknown mode. Without rosapi the type is not known: a topic that is read by
     its name may be any of these."""
     value = message.get("data") if isinstance(message, Mapping) else None
     if isinstance(value, bool):
@@ -54,14 +54,14 @@ def of_word(message: Any) -> DriveMode:
     if isinstance(message, Mapping) and "data" not in message and "mode" in message:
         return of_autoware(message)
     if not isinstance(value, str):
-        raise Rejected("data has no word")
-    said = text(message, "data").strip()[:LONGEST_WORD] or "no word"
-    return DriveMode(mode=WORDS.get(said.casefold(), "unknown"), text=said)
+        raise Rejected("data is not a string")
+    name = text(message, "data").strip()[:LONGEST_NAME] or "empty"
+    return DriveMode(mode=MODES.get(name.casefold(), "unknown"), text=name)
 
 
 def of_autoware(message: Any) -> DriveMode:
-    said, mode = AUTOWARE.get(number := _byte(message, "mode"), (f"mode {number}", "unknown"))
-    return DriveMode(mode=mode, text=said)
+    name, mode = AUTOWARE.get(number := _byte(message, "mode"), (f"mode {number}", "unknown"))
+    return DriveMode(mode=mode, text=name)
 
 
 def _byte(message: Any, name: str) -> int:
@@ -78,7 +78,7 @@ TOPICS = (
         signal="mode",
         names=("/catvehicle/control_mode", "/vehicle/status/control_mode"),
         types={
-            "std_msgs/String": of_word,
+            "std_msgs/String": of_string,
             "std_msgs/Bool": of_bool,
             "std_msgs/UInt8": of_number,
             **dict.fromkeys(REPORTS, of_autoware),

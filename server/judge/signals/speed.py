@@ -18,7 +18,7 @@ MOVES_MPS = 1.0  # below it what is measured sideways may be noise
 
 def twist(message: Any) -> Twist:
     """Speed of a geometry_msgs/Twist in the frame of the car, in the unit of the topic, which `server.judge.units`
-    decides. What goes sideways as no car can is east and north: then the way made is the speed."""
+    decides. A sideways part that no car can have means east and north: then the norm is the speed."""
     yaw_rate = number(message, "angular", "z") if isinstance(message, Mapping) and "angular" in message else math.nan
     x, y = finite(message, "linear", "x"), _sideways(message)
     way = math.hypot(x, y)

@@ -1,1 +1,1 @@
-"""Which topic of a car carries each signal: the candidates, the evidence, the choice, and what is asked."""
+"""Which topic of a car carries each signal: the candidates, the evidence, the choice, and the questions."""

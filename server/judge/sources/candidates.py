@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from server.judge.frame_words import looks
+from server.judge.frame_words import direction_by_name
 from server.judge.signals import TOPICS
 from server.judge.sources import namespaces
 from server.judge.sources.evidence import Evidence
@@ -100,7 +100,7 @@ def _pool(
 
 def _likeliest(one: Candidate) -> tuple[bool, bool, bool, int, int, str]:
     rank = 0 if one.rank is None else one.rank
-    return (not one.is_readable, not one.is_published, one.rank is None, looks(one.topic), rank, one.topic)
+    return (not one.is_readable, not one.is_published, one.rank is None, direction_by_name(one.topic), rank, one.topic)
 
 
 def to_compare(offered: Mapping[str, str], picked: Mapping[str, str]) -> dict[str, str]:
@@ -177,33 +177,33 @@ def named_first(found: Collection[Candidate]) -> Candidate | None:
 
 
 def what_is_known(one: Candidate, signal: str, evidence: Evidence) -> str:
-    """What speaks for a candidate and against it, in few words."""
-    known, words = evidence.of(one.topic), list[str]()
+    """The reasons for and against a candidate, as a short list."""
+    known, facts = evidence.of(one.topic), list[str]()
     if not one.is_readable:
-        words.append("of a type that cannot be read")
+        facts.append("of a type that cannot be read")
     if not one.is_published:
-        words.append(NO_PUBLISHER)
+        facts.append(NO_PUBLISHER)
     if one.topic in evidence.silent:
-        words.append("no message")
+        facts.append("no message")
     if signal == "scan":
         ahead = known.looks_ahead
         if ahead is not None:
-            words.append("looks ahead by TF" if ahead else "looks elsewhere by TF")
-        elif looks(f"{one.topic} {known.frame or ''}"):
-            words.append(
+            facts.append("looks ahead by TF" if ahead else "looks elsewhere by TF")
+        elif direction_by_name(f"{one.topic} {known.frame or ''}"):
+            facts.append(
                 "its name suggests ahead"
-                if looks(f"{one.topic} {known.frame or ''}") < 0
+                if direction_by_name(f"{one.topic} {known.frame or ''}") < 0
                 else "its name suggests another direction"
             )
     if signal in ("speed", "odometry") and known.is_twist_empty:
-        words.append(known.why_empty)
+        facts.append(known.why_empty)
     if signal == "speed" and known.is_earth_fixed:
-        words.append("its velocity is east and north")
+        facts.append("its velocity is east and north")
     if one.is_named:
-        words.append(USUAL_NAME)
+        facts.append(USUAL_NAME)
     if known.frame:
-        words.append(f"frame {known.frame}")
-    return ", ".join(words)
+        facts.append(f"frame {known.frame}")
+    return ", ".join(facts)
 
 
 def counted(count: int, what: str) -> str:
@@ -219,19 +219,19 @@ def title(signal: str, among: Sequence[Candidate]) -> str:
 
 def question(signal: str, among: Sequence[Candidate], known: Mapping[str, str], cars: Sequence[str] = ()) -> Question:
     """The question which of the candidates carries a signal. `known`: topic → what is known of it; `cars`: the
-    namespaces of several cars, of which one is asked for."""
+    namespaces of several cars, one of which is to be chosen."""
     if cars:
         last = f"{len(cars) - 3} more" if len(cars) > 4 else cars[-1]
         named = f"{', '.join(cars[: 3 if len(cars) > 4 else len(cars) - 1])} and {last}"
-        words = f"{counted(len(cars), 'cars')}: {named}: which is this?"
+        text = f"{counted(len(cars), 'cars')}: {named}: which is this?"
     elif signal == "speed" and title(signal, among).endswith("odometries"):
-        words = f"{title(signal, among)}: which is the car's speed?"
+        text = f"{title(signal, among)}: which is the car's speed?"
     else:
-        words = f"{title(signal, among)}: {_KINDS.get(signal, _OTHER)[1]}"
+        text = f"{title(signal, among)}: {_KINDS.get(signal, _OTHER)[1]}"
     return {
         "signal": signal,
         "kind": "source",
-        "words": words,
+        "words": text,
         "options": [
             {"value": one.topic, "label": one.topic, "why": known.get(one.topic, "")} for one in among[:MOST_OPTIONS]
         ],

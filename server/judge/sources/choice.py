@@ -1,4 +1,4 @@
-"""Chooses the topic of each signal by evidence, with a reason; what evidence does not decide is asked. Pure.
+"""Chooses the topic of each signal by evidence, with a reason; what evidence does not decide becomes a question. Pure.
 
 In this order: the operator's pick; a type that can be read; a publisher; the namespace of one car; what the messages
 show; a usual name; the only topic of its type.
@@ -44,7 +44,7 @@ class Choice:
     """Which topic carries each signal of a car, and what is not decided. All by signal."""
 
     sources: Mapping[str, Source]
-    undecided: Mapping[str, str]  # why no topic is taken though there are some, in few words
+    undecided: Mapping[str, str]  # a short reason why no topic is taken though there are some
     refused: frozenset[str] = frozenset()  # those of them where there is nothing to choose from
     reasons: Mapping[str, Mapping[str, str]]  # topic → what is known of it
     questions: Sequence[Question] = ()
@@ -58,7 +58,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Open:
-    """No topic is taken. `among`: those that are asked for; none: there is nothing to ask. `watch`: those that may yet
+    """No topic is taken. `among`: the options of the question; empty: no question. `watch`: those that may yet
     be filled."""
 
     why: str
@@ -101,7 +101,7 @@ class _Chooser:
         self._car = self._only_car(picked.values())
         self._is_car_assumed = self._car is None and not any(namespace_of(t, self._cars) for t in picked.values())
         if self._is_car_assumed:
-            self._car = self._only_car(in_use.values())  # another car came: it is asked, and this one stays meanwhile
+            self._car = self._only_car(in_use.values())  # another car appeared: this one stays until the answer
 
     def _only_car(self, topics: Collection[str]) -> str | None:
         found = {car for topic in topics if (car := namespace_of(topic, self._cars)) is not None}
@@ -190,7 +190,7 @@ class _Chooser:
         return _Open(why=f"{_lower(candidates.title(signal, found))}, none chosen", among=found)
 
     def _speed(self, found: list[Candidate]) -> Source | _Open:
-        """What is zero while the car moves is taken only if nothing but a receiver says so, and there is no other."""
+        """Take what is zero while the car moves only if just a receiver shows the motion and there is no other."""
         filled = [one for one in found if not self._evidence.of(one.topic).is_twist_empty]
         undoubted = [one for one in found if not self._evidence.of(one.topic).is_empty_by_odometry]
         among = self._speed_among(filled, found) or self._speed_among(undoubted, found)
@@ -285,22 +285,22 @@ class _Chooser:
                         found[signal] = self._read(one.source(signal, why=f"{PICKED} for {other}"))
 
     def _questions(self, opened: Mapping[str, _Open]) -> tuple[Question, ...]:
-        asked: list[Question] = []
-        is_asked: set[str] = set()  # topics of the questions so far
+        questions: list[Question] = []
+        covered: set[str] = set()  # topics of the questions so far
         if self._cars and self._is_car_assumed:
             return (self._question_of_cars(),)
         for signal in sorted(opened, key=lambda name: candidates.ORDER.index(name) if name in candidates.ORDER else 99):
             among = opened[signal].among
             if not among:
                 continue
-            if signal == "odometry" and {one.topic for one in among} <= is_asked:
+            if signal == "odometry" and {one.topic for one in among} <= covered:
                 continue  # the answer for the speed answers this too
-            is_asked |= {one.topic for one in among}
-            asked.append(candidates.question(signal, among, self._known(signal, among)))
-        return tuple(asked)
+            covered |= {one.topic for one in among}
+            questions.append(candidates.question(signal, among, self._known(signal, among)))
+        return tuple(questions)
 
     def _question_of_cars(self) -> Question:
-        """Asked as the source of one signal; the namespace of the answer decides for the others."""
+        """The question for the source of one signal; the namespace of the answer decides for the others."""
         by_signal = {
             signal: [one for one in pool if one.is_readable and namespace_of(one.topic, self._cars)]
             for signal, pool in self._pools.items()
@@ -314,7 +314,7 @@ class _Chooser:
         return {one.topic: what_is_known(one, signal, self._evidence) for one in among[: candidates.MOST_OPTIONS]}
 
     def _reasons(self, sources: Mapping[str, Source]) -> dict[str, dict[str, str]]:
-        """What speaks for and against each candidate."""
+        """The reasons for and against each candidate."""
         found: dict[str, dict[str, str]] = {}
         for signal, pool in self._pools.items():
             rows = found[signal] = {}
@@ -325,7 +325,7 @@ class _Chooser:
                     known = f"{OTHER_CAR}: {car}" if self._car else f"of the car {car}"
                 source = sources.get(signal)
                 if source is not None and source.topic == one.topic and source.why:
-                    rest = [words for words in known.split(", ") if words != USUAL_NAME or source.why != BY_NAME]
+                    rest = [fact for fact in known.split(", ") if fact != USUAL_NAME or source.why != BY_NAME]
                     known = ", ".join(dict.fromkeys([source.why, *rest])).rstrip(", ")
                 rows[one.topic] = known
         return found

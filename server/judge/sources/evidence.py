@@ -142,7 +142,7 @@ class Evidence:
 
     def _twist(self, known: TopicEvidence, twist: Any, at_s: float) -> tuple[float, float]:
         x, y = number(twist, "linear", "x"), number(twist, "linear", "y")
-        known.has_twist |= x != 0.0 or y != 0.0  # NaN too: it is filled, and says that it is not known
+        known.has_twist |= x != 0.0 or y != 0.0  # NaN too: it is filled, as unknown
         known.velocity = (at_s, x, 0.0 if math.isnan(y) else y)
         known.is_filled |= math.hypot(x, known.velocity[2]) > 0.0
         known.stated.state(math.hypot(x, known.velocity[2]), at_s)

@@ -108,7 +108,7 @@ class Motion:
 
 
 def is_lost(pose: Mapping[str, Any]) -> bool:
-    """Whether the covariance of a pose (geometry_msgs/PoseWithCovariance) says that nothing is known of it."""
+    """Whether the covariance of a pose (geometry_msgs/PoseWithCovariance) marks it as unknown."""
     return _first(pose.get("covariance")) > LOST_M2
 
 

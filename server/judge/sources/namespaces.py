@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Mapping
 
-from server.judge.frame_words import AHEAD_WORDS, ELSEWHERE_WORDS, words
+from server.judge.frame_words import AHEAD_WORDS, ELSEWHERE_WORDS, name_parts
 
-# Words of the prefixes that sensors, estimators and parts of one car have.
+# Parts of the prefixes that sensors, estimators and components of one car have.
 PART_WORDS = (
     AHEAD_WORDS
     | ELSEWHERE_WORDS
@@ -45,7 +45,7 @@ def competing(topics: Mapping[str, Collection[str]]) -> tuple[str, ...]:
         for topic in group:
             parts = topic.strip("/").split("/")[:MOST_LEVELS]
             for level in range(1, len(parts)):
-                is_part = parts[level - 1].lower() == OWN or not PART_WORDS.isdisjoint(words(parts[level - 1]))
+                is_part = parts[level - 1].lower() == OWN or not PART_WORDS.isdisjoint(name_parts(parts[level - 1]))
                 if not is_part:
                     found[signal, "/".join(parts[level:])].add("/" + "/".join(parts[:level]))
     rivals: set[str] = set()

@@ -1,4 +1,4 @@
-"""Looks into a recording before it is judged: what its messages show of topics that compete for a signal."""
+"""Reads parts of a recording before it is judged, as evidence for topics that compete for a signal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Protocol
 from server.judge.message import Json
 from server.judge.sources.evidence import Evidence
 
-# Where it looks, as parts of the length: a car may stand still at the beginning, for minutes.
+# Where it reads, as parts of the length: a car may stand still at the beginning, for minutes.
 PLACES = (0.0, 0.03, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
 WINDOW_S = 15.0
 MOST_ROWS = 6000  # of all topics, in one place
@@ -62,7 +62,7 @@ def _look(source: Rows, at_s: float, names: Mapping[str, str], wanted: frozenset
 
 
 def _rows(source: Rows, at_s: float, wanted: frozenset[str]) -> Iterator[Row]:
-    """As far as they can be read: whoever judges the recording comes to the same place, and names what is wrong."""
+    """Messages up to the first unreadable one; the run that judges the recording reports the error."""
     rows = source.rows(at_s, wanted)
     while True:
         try:

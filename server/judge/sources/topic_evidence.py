@@ -107,7 +107,7 @@ class TopicEvidence:
     velocity: tuple[float, float, float] | None = None  # when, x and y [m/s] of the newest message
     place: tuple[float, float, float] | None = None  # when, latitude and longitude [degrees]
     course: tuple[float, float] | None = None  # when, direction of the way made [rad from east]
-    looks_ahead: bool | None = None  # of a laser, by the transforms of the car; None: they do not say
+    looks_ahead: bool | None = None  # of a laser, by the transforms of the car; None: they do not give it
     picture: Picture | None = None  # of its newest scan, at most every PICTURE_EVERY_S
 
     @property
@@ -122,7 +122,7 @@ class TopicEvidence:
 
     @property
     def why_empty(self) -> str:
-        """In words, of what `is_twist_empty`."""
+        """The reason for `is_twist_empty`, as text."""
         what = "its value" if self.kind in FLOATS else "its twist"
         beside = self.idle_beside.get(ODOMETRY) or next(iter(self.idle_beside.values()), "")
         return f"{what} is zero while {'its pose' if self.has_moved else beside} moves"

@@ -320,7 +320,7 @@ def _out(mailer: Mailer, letter: Letter) -> MailOut:
         subject=order.subject,
         too_large=order.too_large,
         state=letter.state,
-        said=letter.said,
+        said=letter.detail,
         is_ready=letter.is_ready,
         share=mailer.share_of(letter),
         way=letter.way,
@@ -332,13 +332,13 @@ def _out(mailer: Mailer, letter: Letter) -> MailOut:
                 parts=mail.parts,
                 message_id=mail.message_id,
                 state=mail.state,
-                said=mail.said,
+                said=mail.detail,
                 attempts=mail.attempts,
                 next_ms=mail.next_ms if mail.state == "queued" else None,
                 done_ms=mail.done_ms,
                 size_bytes=mail.size_bytes,
                 recipients=[
-                    RecipientOut(address=address.parse(one.address).shown, state=one.state, said=one.said)
+                    RecipientOut(address=address.parse(one.address).shown, state=one.state, said=one.detail)
                     for one in mail.recipients
                 ],
             )

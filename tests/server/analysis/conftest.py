@@ -63,7 +63,7 @@ def check(capsys: pytest.CaptureFixture[str]) -> Checking:
             code = main(["check", *map(str, arguments)])
         except SystemExit as end:
             code = int(end.code or 0)
-        said = capsys.readouterr()
-        return Ending(code=code, out=said.out, err=said.err)
+        printed = capsys.readouterr()
+        return Ending(code=code, out=printed.out, err=printed.err)
 
     return run

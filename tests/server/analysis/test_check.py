@@ -20,7 +20,7 @@ from tests.server.analysis.conftest import Checking, recorded
 from tests.server.recording.bags import Drive, write_ros1
 from tests.tree import PROJECT
 
-# Faults for which the drive has no occasion: the car does not stand at 8 s, and no phone rides along.
+# Faults for which the drive has no occasion: the car does not stand at 8 s, and no phone is in it.
 NOT_HERE = {"gps-drift", "phone-mismatch", "mode-flaps"}
 
 
@@ -49,7 +49,7 @@ def test_an_alarm_that_is_not_critical_is_exit_0(check: Checking, healthy: Path)
 @pytest.mark.field
 @pytest.mark.parametrize("name", [s.name for s in SCENARIOS.values() if s.effect is not None or s.bridge is not None])
 def test_every_fault_of_messages_can_be_laid_over_a_recording(check: Checking, healthy: Path, name: str) -> None:
-    """And what it does is told, or that this recording has nothing to do it to."""
+    """The report shows its effect, or states that this recording has nothing that it changes."""
     ending = check(healthy, "--inject", f"{name}@8", "--json", "-")
     assert ending.code in (0, 1), ending.err
     (laid,) = ending.json["injected"]
@@ -89,7 +89,7 @@ def test_what_cannot_be_done_is_exit_2_and_one_sentence(
 ) -> None:
     ending = check(healthy, *arguments)
     assert ending.code == 2
-    assert ending.out == "", "it is said before the work"
+    assert ending.out == "", "it is refused before the work"
     assert sentence in ending.err
     assert "Traceback" not in ending.err
 
@@ -116,7 +116,7 @@ def test_a_recording_that_breaks_off_is_judged_up_to_there(check: Checking, tmp_
     raw[middle : middle + 64] = bytes(64)  # the index stays in place
     bag.write_bytes(raw)
     ending = check(bag)
-    assert ending.code == 2  # it cannot be told what the rest holds
+    assert ending.code == 2  # what the rest holds is not known
     assert "Aborted at" in ending.out
     assert "Speed above limit" in ending.out
     assert "cut.bag is damaged" in ending.err
@@ -139,7 +139,7 @@ def with_checksums(bag: Path, path: Path) -> Path:
 
 
 def test_a_damaged_part_is_left_out_and_said(check: Checking, healthy: Path, tmp_path: Path) -> None:
-    """What is whole is judged; whether the rest held an alarm cannot be told."""
+    """What is whole is judged; whether the rest held an alarm is not known."""
     hurt = with_checksums(healthy, tmp_path / "hurt.mcap")
     with hurt.open("rb") as file:
         summary = make_reader(file).get_summary()
@@ -174,12 +174,12 @@ def test_it_tells_when_the_car_would_have_been_slowed(check: Checking, healthy: 
     rules.write_text("version = 1\n[limits.slow_down]\non_obstacle = 1\non_obstacle_after_s = 0.5\n")
     page, found, until = tmp_path / "page.html", tmp_path / "found.json", ("--duration", "16")
     near = ("--inject", "near-object@10+5", *until)
-    said = check(healthy, *near, "--settings", rules, "--json", found, "--html", page).out
+    output = check(healthy, *near, "--settings", rules, "--json", found, "--html", page).out
     (slowed,) = orjson.loads(found.read_bytes())["slow_downs"]
     assert slowed["trigger"] == "obstacle"
     assert slowed["countdown_s"] == pytest.approx(10.5, abs=0.3)
     assert slowed["at_s"] == pytest.approx(slowed["countdown_s"] + 2.0)
-    assert re.search(r"Would have slowed the car.*\n +12\.\d s +Obstacle within the stopping distance", said)
+    assert re.search(r"Would have slowed the car.*\n +12\.\d s +Obstacle within the stopping distance", output)
     assert "Would have slowed the car" in page.read_text()
     short = check(healthy, "--inject", "near-object@10+1.5", *until, "--settings", rules, "--json", "-")
     assert short.json["slow_downs"] == []  # gone before the count-down ended

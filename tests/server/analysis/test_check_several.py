@@ -39,16 +39,16 @@ def test_one_that_cannot_be_read_is_named_and_the_others_are_checked(
     broken.write_bytes(b"#ROSBAG V2.0\n" + b"\0" * 40)
     files = [speeding, broken, healthy]
     ending = check(*files, "--json", "-")
-    assert ending.code == CANNOT, "whether the broken one held a critical alarm cannot be told"
+    assert ending.code == CANNOT, "whether the broken one held a critical alarm is not known"
     assert [one["recording"]["files"] for one in ending.json] == [[str(speeding)], [str(healthy)]]
     assert [alarm["alarm"] for alarm in ending.json[0]["alarms"]] == ["speed_limit"]
     assert ending.err.count("catgraph check:") == 1
     assert str(broken) in ending.err
     alone = check(speeding, "--json", "-")
     assert ending.json[0]["transitions"] == alone.json["transitions"]
-    said = check(healthy, speeding, "--duration", "15")
-    assert said.code == CRITICAL
-    assert said.out.index(f"Checked {healthy}") < said.out.index(f"Checked {speeding}")
+    ending = check(healthy, speeding, "--duration", "15")
+    assert ending.code == CRITICAL
+    assert ending.out.index(f"Checked {healthy}") < ending.out.index(f"Checked {speeding}")
     assert check(healthy, healthy, "--duration", "5").code == NO_CRITICAL
 
 

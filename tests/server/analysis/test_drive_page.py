@@ -1,4 +1,4 @@
-"""The page of one drive: what was told and done, from the recording's own log."""
+"""The page of one drive: what was announced and done, from the recording's own log."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_alarms_are_those_that_were_told(tmp_path: Path) -> None:
     logged = found(made(tmp_path, STORY))
     speed, obstacle = logged.episodes
     assert (speed.raised_s, speed.cleared_s, speed.trip_text) == (2.0, 9.0, "3.4 m/s, limit 3.0 m/s")
-    assert [(said.at_s, said.change) for said in speed.announcements] == [(2.0, "raised"), (7.0, "recaused")]
+    assert [(one.at_s, one.change) for one in speed.announcements] == [(2.0, "raised"), (7.0, "recaused")]
     assert speed.suppressed == ((5.0, 6.0),)
     assert (obstacle.cleared_s, obstacle.until_s, str(obstacle.priority)) == (None, 20.0, "critical")
     assert (logged.load.announced, logged.load.most_in_10_min) == (3, 3)
@@ -114,7 +114,7 @@ def test_a_recording_of_others_is_judged_as_by_catgraph_check(tmp_path: Path) ->
         assert read_recorded_log(recording) is None
     text, _ = page(source, tmp_path)
     assert "catgraph check" in text
-    assert "As they were told" not in text
+    assert "Original alarms" not in text
 
 
 def test_what_is_no_event_and_too_many_of_them_spoil_nothing(tmp_path: Path) -> None:

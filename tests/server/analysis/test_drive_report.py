@@ -49,8 +49,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_page_shows_all_of_it(folder: Path) -> None:
     text = re.sub(r"<style>.*?</style>|<script.*?</script>", "", (folder / "page.html").read_text(), flags=re.S)
-    words = html.unescape(re.sub(r"<[^>]+>", " ", text))
-    for said in (
+    plain = html.unescape(re.sub(r"<[^>]+>", " ", text))
+    for expected in (
         *(
             "Drive report",
             "Intact: 3 records",
@@ -70,7 +70,7 @@ def test_the_page_shows_all_of_it(folder: Path) -> None:
         *("22:13:40", "12.5 m/s, limit 11.0 m/s", "2.1 s", "22:13:53", "22:14:40", "Change to manual, by the driver"),
         *("22:14:55", "The car slows: 10.0 to 8.2 m/s.", "1.4 s", "in 1 gap", "alarms then: signal_slow.scan"),
     ):
-        assert said in words, said
+        assert expected in plain, expected
     assert "data:image/png;base64," in text
     assert "data:audio/webm;base64," in text
 
@@ -119,14 +119,14 @@ def test_a_planned_stop_is_in_it_with_its_times_its_reason_and_who(tmp_path: Pat
         write_report_csv(recording, tmp_path / "report.csv", name="drive")
     text = (tmp_path / "page.html").read_text()
     assert EVIL not in text
-    words = " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
+    plain = " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
     ended = "The planned stop ended. By M. R. (Tablet)."
-    for said in (
+    for expected in (
         f"22:13:30 In the workshop, by {EVIL} {ended} 60.0 s",
         "22:15:00 Parked, by M. R. (Tablet) it was in force to the end 20.0 s",
         "planned stop · shelved · 0.4 m",
     ):
-        assert " ".join(said.split()) in words, said
+        assert " ".join(expected.split()) in plain, expected
     rows = list(csv.reader(io.StringIO((tmp_path / "report.csv").read_text(encoding="utf-8"), newline="")))
     assert [row[7] for row in rows if row[0] == "alarm"] == ["0.4 m · planned stop · shelved"]
     stops = [row for row in rows if row[0] == "planned stop"]
@@ -152,15 +152,15 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_drive_of_several_parts_is_one_report(parts: Path) -> None:
-    words = words_of(parts / "page.html")
-    for said in (
+    plain = text_of(parts / "page.html")
+    for expected in (
         *("in 2 parts", "Parts of the drive", "Part 1, s1", "Part 2, s1_p2", "1.80 km 3:00 min"),
         "22:15:20 Not recorded the car was 300 m away after it; not counted as driven 30.0 s",
         "in 1 gap, and 30.0 s not recorded",
         *("in the second part", "told later", "2.22 per autonomous km"),
     ):
-        assert said in words, said
-    assert words.count("Intact, head ") == 2
+        assert expected in plain, expected
+    assert plain.count("Intact, head ") == 2
     found = json.loads((parts / "report.json").read_text())
     assert [(one["recording"], one["part"]) for one in found["parts"]] == [("s1", 1), ("s1_p2", 2)]
     assert found["gaps"] == [{"from_s": 120.0, "to_s": 150.0, "apart_m": pytest.approx(300, abs=3)}]
@@ -176,7 +176,7 @@ def test_rates_curve_and_link_are_in_it(parts: Path) -> None:
     text = (parts / "page.html").read_text()
     assert "Speed in the 10 s before it" in text
     assert "Delay of the link over the distance driven" in text
-    assert "2.22 per autonomous km" in words_of(parts / "page.html")
+    assert "2.22 per autonomous km" in text_of(parts / "page.html")
     found = json.loads((parts / "report.json").read_text())
     rates = [found["figures"][name] for name in ("interventions_per_autonomous_km", "alarms_per_km")]
     assert rates == [pytest.approx(2 / 0.9, abs=0.005), pytest.approx(4 / 1.8, abs=0.005)]
@@ -191,7 +191,7 @@ def test_rates_curve_and_link_are_in_it(parts: Path) -> None:
 def test_a_part_that_is_missing_is_said(tmp_path: Path) -> None:
     with open_recording(in_two_parts(tmp_path)[1:]) as recording:
         write_drive_page(recording, tmp_path / "page.html", name="drive")
-    assert "Part 1 of the drive of s1_p2 is not in this report" in words_of(tmp_path / "page.html")
+    assert "Part 1 of the drive of s1_p2 is not in this report" in text_of(tmp_path / "page.html")
     bad = re.findall(r'<p class="bad">.*?<b>(.*?)</b>', (tmp_path / "page.html").read_text())
     assert bad == ["Missing: part 1"]
 
@@ -205,10 +205,10 @@ def test_the_last_part_is_named_while_its_file_is_there(tmp_path: Path, where: s
     with open_recording(paths) as recording:
         write_report_json(recording, tmp_path / "report.json", name="drive")
         outcome = write_forms(recording, tmp_path / "forms.zip")
-    (said,) = json.loads((tmp_path / "report.json").read_text())["parts_missing"]
+    (missing,) = json.loads((tmp_path / "report.json").read_text())["parts_missing"]
     what = "No record here" if where.endswith(".damaged") else "Not in this report"
-    assert said.startswith(f"{what} from 22:16:50 on: Part 3 of the drive of s1 is not in this report")
-    assert said in outcome.notices
+    assert missing.startswith(f"{what} from 22:16:50 on: Part 3 of the drive of s1 is not in this report")
+    assert missing in outcome.notices
 
 
 def test_a_time_without_a_record_is_never_said_to_be_without_alarms(tmp_path: Path) -> None:
@@ -219,7 +219,7 @@ def test_a_time_without_a_record_is_never_said_to_be_without_alarms(tmp_path: Pa
         write_drive_page(recording, tmp_path / "page.html", name="drive")
         write_report_json(recording, tmp_path / "report.json", name="drive")
         write_report_csv(recording, tmp_path / "report.csv", name="drive")
-    text = words_of(tmp_path / "page.html")
+    text = text_of(tmp_path / "page.html")
     assert "Alarms, time to acknowledge none in what was recorded" in text
     assert "Missing: part 2 see data lost" in text, "no chain that is intact stands alone"
     bad = re.findall(r'<p class="bad">.*?<b>(.*?)</b>', (tmp_path / "page.html").read_text())
@@ -235,13 +235,13 @@ def test_a_time_without_a_record_is_never_said_to_be_without_alarms(tmp_path: Pa
     alone = recorded(tmp_path / "alone", [], name="s1.mcap", **own)
     with open_recording([alone]) as recording:
         write_drive_page(recording, tmp_path / "whole.html", name="drive")
-    text = words_of(tmp_path / "whole.html")
+    text = text_of(tmp_path / "whole.html")
     assert "Alarms, time to acknowledge none" in text
     assert "No record" not in text
 
 
-def words_of(path: Path) -> str:
-    """What the page says, without its tags."""
+def text_of(path: Path) -> str:
+    """The text of the page, without its tags."""
     text = re.sub(r"<style>.*?</style>|<script.*?</script>", "", path.read_text(), flags=re.S)
     return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
 
@@ -322,7 +322,7 @@ def test_only_a_signed_check_has_a_tick(
 def test_a_drive_without_a_departure_check_says_so(tmp_path: Path) -> None:
     with open_recording([recorded(tmp_path, [logged(1.0, "connected")])]) as recording:
         write_drive_page(recording, tmp_path / "page.html", name="drive")
-    assert "Departure check No departure check was made." in words_of(tmp_path / "page.html")
+    assert "Departure check No departure check was made." in text_of(tmp_path / "page.html")
 
 
 def test_media_are_bounded() -> None:

@@ -1,4 +1,4 @@
-"""`catgraph check` of a recording that says nothing of the car: 2, and why, in each output."""
+"""`catgraph check` of a recording without data of the car: code 2 and the reason, in each output."""
 
 from __future__ import annotations
 

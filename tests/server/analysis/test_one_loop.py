@@ -152,7 +152,7 @@ def faster(message: Any) -> Any:
 
 
 def phone(car: SimulatedCar, now_s: float) -> Mapping[str, Any]:
-    """A phone that rides in the car for 37 s and is then 1 km away."""
+    """A phone that is in the car for 37 s and then 1 km away."""
     truth = car.state()["truth"]
     lat_deg = truth["lat_deg"] + (0.01 if now_s > 37.0 else 0.0)
     wall_ms = (BEGAN_S + now_s) * 1000

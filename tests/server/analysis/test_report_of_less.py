@@ -1,4 +1,4 @@
-"""What the drive's report says where a file lacks its end, or more."""
+"""The drive's report where a file lacks its end, or more."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from server.analysis.drive.axis import dated_time
 from server.analysis.drive.tables import write_report_json
 from server.analysis.drive_page import write_drive_page
 from server.recording.read.read import open_recording
-from tests.server.analysis.test_drive_report import words_of
+from tests.server.analysis.test_drive_report import text_of
 from tests.server.recording.drive.story import BEGIN_MS, recorded
 
 
@@ -29,7 +29,7 @@ def test_a_part_without_its_end_is_a_time_without_a_record(tmp_path: Path, has_n
         write_drive_page(recording, tmp_path / "page.html", name="drive")
         write_report_json(recording, tmp_path / "report.json", name="drive")
         cut_ms = round(recording.files[0].end_ns / 1e6)
-    text = words_of(tmp_path / "page.html")
+    text = text_of(tmp_path / "page.html")
     assert "Alarms, time to acknowledge none in what was recorded" in text
     (one,) = json.loads((tmp_path / "report.json").read_text())["no_record"]
     assert BEGIN_MS + 10_000 < one["from_ms"] < BEGIN_MS + 50_000

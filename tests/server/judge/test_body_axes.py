@@ -180,8 +180,8 @@ def test_along_the_car_and_along_the_ground_at_once_it_is_a_speed_only_if_both_h
     sent["twist"]["twist"]["linear"] = vector(np.array([speed_mps, 0.0, 0.0]))
     message, why = in_body_axes(Frames(), "/odom", "nav_msgs/Odometry", sent)
     if abs(course_deg) == 180:
-        words = "its twist is in odom or in the axes of the car, which point the other way"
-        assert why == f"its axes are not known: {words}"
+        reason = "its twist is in odom or in the axes of the car, which point the other way"
+        assert why == f"its axes are not known: {reason}"
     else:
         assert why is None
         assert twist_of_odometry(message).speed_mps == pytest.approx(speed_mps)

@@ -98,7 +98,7 @@ def texts(report: Report, alarm: str) -> list[str]:
 def test_a_healthy_drive_raises_none_of_them(tmp_path: Path, made: dict[str, Any]) -> None:
     report, raised = check(tmp_path, drive(**made))
     assert raised == []
-    (agree,) = (ribbon for ribbon in report.run.ribbons if ribbon.label == "Speeds agree")
+    (agree,) = (timeline for timeline in report.run.timelines if timeline.label == "Speeds agree")
     assert (agree.seconds(Verdict.OK) > 20.0) is ("sigma_m" not in made)  # too poor to compare
     assert report.run.crashes == ()
 
@@ -146,7 +146,7 @@ def test_where_there_is_one_source_it_is_not_checked(tmp_path: Path) -> None:
     rows = [row for row in drive() if row[1] == "/vehicle/twist"]
     report, raised = check(tmp_path, rows)
     assert raised == []
-    (agree,) = (ribbon for ribbon in report.run.ribbons if ribbon.label == "Speeds agree")
+    (agree,) = (timeline for timeline in report.run.timelines if timeline.label == "Speeds agree")
     assert agree.seconds(Verdict.OK) == 0.0
 
 

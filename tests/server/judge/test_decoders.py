@@ -310,30 +310,30 @@ def test_what_no_car_can_be(read: Callable[[Any], Any], value: float, why: str |
 DISTANCES: dict[str, tuple[float, float | None]] = {
     "near": (4.1, 4.1),
     "the real car's laser ends": (81.0, None),
-    "as a float32 says it": (float(np.float32(81.0)), None),
+    "as a float32": (float(np.float32(81.0)), None),
     "a hair beside it": (float(np.float32(81.0004)), None),
     "just before it": (80.99, 80.99),
     "the simulator's laser ends": (180.0, None),
     "between the two": (120.0, 120.0),
     "nothing ever seen": (2147483647.0, None),
-    "as a float32 says that": (float(np.float32(2147483647.0)), None),
+    "the same as a float32": (float(np.float32(2147483647.0)), None),
     "the largest float32": (float(np.finfo(np.float32).max), None),
     "farther than any sensor": (1000.0, None),
 }
 
 
-@pytest.mark.parametrize(("said", "distance_m"), DISTANCES.values(), ids=DISTANCES)
-def test_what_the_distance_estimator_says_of_nothing_ahead(said: float, distance_m: float | None) -> None:
-    found = signals.nearest.distance({"data": said})
+@pytest.mark.parametrize(("value", "distance_m"), DISTANCES.values(), ids=DISTANCES)
+def test_what_the_distance_estimator_reports_with_nothing_ahead(value: float, distance_m: float | None) -> None:
+    found = signals.nearest.distance({"data": value})
     assert found == Distance(distance_m=distance_m, none_in_range=distance_m is None)
 
 
 TURNS = {"north": (0.0, 0.0), "a full turn": (360.0, 0.0), "west": (-90.0, 270.0), "a hair west": (-1e-20, 0.0)}
 
 
-@pytest.mark.parametrize(("said", "heading_deg"), TURNS.values(), ids=TURNS)
-def test_a_heading_is_within_one_turn(said: float, heading_deg: float) -> None:
-    found = signals.heading.heading_of_float({"data": said}).heading_deg
+@pytest.mark.parametrize(("value", "heading_deg"), TURNS.values(), ids=TURNS)
+def test_a_heading_is_within_one_turn(value: float, heading_deg: float) -> None:
+    found = signals.heading.heading_of_float({"data": value}).heading_deg
     assert found == pytest.approx(heading_deg)
     assert 0 <= found < 360
 
@@ -356,8 +356,8 @@ WAYS = {
     "forward": (4.0, 0.0, 4.0),
     "backward": (-1.0, 0.0, -1.0),
     "backward with a slip": (-1.0, 0.2, -1.0198),
-    "north, as the CATVehicle says it": (0.03, 4.0, 4.0001),
-    "south-west, as the CATVehicle says it": (-3.0, -4.0, 5.0),
+    "north, as the CATVehicle reports it": (0.03, 4.0, 4.0001),
+    "south-west, as the CATVehicle reports it": (-3.0, -4.0, 5.0),
     "no sideways": (2.0, None, 2.0),
     "standing": (0.0, 0.0, 0.0),
 }
@@ -471,9 +471,9 @@ STATUSES: dict[str, tuple[Any, int | str]] = {
 }
 
 
-@pytest.mark.parametrize(("said", "expected"), STATUSES.values(), ids=STATUSES)
-def test_the_status_of_a_fix(said: Any, expected: int | str) -> None:
-    given_ = fix(status={"status": said, "service": 1})
+@pytest.mark.parametrize(("value", "expected"), STATUSES.values(), ids=STATUSES)
+def test_the_status_of_a_fix(value: Any, expected: int | str) -> None:
+    given_ = fix(status={"status": value, "service": 1})
     if isinstance(expected, int):
         assert signals.position.nav_sat_fix(given_).status == expected
     else:
@@ -602,14 +602,14 @@ def test_a_scan_is_one_or_is_refused(laser: dict[str, Any], why: str | None) -> 
             signals.scan.laser_scan(laser)
 
 
-@pytest.mark.parametrize("said", [None, NAN, INF, float(np.finfo(np.float32).max), 1e300])
-def test_a_range_without_an_end_is_infinite(said: Any) -> None:
-    assert signals.scan.laser_scan(scan([5.0], range_max=said)).range_max_m == INF
+@pytest.mark.parametrize("value", [None, NAN, INF, float(np.finfo(np.float32).max), 1e300])
+def test_a_range_without_an_end_is_infinite(value: Any) -> None:
+    assert signals.scan.laser_scan(scan([5.0], range_max=value)).range_max_m == INF
 
 
-@pytest.mark.parametrize("said", [None, NAN, INF, 0, -1.0])
-def test_times_that_are_not_given_are_zero(said: Any) -> None:
-    found = signals.scan.laser_scan(scan([5.0], time_increment=said, scan_time=said))
+@pytest.mark.parametrize("value", [None, NAN, INF, 0, -1.0])
+def test_times_that_are_not_given_are_zero(value: Any) -> None:
+    found = signals.scan.laser_scan(scan([5.0], time_increment=value, scan_time=value))
     assert (found.time_increment_s, found.scan_time_s) == (0.0, 0.0)
 
 
@@ -628,7 +628,7 @@ LEVELS: dict[str, tuple[Any, int | None]] = {
     "a float": (2.0, None),
     "true": (True, None),
     "null": (None, None),
-    "a word": ("WARN", None),
+    "a name": ("WARN", None),
     "a letter": ("A", None),
     "base64 of two bytes": ("AgI=", None),
     "base64 of a large byte": ("BA==", None),
@@ -642,9 +642,9 @@ LEVELS: dict[str, tuple[Any, int | None]] = {
 }
 
 
-@pytest.mark.parametrize(("said", "level"), LEVELS.values(), ids=LEVELS)
-def test_a_level_by_every_spelling_of_a_byte(said: Any, level: int | None) -> None:
-    given_ = {"status": [{"name": "gps", "level": said, "message": "m"}]}
+@pytest.mark.parametrize(("value", "level"), LEVELS.values(), ids=LEVELS)
+def test_a_level_by_every_spelling_of_a_byte(value: Any, level: int | None) -> None:
+    given_ = {"status": [{"name": "gps", "level": value, "message": "m"}]}
     if level is None:
         with pytest.raises(Rejected, match=r"^level is not one of OK, WARN, ERROR, STALE$"):
             signals.diagnostics.diagnostics(given_)
@@ -696,7 +696,7 @@ anything = st.recursive(
 
 
 def is_proper(value: Any) -> None:
-    """Whatever was accepted has a headline that is a finite number or honestly unknown, and can be told as JSON."""
+    """Whatever was accepted has a headline that is a finite number or honestly unknown, and can be encoded as JSON."""
     for field in dataclasses.fields(value):
         one = getattr(value, field.name)
         if isinstance(one, float) and not (isinstance(value, LaserScan) and field.name == "range_max_m"):

@@ -43,7 +43,9 @@ def scanned(
     return by.mounted(TOPIC, laser_scan(laser.scan(posts, frame=frame)), set_to)
 
 
-def asked(scan: LaserScan, set_to: AllLimits = LIMITS, *, tyre_rad: float = 0.0, check: str = "obstacle") -> Finding:
+def finding_of(
+    scan: LaserScan, set_to: AllLimits = LIMITS, *, tyre_rad: float = 0.0, check: str = "obstacle"
+) -> Finding:
     steering = Steering(percent=0.0, tyre_rad=tyre_rad)
     one = check_of(check)
     snapshot = known(scan=scan, speed=Twist(speed_mps=0.0), steering=steering)
@@ -157,7 +159,7 @@ def test_what_is_thin_and_ahead_is_seen_also_at_the_seam(shape: dict[str, Any], 
     laser = Laser(yaw_rad=yaw_rad, **shape)
     for aside_m in np.linspace(-0.06, 0.06, 7):
         post = (6.0, float(aside_m), 0.053)  # of 6 m, a step of half a degree is 5 cm
-        finding = asked(scanned(laser, [post], frames(laser.transform())), limits(obstacle__standoff_m=7.0))
+        finding = finding_of(scanned(laser, [post], frames(laser.transform())), limits(obstacle__standoff_m=7.0))
         assert finding.verdict == "fault", (aside_m, finding.text)
 
 
@@ -172,7 +174,7 @@ WIDE = {"beams": 541, "first_rad": -math.radians(135), "increment_rad": math.rad
 )
 def test_a_laser_that_does_not_look_into_the_whole_corridor_says_nothing_of_it(yaw_deg: float, verdict: str) -> None:
     laser = Laser(yaw_rad=math.radians(yaw_deg), **WIDE)
-    finding = asked(scanned(laser, [], frames(laser.transform())))
+    finding = finding_of(scanned(laser, [], frames(laser.transform())))
     assert finding.verdict == verdict
     if verdict == "unknown":
         assert "look" in finding.text
@@ -181,7 +183,7 @@ def test_a_laser_that_does_not_look_into_the_whole_corridor_says_nothing_of_it(y
 
 def test_what_is_near_in_the_part_that_is_seen_is_an_obstacle_all_the_same() -> None:
     laser = Laser(yaw_rad=math.radians(135), **WIDE)
-    assert asked(scanned(laser, [(3.0, 0.6, 0.3)], frames(laser.transform()))).verdict == "fault"
+    assert finding_of(scanned(laser, [(3.0, 0.6, 0.3)], frames(laser.transform()))).verdict == "fault"
 
 
 @pytest.mark.parametrize("pitch_deg", [0.0, 1.0, 5.0, 9.0, 12.0, -12.0, 40.0, 90.0, 140.0, 180.0])
@@ -189,10 +191,10 @@ def test_a_tilted_laser_is_not_checked(pitch_deg: float) -> None:
     laser = Laser(pitch_rad=math.radians(pitch_deg))
     tilt = min(abs(pitch_deg), 180 - abs(pitch_deg))
     scan = scanned(Laser(), [(3.3, 0.0, 0.5)], frames(laser.transform()))
-    finding = asked(scan)
+    finding = finding_of(scan)
     if tilt > 10:
         assert (finding.verdict, finding.text) == ("unknown", f"The laser is tilted by {tilt:.0f}°")
-        assert asked(scan, check="laser_blind").verdict == "unknown"
+        assert finding_of(scan, check="laser_blind").verdict == "unknown"
     elif tilt > 2:
         assert f"(laser tilted by {tilt:.0f}°)" in finding.text
     else:
@@ -202,7 +204,7 @@ def test_a_tilted_laser_is_not_checked(pitch_deg: float) -> None:
 def test_a_roll_tilts_too() -> None:
     for degrees, verdict in ((40, "unknown"), (140, "unknown"), (3, "fault"), (177, "fault")):
         by = frames(Laser(roll_rad=math.radians(degrees)).transform())
-        assert asked(scanned(Laser(), [(3.0, 0.0, 0.5)], by)).verdict == verdict
+        assert finding_of(scanned(Laser(), [(3.0, 0.0, 0.5)], by)).verdict == verdict
 
 
 # -- the car itself --------------------------------------------------------------------------------------------------
@@ -213,16 +215,16 @@ def test_the_cars_own_body_is_no_obstacle_and_hides_what_is_behind_it() -> None:
     laser, set_to = Laser(), limits(obstacle__bumper_ahead_m=3.0)
     by = frames(laser.transform())
     mast = [(1.0, 0.3, 0.05)]
-    assert asked(scanned(laser, mast, by), set_to).verdict == "ok"
-    assert asked(scanned(laser, [*mast, (5.0, -0.5, 0.4)], by), set_to).verdict == "fault"
+    assert finding_of(scanned(laser, mast, by), set_to).verdict == "ok"
+    assert finding_of(scanned(laser, [*mast, (5.0, -0.5, 0.4)], by), set_to).verdict == "fault"
     cabin = [(1.5, 0.0, 1.0)]
-    assert asked(scanned(laser, cabin, by), set_to).verdict == "unknown", "it hides the corridor"
+    assert finding_of(scanned(laser, cabin, by), set_to).verdict == "unknown", "it hides the corridor"
 
 
 @pytest.mark.parametrize("beyond_m", [0.02, 0.0, -0.1, -0.25])
 def test_what_touches_the_bumper_is_an_obstacle_though_the_bumper_is_measured_by_hand(beyond_m: float) -> None:
     laser, set_to = Laser(), limits(obstacle__bumper_ahead_m=3.0)
-    finding = asked(scanned(laser, [(3.3 + beyond_m, 0.0, 0.3)], frames(laser.transform())), set_to)
+    finding = finding_of(scanned(laser, [(3.3 + beyond_m, 0.0, 0.3)], frames(laser.transform())), set_to)
     assert finding.verdict == "fault"
     assert finding.measured is not None
     assert finding.measured.value == pytest.approx(max(0.0, beyond_m), abs=0.01)
@@ -231,8 +233,8 @@ def test_what_touches_the_bumper_is_an_obstacle_though_the_bumper_is_measured_by
 def test_without_transforms_the_bumper_counts_from_the_laser_as_it_is_set() -> None:
     laser = Laser()
     scan = scanned(laser, [(8.3, 0.0, 0.3)], Frames(), set_to := limits(obstacle__bumper_ahead_m=3.5))
-    assert asked(scan).measured.value == pytest.approx(8.0, abs=0.01)  # type: ignore[union-attr]
-    assert asked(scan, set_to).measured.value == pytest.approx(7.0, abs=0.01)  # type: ignore[union-attr]
+    assert finding_of(scan).measured.value == pytest.approx(8.0, abs=0.01)  # type: ignore[union-attr]
+    assert finding_of(scan, set_to).measured.value == pytest.approx(7.0, abs=0.01)  # type: ignore[union-attr]
 
 
 # -- settings --------------------------------------------------------------------------------------------------------
@@ -253,8 +255,8 @@ def test_settings_stand_for_transforms(laser: Laser, values: dict[str, float], p
     laser = replace(laser, x_m=2.5)  # where the settings have it
     by_settings, set_to = scanned(laser, [post], Frames(), limits(**values)), limits(**values)
     by_transforms = scanned(laser, [post], frames(laser.transform()))
-    assert asked(by_settings, set_to).text == asked(by_transforms).text
-    assert "assumed" not in asked(by_settings, set_to).text
+    assert finding_of(by_settings, set_to).text == finding_of(by_transforms).text
+    assert "assumed" not in finding_of(by_settings, set_to).text
     assert by_settings.mounting is not None
     assert (by_settings.mounting.note or "").startswith("mounted by the settings")
 
@@ -266,32 +268,32 @@ def test_the_operators_setting_comes_before_the_transforms() -> None:
     assert scan.mounting is not None
     assert (scan.mounting.origin, scan.mounting.x_m, scan.mounting.y_m) == ("settings", 0.4, 0.2)
     assert (scan.mounting.note or "").endswith("not by the car's transforms")
-    assert asked(scan).verdict == "fault"
+    assert finding_of(scan).verdict == "fault"
     ahead = scanned(Laser(), [(3.3, 0.0, 0.3)], frames(laser.transform()), limits(mounting__by_settings=1.0))
-    assert asked(ahead).verdict == "fault", "what is at its default counts too"
+    assert finding_of(ahead).verdict == "fault", "what is at its default counts too"
 
 
 def test_assumed_is_said_and_a_setting_or_the_catvehicles_topic_ends_it() -> None:
     laser, posts = Laser(), [(3.3, 0.0, 0.3)]
     assumed = scanned(laser, posts, Frames())
-    assert "(laser assumed to look ahead); gap from the laser: no bumper set" in asked(assumed).text
+    assert "(laser assumed to look ahead); gap from the laser: no bumper set" in finding_of(assumed).text
     measured = scanned(laser, posts, Frames(), limits(obstacle__bumper_ahead_m=3.0))
-    assert "(laser assumed to look ahead)" in asked(measured).text
+    assert "(laser assumed to look ahead)" in finding_of(measured).text
     assert (assumed.mounting.note or "").startswith("assumed to look ahead") if assumed.mounting else False
     set_there = scanned(laser, posts, Frames(), limits(mounting__by_settings=1.0))
-    assert "assumed" not in asked(set_there).text
+    assert "assumed" not in finding_of(set_there).text
     of_car = Frames().mounted("/catvehicle/front_laser_points", laser_scan(laser.scan(posts)), LIMITS)
     assert of_car.mounting is not None
-    assert (of_car.mounting.note, "assumed" in asked(of_car).text) == (None, False)
+    assert (of_car.mounting.note, "assumed" in finding_of(of_car).text) == (None, False)
     moved = scanned(laser, posts, Frames(), limits(obstacle__laser_ahead_m=1.0))
-    assert "assumed" in asked(moved).text, "its place alone does not tell where it looks"
+    assert "assumed" in finding_of(moved).text, "its place alone does not give its direction"
 
 
 COUNTED = "gap from the laser: no bumper set"
 
 
 @pytest.mark.parametrize(
-    ("x_m", "posts", "words"),
+    ("x_m", "posts", "text"),
     [
         (1.2, [(4.5, 0.0, 0.3)], COUNTED),  # on the roof
         (1.2, [], COUNTED),
@@ -301,18 +303,18 @@ COUNTED = "gap from the laser: no bumper set"
 )
 @pytest.mark.parametrize("by_settings", [0.0, 1.0])
 def test_a_gap_that_is_not_counted_from_the_bumper_says_so(
-    x_m: float, posts: list[Post], words: str, by_settings: float
+    x_m: float, posts: list[Post], text: str, by_settings: float
 ) -> None:
     laser = Laser(x_m=x_m)
     set_to = limits(mounting__by_settings=by_settings)
     scan = scanned(laser, posts, frames(laser.transform()), set_to)
-    expected = COUNTED if by_settings else words  # there the laser's place is that of the settings
-    assert f"; {expected}" in asked(scan, set_to).text
+    expected = COUNTED if by_settings else text  # there the laser's place is that of the settings
+    assert f"; {expected}" in finding_of(scan, set_to).text
     assert scan.mounting is not None
     assert expected in scan.mounting.notes
     with_bumper = limits(obstacle__bumper_ahead_m=3.5, mounting__by_settings=by_settings)
     scan = scanned(laser, posts, frames(laser.transform()), with_bumper)
-    assert "bumper" not in asked(scan, with_bumper).text
+    assert "bumper" not in finding_of(scan, with_bumper).text
     assert scan.mounting is not None
     assert (scan.mounting.gap_words, len(scan.mounting.notes)) == (None, 1)
 
@@ -338,42 +340,42 @@ NAN = math.nan
 )
 def test_transforms_that_contradict_each_other_are_not_guessed_at(rows: list[dict[str, Any]], why: str | None) -> None:
     by = frames(*rows)
-    finding = asked(scanned(Laser(), [(3.3, 0.0, 0.3)], by))
+    finding = finding_of(scanned(Laser(), [(3.3, 0.0, 0.3)], by))
     if why is None:
         assert "assumed" in finding.text or finding.verdict == "unknown"
         return
     assert finding.verdict == "unknown"
     assert why in finding.text
     settled = scanned(Laser(), [(3.3, 0.0, 0.3)], by, limits(mounting__by_settings=1.0))
-    assert asked(settled).verdict == "fault", "the operator knows"
+    assert finding_of(settled).verdict == "fault", "the operator knows"
 
 
 def test_a_frame_that_is_renamed_in_mid_drive_is_not_guessed_at() -> None:
     laser, posts = Laser(yaw_rad=math.pi), [(3.3, 0.0, 0.3)]
     by = frames(laser.transform())
-    assert asked(scanned(laser, posts, by)).verdict == "fault"
-    renamed = asked(scanned(laser, posts, by, frame="laser_2"))
+    assert finding_of(scanned(laser, posts, by)).verdict == "fault"
+    renamed = finding_of(scanned(laser, posts, by, frame="laser_2"))
     assert (renamed.verdict, "its frame was laser and is laser_2" in renamed.text) == ("unknown", True)
     by.receive("/tf_static", {"transforms": [laser.transform(child="laser_2")]})
-    assert asked(scanned(laser, posts, by, frame="laser_2")).verdict == "fault"
+    assert finding_of(scanned(laser, posts, by, frame="laser_2")).verdict == "fault"
 
 
 def test_after_the_link_was_lost_transforms_are_sent_again_and_may_be_others() -> None:
     posts = [(3.3, 0.0, 0.3)]
     by = frames(Laser(yaw_rad=math.pi).transform())
-    assert asked(scanned(Laser(yaw_rad=math.pi), posts, by)).verdict == "fault"
+    assert finding_of(scanned(Laser(yaw_rad=math.pi), posts, by)).verdict == "fault"
     by.forget()
-    waiting = asked(scanned(Laser(yaw_rad=math.pi), posts, by))
+    waiting = finding_of(scanned(Laser(yaw_rad=math.pi), posts, by))
     assert (waiting.verdict, "is not sent any more" in waiting.text) == ("unknown", True), (
         "it is known not to look ahead"
     )
     by.receive("/tf_static", {"transforms": [Laser(yaw_rad=1.0).transform()]})
-    assert asked(scanned(Laser(yaw_rad=1.0), posts, by)).verdict == "fault"
+    assert finding_of(scanned(Laser(yaw_rad=1.0), posts, by)).verdict == "fault"
 
 
 def test_frames_that_name_no_body_are_no_answer() -> None:
-    assert "assumed" in asked(scanned(Laser(), [], frames(row("map", "odom"), row("odom", "laser")))).text
-    assert "assumed" in asked(scanned(Laser(), [], frames(row("base_link", "camera")))).text
+    assert "assumed" in finding_of(scanned(Laser(), [], frames(row("map", "odom"), row("odom", "laser")))).text
+    assert "assumed" in finding_of(scanned(Laser(), [], frames(row("base_link", "camera")))).text
 
 
 @pytest.mark.parametrize(
@@ -395,7 +397,7 @@ def test_frames_that_name_no_body_are_no_answer() -> None:
 def test_the_body_is_found(rows: list[dict[str, Any]]) -> None:
     for order in (rows, rows[::-1]):
         scan = scanned(Laser(yaw_rad=math.pi), [(3.3, 0.0, 0.3)], frames(*order))
-        assert asked(scan).verdict == "fault"
+        assert finding_of(scan).verdict == "fault"
         assert scan.mounting is not None
         assert scan.mounting.origin == "transforms"
 
@@ -460,7 +462,7 @@ def test_a_laser_whose_frame_is_named_by_a_counter_is_placed_each_time() -> None
         assert scanned(Laser(beams=3), [], by, frame=f"laser_{number}").mounting.why_not is None  # type: ignore[union-attr]
         by.note_needed(names)
         assert f"laser_{number}".encode() in names
-    assert len(by._asked) <= 64
+    assert len(by._requested) <= 64
     assert len(by._trees[""]._placed) <= 64
 
 

@@ -171,7 +171,7 @@ def test_the_strict_setting_rejects_the_cars_own_receiver() -> None:
 
 @pytest.mark.slow
 def test_an_old_recording_played_in_a_loop_is_one_jump_of_the_clock() -> None:
-    """Stamps that are ten years old alarm nobody; that they go back by half a minute is told, once."""
+    """Stamps that are ten years old raise no alarm; their jump back by half a minute is reported once."""
 
     def looped(step_s: float, after_s: float) -> Planned:
         old = Scenario(

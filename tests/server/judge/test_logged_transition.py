@@ -1,4 +1,4 @@
-"""An event of an older or a newer version is read as what it says; whatever is not known of it is the most urgent."""
+"""An event of an older or a newer version is read as it declares itself; an unknown one is the most urgent."""
 
 from __future__ import annotations
 

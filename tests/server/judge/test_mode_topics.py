@@ -1,4 +1,4 @@
-"""The topics that say who drives: each type, each value, and what says nothing."""
+"""The topics of the driving mode: each type, each value, and values without a mode."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ REPORT = "autoware_vehicle_msgs/ControlModeReport"
         ("std_msgs/String", {"data": "manual"}, "manual"),
         ("std_msgs/String", {"data": "not autonomous"}, "unknown"),
         ("std_msgs/String", {"data": "<b>" * 100}, "unknown"),
-        ("std_msgs/String", {"data": ""}, "unknown"),  # else the word before would go on standing
+        ("std_msgs/String", {"data": ""}, "unknown"),  # else the previous mode would remain
         ("std_msgs/String", {"data": "\u200b"}, "unknown"),
         ("std_msgs/String", {"data": True}, "autonomous"),  # where the type is not known
         ("std_msgs/String", {"data": 0}, "unknown"),

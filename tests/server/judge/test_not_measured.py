@@ -110,7 +110,7 @@ HELD: dict[str, tuple[Rule, Any, bool]] = {
     "no battery, null": (table.NO_BATTERY, battery(present=False, percentage=None), True),
     "only the percentage": (table.NO_BATTERY, battery(present=False, percentage=0.03), False),
     "a battery": (table.NO_BATTERY, battery(present=True), False),
-    "nothing said of a battery": (table.NO_BATTERY, without(battery(), "present"), False),
+    "no field about a battery": (table.NO_BATTERY, without(battery(), "present"), False),
     "percentage NaN": (table.NO_PERCENTAGE, battery(percentage=NAN), True),
     "percentage null": (table.NO_PERCENTAGE, battery(percentage=None), True),
     "percentage 0": (table.NO_PERCENTAGE, battery(percentage=0.0), False),

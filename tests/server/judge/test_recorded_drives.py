@@ -104,13 +104,13 @@ def test_a_fault_laid_over_the_real_drive_is_found(
     if alarms:
         assert during[0].at_s <= FAULT_AT_S + within_s
     if raises is None:
-        assert any("changed nothing" in note for note in found.notes), "and that is said"
+        assert any("changed nothing" in note for note in found.notes), "and a note states it"
 
 
 @pytest.mark.slow
 def test_what_is_checked_on_the_real_drive(recordings: Path) -> None:
     """Checks that find nothing because they do not look would pass all of the above."""
     found = run(recordings, BAG, extract=Extract(start_s=24.0, duration_s=14.0))
-    looked_s = {ribbon.label: ribbon.seconds(Verdict.OK) for ribbon in found.ribbons}
+    looked_s = {timeline.label: timeline.seconds(Verdict.OK) for timeline in found.timelines}
     for tile in ("Frozen", "Clock", "Response", "Rates", "Pedals"):
         assert looked_s[tile] > 5.0, tile

@@ -169,8 +169,8 @@ def test_a_contradiction_that_comes_late_is_said_in_the_same_words_as_live(
     assert recorded.why_not is not None
     assert expected.why_not is not None
     assert topic == "/tf_static" or before is None, "only what is static is known beforehand"
-    said = {frozenset(note.removesuffix(".").split()) for note in report.notes}
-    assert {frozenset(note.removesuffix(".").split()) for note in live.notes} & said
+    notes = {frozenset(note.removesuffix(".").split()) for note in report.notes}
+    assert {frozenset(note.removesuffix(".").split()) for note in live.notes} & notes
 
 
 def test_what_is_wrong_with_transforms_is_a_note_of_the_drive(tmp_path: Path) -> None:
@@ -187,7 +187,7 @@ def test_what_is_wrong_with_transforms_is_a_note_of_the_drive(tmp_path: Path) ->
 def test_of_two_lasers_the_one_that_looks_ahead_is_taken(
     tmp_path: Path, version: int, turn_deg: int, topic: str
 ) -> None:
-    """The lasers look in opposite directions; where neither looks ahead, it is asked."""
+    """The lasers look in opposite directions; where neither looks ahead, there is a question."""
     rows: list[Row] = []
     for number, name in enumerate(("one", "two")):
         yaw_rad = math.radians(turn_deg + 180 * number)

@@ -1,4 +1,4 @@
-"""The slow-down in a replay: what the log of the drive told of it, moment by moment."""
+"""The slow-down in a replay: its state in the log of the drive, moment by moment."""
 
 from __future__ import annotations
 

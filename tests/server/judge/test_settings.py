@@ -144,8 +144,8 @@ def test_of_a_file_of_another_version_the_rest_is_in_force_and_nothing_is_lost(t
     found = file.read()
     assert found == Settings(version=7, values={LIMIT: 9.0}, topics={"scan": "/other"})
     assert file.complaint is not None
-    for word in ("car.unusable.toml", "no such car", "from_tomorrow", "sonar", "boost_mps", "Obstacle distance"):
-        assert word in file.complaint
+    for part in ("car.unusable.toml", "no such car", "from_tomorrow", "sonar", "boost_mps", "Obstacle distance"):
+        assert part in file.complaint
     assert (tmp_path / "car.unusable.toml").read_text() == text
     again = SettingsFile(path)
     assert again.read() == found
@@ -425,13 +425,13 @@ async def test_a_picked_topic_replaces_the_found_one(bridge: RosBridge, server: 
 
 
 async def test_a_picked_topic_is_subscribed_though_the_bridge_tells_no_topics() -> None:
-    heard: list[dict[str, Any]] = []
+    received: list[dict[str, Any]] = []
 
     async def bare(socket: websockets.ServerConnection) -> None:
         """A rosbridge without rosapi: every service fails; the one topic it has is published once it is wanted."""
         async for text in socket:
             message = json.loads(text)
-            heard.append(message)
+            received.append(message)
             if message["op"] == "call_service":
                 answer = {"op": "service_response", "id": message["id"], "service": message["service"], "values": ""}
                 await socket.send(json.dumps(answer | {"result": False}))
@@ -439,7 +439,7 @@ async def test_a_picked_topic_is_subscribed_though_the_bridge_tells_no_topics() 
                 await socket.send(json.dumps({"op": "publish", "topic": "/my/vel", "msg": twist(7.5)}))
 
     def topics(op: str) -> set[str]:
-        return {message["topic"] for message in heard if message["op"] == op}
+        return {message["topic"] for message in received if message["op"] == op}
 
     async with websockets.serve(bare, "127.0.0.1", 0) as bridge:
         port = next(iter(bridge.sockets)).getsockname()[1]

@@ -1,4 +1,4 @@
-"""Which topic carries each signal: by evidence, with a reason; what evidence does not decide is asked."""
+"""Which topic carries each signal: by evidence, with a reason; what evidence does not decide becomes a question."""
 
 from __future__ import annotations
 
@@ -256,7 +256,7 @@ CARS = {"/agv1/odom": ODOM, "/agv2/odom": ODOM, "/agv1/gps/fix": FIX, "/agv2/sca
 
 
 @pytest.mark.parametrize(
-    ("topics", "words"),
+    ("topics", "text"),
     [
         (CARS, "Two cars: /agv1 and /agv2: which is this?"),
         ({f"/robot_{n}/odom": ODOM for n in range(3)}, "Three cars: /robot_0, /robot_1 and /robot_2: which is this?"),
@@ -266,10 +266,10 @@ CARS = {"/agv1/odom": ODOM, "/agv2/odom": ODOM, "/agv1/gps/fix": FIX, "/agv2/sca
         ),
     ],
 )
-def test_several_cars_on_one_bridge_are_asked_for_once(topics: dict[str, str], words: str) -> None:
+def test_several_cars_on_one_bridge_are_asked_for_once(topics: dict[str, str], text: str) -> None:
     choice = choose(topics)
     assert choice.sources == {}
-    assert [one["words"] for one in choice.questions] == [words]
+    assert [one["words"] for one in choice.questions] == [text]
 
 
 @pytest.mark.parametrize(

@@ -247,7 +247,7 @@ def test_two_publishers_of_other_units_are_noticed(pattern: list[float], chosen:
     assert "two publishers" in car.why("brake") or chosen == "share"
     answers = ["percent", "nm", "bar"]
     assert car.questions() == ({"brake": answers} if chosen == "share" and "two" not in car.why("brake") else {})
-    assert any("unit unknown" in words for words in unit_sentences(car.reception.units, car.sources))
+    assert any("unit unknown" in sentence for sentence in unit_sentences(car.reception.units, car.sources))
 
 
 def test_two_publishers_of_a_speed_are_noticed() -> None:

@@ -1,4 +1,4 @@
-"""A mailer as a process of its own, to be killed: orders what it is told once, sends until nothing waits."""
+"""A mailer in its own process, to be killed: orders the given mails once, then sends until the outbox is empty."""
 
 from __future__ import annotations
 

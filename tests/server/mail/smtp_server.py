@@ -1,7 +1,7 @@
 """A real SMTP server (aiosmtpd) as a process of its own, with the moods of one: it refuses, delays, loses its replies.
 
 Prints its port, then keeps what it takes in a folder: a mail a file, and a line of JSON for each in `taken.jsonl`,
-written before it answers, as a server does that keeps its word.
+written before it answers, as a reliable server does.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from aiosmtpd.smtp import SMTP, AuthResult, Envelope, LoginPassword, Session
 
 
 class Mailbox:
-    """Takes mail as it was told to."""
+    """Accepts, refuses or drops mail as configured."""
 
     def __init__(self, options: argparse.Namespace) -> None:
         self.options = options
@@ -70,7 +70,7 @@ class Mailbox:
             )
         if mood < self.options.temporary + self.options.lost:
             assert server.transport is not None
-            server.transport.abort()  # it has it, and nobody is told
+            server.transport.abort()  # accepted, but the client gets no reply
         return "250 2.0.0 OK queued as " + path.stem
 
 
@@ -82,8 +82,8 @@ def login(options: argparse.Namespace) -> Any:
         )
         if is_known:
             return AuthResult(success=True, auth_data=data)
-        said = f"535 5.7.8 not accepted: {data.password.decode()}"  # such servers are: the password must not be shown
-        return AuthResult(success=False, handled=False, message=said)
+        reply = f"535 5.7.8 not accepted: {data.password.decode()}"  # such servers are: the password must not be shown
+        return AuthResult(success=False, handled=False, message=reply)
 
     return check
 

@@ -14,9 +14,9 @@ from server.mail.smtp_connection import Reply
 from tests.server.mail.mailing import START_MS as T
 
 OK, LATER, NEVER = (
-    Reply(code=250, words="OK"),
-    Reply(code=450, words="greylisted"),
-    Reply(code=550, words="no such user"),
+    Reply(code=250, message="OK"),
+    Reply(code=450, message="greylisted"),
+    Reply(code=550, message="no such user"),
 )
 
 
@@ -33,7 +33,7 @@ def mail(*recipients: Recipient, attempts: int = 1) -> Mail:
         attempts=attempts,
         next_ms=None,
         done_ms=None,
-        said="",
+        detail="",
         recipients=recipients,
     )
 
@@ -70,7 +70,7 @@ CASES: dict[str, tuple[tuple[Recipient, ...], dict[str, Reply], Reply | None, st
         "refused waiting",
     ),
     "the other had it before": (
-        (Recipient(address="ann@x", state="accepted", said="250"), BOB),
+        (Recipient(address="ann@x", state="accepted", detail="250"), BOB),
         {"bob@x": OK},
         OK,
         "sent",
@@ -78,7 +78,7 @@ CASES: dict[str, tuple[tuple[Recipient, ...], dict[str, Reply], Reply | None, st
         "accepted accepted",
     ),
     "the other was refused before": (
-        (Recipient(address="ann@x", state="refused", said="550 no"), BOB),
+        (Recipient(address="ann@x", state="refused", detail="550 no"), BOB),
         {"bob@x": OK},
         OK,
         "failed",
@@ -90,15 +90,15 @@ CASES: dict[str, tuple[tuple[Recipient, ...], dict[str, Reply], Reply | None, st
 
 @pytest.mark.parametrize("name", CASES)
 def test_what_the_answers_come_to(name: str) -> None:
-    recipients, answers, of_mail, state, said, states = CASES[name]
+    recipients, answers, of_mail, state, detail, states = CASES[name]
     outcome = answered(mail(*recipients), answers, of_mail, T, retry_backoff.pause_s)
-    assert (outcome.state, outcome.said) == (state, said)
+    assert (outcome.state, outcome.detail) == (state, detail)
     assert " ".join(one.state for one in outcome.recipients) == states
     assert (outcome.next_ms == T + 10_000) is (state == "queued")
 
 
 @pytest.mark.parametrize(
-    ("facts", "is_doubtful", "state", "said"),
+    ("facts", "is_doubtful", "state", "detail"),
     [
         ({}, False, "queued", "gone"),
         ({}, True, "queued", "gone It may have arrived; it is sent again under the same Message-ID."),
@@ -106,11 +106,11 @@ def test_what_the_answers_come_to(name: str) -> None:
         ({"is_permanent": True, "is_of_account": True}, False, "failed", "gone"),
     ],
 )
-def test_what_trouble_comes_to(facts: dict[str, Any], is_doubtful: bool, state: str, said: str) -> None:
+def test_the_outcome_of_a_failure(facts: dict[str, Any], is_doubtful: bool, state: str, detail: str) -> None:
     outcome = troubled(
         mail(ANN), Trouble("gone", **facts), is_doubtful=is_doubtful, now_ms=T, pause_s=retry_backoff.pause_s
     )
-    assert (outcome.state, outcome.said) == (state, said)
+    assert (outcome.state, outcome.detail) == (state, detail)
     assert outcome.of_account is bool(facts.get("is_of_account"))
     assert outcome.recipients == (ANN,)
 
@@ -126,16 +126,16 @@ def test_pauses_grow_to_an_hour_and_end_after_three_days() -> None:
 @pytest.mark.parametrize(
     ("attempts", "state"), [(retry_backoff.MAX_ATTEMPTS - 1, "queued"), (retry_backoff.MAX_ATTEMPTS, "failed")]
 )
-def test_it_is_given_up_in_words(attempts: int, state: str) -> None:
+def test_a_mail_fails_after_the_last_attempt_with_a_reason(attempts: int, state: str) -> None:
     outcome = answered(mail(ANN, attempts=attempts), {"ann@x": LATER}, None, T, retry_backoff.pause_s)
     assert outcome.state == state
-    assert outcome.said == (
+    assert outcome.detail == (
         "450 greylisted" if state == "queued" else f"Given up after {attempts} attempts: 450 greylisted"
     )
 
 
 @pytest.mark.parametrize(
-    ("words", "shown"),
+    ("reply", "shown"),
     [
         ("5.1.1 no such user", "5.1.1 no such user"),
         ("two\nlines\r\n\x00here", "two lines here"),
@@ -148,5 +148,5 @@ def test_it_is_given_up_in_words(attempts: int, state: str) -> None:
         ("abcdefgh", "abcdefgh"),
     ],
 )
-def test_a_servers_words_are_one_line_and_never_hold_the_password(words: str, shown: str) -> None:
-    assert clean(words, "hunter2") == shown
+def test_a_reply_is_shown_on_one_line_without_the_password(reply: str, shown: str) -> None:
+    assert clean(reply, "hunter2") == shown

@@ -28,12 +28,12 @@ async def sending(tmp_path: Path, port: int, orders: int) -> asyncio.subprocess.
     )
 
 
-async def printed(process: asyncio.subprocess.Process, word: str) -> None:
+async def printed(process: asyncio.subprocess.Process, start: str) -> None:
     assert process.stdout is not None
     while line := (await process.stdout.readline()).decode():
-        if line.startswith(word):
+        if line.startswith(start):
             return
-    raise AssertionError(f"the sender ended before it said “{word}”")
+    raise AssertionError(f"the sender ended before it printed “{start}”")
 
 
 async def killed_again_and_again(tmp_path: Path, post: Post, orders: int, kills: int, within_s: float) -> None:

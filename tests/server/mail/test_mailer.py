@@ -81,7 +81,7 @@ async def test_a_server_that_does_not_prove_who_it_is_gets_no_password(
             await mailer.change(settings(post.port, security=security, user="car", password="x", ca=foreign))
             letter = await over(mailer, (await mailer.order("key-0001", order())).n)
             assert letter.state == "failed"
-            assert "cannot be verified" in letter.said
+            assert "cannot be verified" in letter.detail
             assert post.taken == []
 
 
@@ -98,7 +98,7 @@ async def test_a_refused_login_fails_all_that_waits_and_new_settings_send_it(
         for one in some:
             letter = await over(mailer, one.n)
             assert letter.state == "failed"
-            assert "refuses the login of car: 535" in letter.said
+            assert "refuses the login of car: 535" in letter.detail
             assert "secret-wrong" not in repr(letter)
         await mailer.change({**given, "password": "hunter2"})
         assert [(await over(mailer, one.n)).state for one in some] == ["sent"] * 3
@@ -116,10 +116,10 @@ async def test_a_refused_recipient_is_named_and_the_others_have_it(tmp_path: Pat
     async with posting(tmp_path / "post", *moods) as post, mailing(tmp_path / "mail", shelf, clock) as mailer:
         await mailer.change(settings(post.port))
         n = (await mailer.order("key-0001", order(to=to))).n
-        letter = await until(mailer, n, lambda letter: letter.said != "")
+        letter = await until(mailer, n, lambda letter: letter.detail != "")
         assert letter.state == "queued", "one of them may take it later"
         assert [one.state for one in letter.mails[0].recipients] == ["accepted", "refused", "waiting"]
-        assert letter.said.startswith("busy@example.org: 450 4.2.0")
+        assert letter.detail.startswith("busy@example.org: 450 4.2.0")
         await post.kill()
         await post.start("--refuse", "gone@example.org")
         clock.ms += 10_000
@@ -127,7 +127,8 @@ async def test_a_refused_recipient_is_named_and_the_others_have_it(tmp_path: Pat
         letter = await over(mailer, n)
         assert letter.state == "failed"
         assert (
-            letter.said == "gone@example.org: 550 5.1.1 <gone@example.org>: no such mailbox; 2 of 3 recipients have it"
+            letter.detail
+            == "gone@example.org: 550 5.1.1 <gone@example.org>: no such mailbox; 2 of 3 recipients have it"
         )
         assert [one["to"] for one in post.taken] == [["ann@example.org"], ["busy@example.org"]], "nobody got it twice"
         assert len({one["message_id"] for one in post.taken}) == 1
@@ -137,7 +138,7 @@ async def test_a_mail_refused_for_good_is_not_tried_again(tmp_path: Path, shelf:
     async with posting(tmp_path / "post", "--reject") as post, mailing(tmp_path / "mail", shelf) as mailer:
         await mailer.change(settings(post.port))
         letter = await over(mailer, (await mailer.order("key-0001", order())).n)
-        assert (letter.state, letter.said) == ("failed", "554 5.6.0 content rejected")
+        assert (letter.state, letter.detail) == ("failed", "554 5.6.0 content rejected")
         assert letter.mails[0].attempts == 1
         assert (tmp_path / "mail" / "outbox" / letter.mails[0].file).is_file(), "what failed can be sent again"
         await post.kill()
@@ -155,16 +156,16 @@ async def test_while_the_server_is_down_it_waits_longer_and_longer_and_is_sent_w
         await mailer.change(settings(post.port))
         await post.kill()
         first = (await mailer.order("key-0001", order())).n
-        await until(mailer, first, lambda letter: letter.said != "")
+        await until(mailer, first, lambda letter: letter.detail != "")
         second = (await mailer.order("key-0002", order())).n
-        waiting = await until(mailer, second, lambda letter: letter.said != "")
+        waiting = await until(mailer, second, lambda letter: letter.detail != "")
         assert waiting.mails[0].attempts == 0, "it waits with the first"
         for attempts in (1, 2, 3, 4):
             letter = await until(
                 mailer, first, lambda letter, a=attempts: letter.mails and letter.mails[0].attempts == a  # type: ignore[misc]
                 and letter.state == "queued" and letter.mails[0].next_ms > clock.ms,
             )  # fmt: skip
-            assert letter.said == f"127.0.0.1:{post.port} refuses the connection."
+            assert letter.detail == f"127.0.0.1:{post.port} refuses the connection."
             assert letter.mails[0].next_ms == clock.ms + 1000 * pause_s(attempts)
             if attempts == 4:
                 await post.start()  # before the mail is due: it is tried as soon as it is
@@ -175,7 +176,7 @@ async def test_while_the_server_is_down_it_waits_longer_and_longer_and_is_sent_w
         mailer.look()
         waited = await over(mailer, second)
         assert waited.state == "sent"
-        assert waited.mails[0].attempts <= 5, "the server is asked once for all that waits"
+        assert waited.mails[0].attempts <= 5, "one attempt serves all waiting mails"
         assert len(post.taken) == 2
         assert {one["date"] for one in post.taken} == {"Mon, 21 Sep 2026 14:13:20 +0000"}, "the Date of the first try"
 
@@ -188,13 +189,13 @@ async def test_a_temporary_refusal_is_tried_again_under_the_same_name(tmp_path: 
     ):
         await mailer.change(settings(post.port))
         n = (await mailer.order("key-0001", order())).n
-        letter = await until(mailer, n, lambda letter: letter.said != "")
-        assert (letter.state, letter.said) == ("queued", "451 4.3.0 try again later")
+        letter = await until(mailer, n, lambda letter: letter.detail != "")
+        assert (letter.state, letter.detail) == ("queued", "451 4.3.0 try again later")
         await post.kill()
         await post.start("--lost", "1")
         clock.ms += 10_000
         mailer.look()
-        letter = await until(mailer, n, lambda letter: "may have arrived" in letter.said)
+        letter = await until(mailer, n, lambda letter: "may have arrived" in letter.detail)
         assert letter.state == "queued"
         await post.kill()
         await post.start("--seed", "1")
@@ -261,7 +262,7 @@ async def test_what_is_too_large_goes_as_a_link_when_that_was_chosen(tmp_path: P
         assert "\nhttp://192.168.4.1:8000/api/recordings/large/file.mcap\n" in mails[0].get_content().replace(
             "\r\n", "\n"
         )
-        assert (nowhere.state, nowhere.said) == (
+        assert (nowhere.state, nowhere.detail) == (
             "failed",
             "No address for links is known: set it in Settings, E-mail.",
         )
@@ -289,7 +290,7 @@ async def test_formats(
         letter = await over(mailer, (await mailer.order("key-0001", order(**more))).n)
         assert letter.state == state
         if state == "failed":
-            assert letter.said == holds
+            assert letter.detail == holds
         else:
             assert next(post.mails()[0].iter_attachments()).get_filename() == holds
         assert list((tmp_path / "mail" / "work").iterdir()) == [], "nothing is left lying about"
@@ -306,7 +307,7 @@ async def test_a_database_is_not_sent_without_its_log(
         await mailer.change(settings(post.port))
         letter = await over(mailer, (await mailer.order("key-0001", order())).n)
         assert (letter.state, post.mails()) == ("failed", [])
-        assert letter.said == "drive is a database with a log that holds a part of it: send it in another format."
+        assert letter.detail == "drive is a database with a log that holds a part of it: send it in another format."
         assert (await over(mailer, (await mailer.order("key-0002", order(format="csv"))).n)).state == "sent"
 
 
@@ -361,7 +362,7 @@ async def test_what_is_made_can_be_cancelled(tmp_path: Path, shelf: Shelf, post:
         await begun.wait()
         assert mailer.share_of(letter) == 0.3
         assert (await mailer.cancel(letter.n)).state == "cancelled"
-        assert ended.is_set(), "the export was told"
+        assert ended.is_set(), "the export was cancelled"
         following = await mailer.order("key-0002", order())
         assert (await over(mailer, following.n)).state == "sent"
         with pytest.raises(MailRefused, match="already cancelled"):
@@ -423,7 +424,7 @@ async def test_a_refusal_in_the_midst_of_a_mail_is_heard(tmp_path: Path, shelf: 
     async with mailing(tmp_path / "mail", shelf) as mailer:
         await mailer.change(settings(server.sockets[0].getsockname()[1]))
         letter = await over(mailer, (await mailer.order("key-0001", order("large"))).n)
-        assert (letter.state, letter.said) == ("failed", "552 5.3.4 too much")
+        assert (letter.state, letter.detail) == ("failed", "552 5.3.4 too much")
     server.close()
 
 
@@ -433,7 +434,7 @@ async def test_a_mail_larger_than_the_server_takes_is_not_even_begun(tmp_path: P
         await mailer.change(settings(post.port))
         letter = await over(mailer, (await mailer.order("key-0001", order("large"))).n)
         assert letter.state == "failed"
-        assert "takes mails of at most 0.1 MB, and this one has 0.4 MB: lower the size limit" in letter.said
+        assert "takes mails of at most 0.1 MB, and this one has 0.4 MB: lower the size limit" in letter.detail
 
 
 @pytest.mark.parametrize("is_ascii", [False, True])
@@ -448,7 +449,7 @@ async def test_an_address_beyond_ascii_needs_a_server_that_takes_it(
         letter = await over(mailer, (await mailer.order("key-0001", order(to=("jörg@xn--bcher-kva.example",)))).n)
         if is_ascii:
             assert letter.state == "failed"
-            assert "beyond ASCII" in letter.said
+            assert "beyond ASCII" in letter.detail
         else:
             assert letter.state == "sent"
             assert post.taken[0]["to"] == ["jörg@xn--bcher-kva.example"]
@@ -459,7 +460,7 @@ async def test_lines_that_begin_with_a_dot_arrive_as_they_were(tmp_path: Path, s
         await mailer.change(settings(post.port))
         await post.kill()
         letter = await mailer.order("key-0001", order())
-        letter = await until(mailer, letter.n, lambda letter: letter.said != "")
+        letter = await until(mailer, letter.n, lambda letter: letter.detail != "")
         path = tmp_path / "mail" / "outbox" / letter.mails[0].file
         # Across the places where the file is read piece by piece too.
         content = (
@@ -489,17 +490,17 @@ async def test_who_is_not_allowed_gets_nothing_even_when_it_waits_already(
         assert why.value.field == "to"
         await post.kill()
         n = (await mailer.order("key-0002", order())).n
-        await until(mailer, n, lambda letter: letter.said != "")
+        await until(mailer, n, lambda letter: letter.detail != "")
         await post.start()
         await mailer.change(settings(post.port, allowed=["example.com"]))
         letter = await over(mailer, n)
-        assert (letter.state, letter.said) == ("failed", "ann@example.org is not among the allowed recipients.")
+        assert (letter.state, letter.detail) == ("failed", "ann@example.org is not among the allowed recipients.")
         assert post.taken == []
         with pytest.raises(MailRefused):
             await mailer.resend(n)
 
 
-async def test_what_cannot_be_ordered_is_refused_in_words(tmp_path: Path, shelf: Shelf, post: Post) -> None:
+async def test_what_cannot_be_ordered_is_refused_with_a_reason(tmp_path: Path, shelf: Shelf, post: Post) -> None:
     async with mailing(tmp_path / "mail", shelf) as mailer:
         with pytest.raises(MailRefused, match="not set up"):
             await mailer.order("key-0001", order())
@@ -508,9 +509,9 @@ async def test_what_cannot_be_ordered_is_refused_in_words(tmp_path: Path, shelf:
             await mailer.order("key-0001", order("nothing"))
         with pytest.raises(BadMailSetting):
             await mailer.change(settings(0))
-        for asked in (mailer.cancel(9), mailer.resend(9), mailer.letter(9)):
+        for request in (mailer.cancel(9), mailer.resend(9), mailer.letter(9)):
             with pytest.raises(MailRefused, match="no mail number 9"):
-                await asked
+                await request
 
 
 async def test_a_recording_that_is_gone_is_told(tmp_path: Path, shelf: Shelf, post: Post) -> None:
@@ -518,13 +519,13 @@ async def test_a_recording_that_is_gone_is_told(tmp_path: Path, shelf: Shelf, po
         await mailer.change(settings(post.port))
         await post.kill()
         n = (await mailer.order("key-0001", order())).n
-        await until(mailer, n, lambda letter: letter.said != "")
+        await until(mailer, n, lambda letter: letter.detail != "")
         (tmp_path / "shelf" / "drive.mcap").unlink()
         await post.start()
         await mailer.resend(n)
         assert (await over(mailer, n)).state == "sent", "it was made before"
         await mailer.resend(n)
-        assert (await over(mailer, n)).said == "The recording drive no longer exists."
+        assert (await over(mailer, n)).detail == "The recording drive no longer exists."
 
 
 async def test_it_goes_on_after_a_restart(tmp_path: Path, shelf: Shelf, post: Post) -> None:
@@ -532,7 +533,7 @@ async def test_it_goes_on_after_a_restart(tmp_path: Path, shelf: Shelf, post: Po
         await mailer.change(settings(post.port))
         await post.kill()
         n = (await mailer.order("key-0001", order())).n
-        first = await until(mailer, n, lambda letter: letter.said != "")
+        first = await until(mailer, n, lambda letter: letter.detail != "")
     await post.start()
     clock = Clock()
     clock.ms = START_MS + 60_000
@@ -628,18 +629,18 @@ async def test_what_was_ordered_before_the_settings_were_emptied_says_so(
         await mailer.change(settings(post.port))
         await post.kill()
         n = (await mailer.order("key-0001", order())).n
-        await until(mailer, n, lambda letter: letter.said != "")
+        await until(mailer, n, lambda letter: letter.detail != "")
         await mailer.change({})
         letter = await over(mailer, n)
         assert letter.state == "failed"
-        assert letter.said == "Mail is not set up: enter SMTP host and sender in Settings, E-mail."
+        assert letter.detail == "Mail is not set up: enter SMTP host and sender in Settings, E-mail."
 
 
 async def test_link_local_and_metadata_addresses_are_never_dialled(tmp_path: Path, shelf: Shelf) -> None:
     async with mailing(tmp_path / "mail", shelf) as mailer:
         await mailer.change({**settings(25), "host": "169.254.169.254"})
         letter = await over(mailer, (await mailer.order("key-0001", order())).n)
-        assert (letter.state, letter.said) == ("failed", "169.254.169.254 is never dialled.")
+        assert (letter.state, letter.detail) == ("failed", "169.254.169.254 is never dialled.")
 
 
 async def test_settings_that_were_damaged_are_told(tmp_path: Path, shelf: Shelf) -> None:

@@ -60,16 +60,18 @@ def send(outbox: Outbox, outcome: Outcome, now_ms: int = T) -> int:
 def sent(*addresses: str) -> Outcome:
     some = addresses or ("ann@example.org",)
     return Outcome(
-        state="sent", said="250 OK", recipients=tuple(Recipient(address=a, state="accepted", said="250") for a in some)
+        state="sent",
+        detail="250 OK",
+        recipients=tuple(Recipient(address=a, state="accepted", detail="250") for a in some),
     )
 
 
-def failed(said: str = "554 no", of_account: bool = False) -> Outcome:
-    return Outcome(state="failed", said=said, recipients=(), of_account=of_account)
+def failed(detail: str = "554 no", of_account: bool = False) -> Outcome:
+    return Outcome(state="failed", detail=detail, recipients=(), of_account=of_account)
 
 
 def later(next_ms: int) -> Outcome:
-    return Outcome(state="queued", said="451 later", recipients=(), next_ms=next_ms)
+    return Outcome(state="queued", detail="451 later", recipients=(), next_ms=next_ms)
 
 
 def test_it_is_durable(outbox: Outbox, tmp_path: Path) -> None:
@@ -94,7 +96,7 @@ def test_a_letter_goes_from_ordered_to_sent(outbox: Outbox) -> None:
     assert outbox.queue.begin(mail.n) is None, "it is on its way already"
     outbox.queue.settle(mail.n, sent(), T)
     done = outbox.letters()[0]
-    assert (done.state, done.said) == ("sent", "250 OK")
+    assert (done.state, done.detail) == ("sent", "250 OK")
     assert done.mails[0].recipients[0].state == "accepted"
     assert list(outbox.files.iterdir()) == [], "what was sent takes no room"
 
@@ -126,7 +128,7 @@ def test_after_a_kill_what_was_on_its_way_waits_again(tmp_path: Path) -> None:
     letter = again.letter(n)
     assert letter is not None
     assert letter.state == "queued"
-    assert "may arrive twice" in letter.said
+    assert "may arrive twice" in letter.detail
     same = again.queue.next_due(T, HOUR_MS)
     assert same is not None
     assert (same.message_id, same.attempts) == (mail.message_id, 1)
@@ -163,7 +165,7 @@ def test_a_cancelled_letter_is_not_sent_after_a_kill_either(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("outcomes", "state", "said"),
+    ("outcomes", "state", "detail"),
     [
         ([sent(), sent()], "sent", "Part 1 of 2: 250 OK"),
         ([sent(), failed()], "failed", "Part 2 of 2: 554 no"),
@@ -172,20 +174,20 @@ def test_a_cancelled_letter_is_not_sent_after_a_kill_either(tmp_path: Path) -> N
     ],
     ids=["both", "one failed", "one waits", "one not tried"],
 )
-def test_the_state_of_a_letter_of_two_parts(outbox: Outbox, outcomes: list[Outcome], state: str, said: str) -> None:
+def test_the_state_of_a_letter_of_two_parts(outbox: Outbox, outcomes: list[Outcome], state: str, detail: str) -> None:
     n = ready(outbox, parts=2)
     for outcome in outcomes:
         send(outbox, outcome)
     letter = outbox.letter(n)
     assert letter is not None
-    assert (letter.state, letter.said) == (state, said)
+    assert (letter.state, letter.detail) == (state, detail)
 
 
 def test_cancelling_ends_what_waits_and_keeps_what_was_sent(outbox: Outbox) -> None:
     n = ready(outbox, parts=2)
     send(outbox, sent())
     letter = outbox.cancel(n)
-    assert (letter.state, letter.said) == ("cancelled", "1 of 2 mails were sent before.")
+    assert (letter.state, letter.detail) == ("cancelled", "1 of 2 mails were sent before.")
     assert outbox.queue.next_due(T, HOUR_MS) is None
     assert list(outbox.files.iterdir()) == []
     with pytest.raises(WrongState, match="already cancelled"):
@@ -210,7 +212,7 @@ def test_a_mail_that_arrived_though_its_letter_was_cancelled_is_told_as_sent(out
     outbox.queue.settle(mail.n, sent(), T)
     letter = outbox.letter(n)
     assert letter is not None
-    assert (letter.state, letter.said, letter.mails[0].state) == (
+    assert (letter.state, letter.detail, letter.mails[0].state) == (
         "sent",
         "It was sent before it could be cancelled.",
         "sent",
@@ -222,10 +224,10 @@ def test_resending_tries_only_what_has_not_arrived(outbox: Outbox) -> None:
     n = ready(outbox, parts=2, to=both)
     send(outbox, sent(*both))
     refused = (
-        Recipient(address=both[0], state="accepted", said="250"),
-        Recipient(address=both[1], state="refused", said="550"),
+        Recipient(address=both[0], state="accepted", detail="250"),
+        Recipient(address=both[1], state="refused", detail="550"),
     )
-    second = send(outbox, Outcome(state="failed", said="550", recipients=refused))
+    second = send(outbox, Outcome(state="failed", detail="550", recipients=refused))
     letter = outbox.resend(n, "a@b", T + 5)
     assert (letter.state, letter.is_ready) == ("queued", True)
     mail = outbox.queue.next_due(T + 5, HOUR_MS)

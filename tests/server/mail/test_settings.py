@@ -1,4 +1,4 @@
-"""Mail settings: what cannot be set is refused in words, the password is told to nobody and stays in a file of 0600."""
+"""Mail settings: bad values are refused with a reason; the password is never returned and stays in a file of 0600."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ async def test_a_process_that_dies_ends_the_second_alone(bridge: RosBridge, base
         await order(one, "beside", recording=OTHER)
         [second] = [process for process in replays() if process.pid not in before]
         second.send_signal(signal.SIGKILL)
-        said = await one.until(lambda: next((m for m in one.other if m["kind"] == "beside_ended"), None))
-        assert said["ended"].startswith("The replay failed")
+        message = await one.until(lambda: next((m for m in one.other if m["kind"] == "beside_ended"), None))
+        assert message["ended"].startswith("The replay failed")
         await at(one, 3.0)
         assert {process.pid for process in replays()} == before

@@ -18,7 +18,11 @@ from tests.page import drives
 
 HOUR_S = 3600.0
 LOST_S = (5000.0, 5060.0)
-ASKED: dict[str, Any] = {"kind": "drive_trends", "signals": ["speed", "distance", "brake", "steering"], "buckets": 500}
+REQUEST: dict[str, Any] = {
+    "kind": "drive_trends",
+    "signals": ["speed", "distance", "brake", "steering"],
+    "buckets": 500,
+}
 
 
 @pytest.mark.field
@@ -42,14 +46,14 @@ def test_a_long_drive_opens_in_the_chart_within_0_3_s_and_60_kB(
     sketch = survey(path)["trends"]
     playback = Playback(open_recording([path]), lambda: open_recording([path]), settings="", now_s=0.0, trends=sketch)
     began_s = time.monotonic()
-    whole = playback.answer(ASKED)
+    whole = playback.answer(REQUEST)
     took_s, size = time.monotonic() - began_s, len(orjson.dumps(whole))
     assert whole["is_sketch"]
     assert found(whole, lost_s)
     playback.index.work(lambda: False)
     for part in ({}, {"from_s": max(0.0, lost_s[0] - 180), "to_s": lost_s[0] + 180}):
         began_s = time.monotonic()
-        read = playback.answer({**ASKED, **part})
+        read = playback.answer({**REQUEST, **part})
         took_s, size = max(took_s, time.monotonic() - began_s), max(size, len(orjson.dumps(read)))
         assert not read["is_sketch"]
         assert part or found(read, lost_s)

@@ -17,13 +17,18 @@ from server.replay.playback import Playback
 from tests.server.recording.made import BEGAN_MS, record
 from tests.server.replay.test_playback import NAMES, NEVER, reach
 
-WORDS = {"title": "Wheel lost", "text": "rear left, limit none"}
+TEXTS = {"title": "Wheel lost", "text": "rear left, limit none"}
 NEWER = {
     "alarm": "wheel_lost", "change": "raised", "priority": "extreme", "place": "ceiling", "sound": "siren",
-    "announces": True, "state": "UNACKED", "occurrence": 1, **WORDS,
+    "announces": True, "state": "UNACKED", "occurrence": 1, **TEXTS,
 }  # fmt: skip
-OLDER = {"alarm": "wheel_lost", "change": "raised", "priority": "critical", **WORDS}
-KNOWN = {"alarm": "not_moving", "change": "raised", "priority": "critical", **WORDS}  # another priority and other words
+OLDER = {"alarm": "wheel_lost", "change": "raised", "priority": "critical", **TEXTS}
+KNOWN = {
+    "alarm": "not_moving",
+    "change": "raised",
+    "priority": "critical",
+    **TEXTS,
+}  # another priority and another text
 
 
 @pytest.fixture(params=[NEWER, OLDER, KNOWN], ids=["newer", "older", "known"])
@@ -44,17 +49,17 @@ def playback(path: Path) -> Iterator[Playback]:
 def test_files_and_replay_count_the_same_alarms(path: Path, playback: Playback) -> None:
     assert survey(path)["alarms"] == {"critical": 1, "warning": 0, "advisory": 0}
     [alarm] = playback.frame(**NAMES)["alarms"]
-    assert (alarm["title"], alarm["trip_text"], alarm["priority"]) == (WORDS["title"], WORDS["text"], "critical")
+    assert (alarm["title"], alarm["trip_text"], alarm["priority"]) == (TEXTS["title"], TEXTS["text"], "critical")
     assert (alarm["state"], alarm["active"]) == ("UNACKED", True)
     assert (alarm["place"], alarm["sound"]) == ("dialog", "high")
     [mark] = playback.index.as_json()["marks"]
-    assert (mark["title"], mark["text"], mark["priority"]) == (WORDS["title"], WORDS["text"], "critical")
+    assert (mark["title"], mark["text"], mark["priority"]) == (TEXTS["title"], TEXTS["text"], "critical")
 
 
 def test_the_marks_of_the_trends_name_it(playback: Playback) -> None:
     wanted = Wanted.of({"from_s": 0.0, "to_s": 20.0, "buckets": 10, "signals": ["speed"]})
     marks = playback._drive_trends(wanted)["marks"]
-    assert [(mark["title"], mark["priority"]) for mark in marks] == [(WORDS["title"], "critical")]
+    assert [(mark["title"], mark["priority"]) for mark in marks] == [(TEXTS["title"], "critical")]
 
 
 def test_report_and_log_name_it(path: Path) -> None:
@@ -62,10 +67,10 @@ def test_report_and_log_name_it(path: Path) -> None:
         log = read_recorded_log(recording)
         assert log is not None
         assert [(one.title, one.priority, one.trip_text) for one in log.episodes] == [
-            (WORDS["title"], "critical", WORDS["text"])
+            (TEXTS["title"], "critical", TEXTS["text"])
         ]
-        assert [(one.title, one.priority) for one in log.entries] == [(WORDS["title"], "critical")]
+        assert [(one.title, one.priority) for one in log.entries] == [(TEXTS["title"], "critical")]
         assert log.load.announced == 1
         events = read_drive_events(recording)
     assert events is not None
-    assert [(one.title, one.priority) for one in alarms_of(events)] == [(WORDS["title"], "critical")]
+    assert [(one.title, one.priority) for one in alarms_of(events)] == [(TEXTS["title"], "critical")]

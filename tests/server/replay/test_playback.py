@@ -1,4 +1,4 @@
-"""Playback: what a seek shows is what playing shows; alarms as they were told; the pace; hostile moments and files."""
+"""Playback: what a seek shows is what playing shows; alarms as announced then; the pace; hostile moments and files."""
 
 from __future__ import annotations
 
@@ -186,14 +186,14 @@ def test_a_chart_of_a_recording_stands_before_it_is_read(street: Path) -> None:
     playback = Playback(
         open_recording([street]), lambda: open_recording([street]), settings="", now_s=100.0, trends=sketch
     )
-    asked = {"kind": "drive_trends", "signals": ["speed", "brake"], "buckets": 100}
-    first = playback.answer(asked)
+    request = {"kind": "drive_trends", "signals": ["speed", "brake"], "buckets": 100}
+    first = playback.answer(request)
     assert (first["is_sketch"], first["known_s"]) == (True, 0.0)
     assert max(high for high in first["signals"]["speed"]["highest"] if high is not None) == 12.5
     assert first["signals"]["speed"]["limits"]
     assert any(a <= 100.1 and b >= 107.9 for a, b in first["blind"])
     playback.index.work(NEVER)
-    read = playback.answer(asked)
+    read = playback.answer(request)
     assert (read["is_sketch"], read["known_s"]) == (False, read["length_s"])
     assert max(high for high in read["signals"]["speed"]["highest"] if high is not None) == 12.5
     assert any(a <= 100.1 and b >= 107.9 for a, b in read["blind"])

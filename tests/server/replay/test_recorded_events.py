@@ -44,8 +44,8 @@ def record(path: Path, own: list[tuple[float, Any, dict[str, Any]]], **metadata:
     for n in range(401):
         at_ns = BEGAN_MS * 1_000_000 + n * 50_000_000
         while waiting and waiting[0][0] <= n / 20:
-            at_s, channel, said = waiting.pop(0)
-            body = orjson.dumps({"time_ms": BEGAN_MS + at_s * 1000} | said)
+            at_s, channel, fields = waiting.pop(0)
+            body = orjson.dumps({"time_ms": BEGAN_MS + at_s * 1000} | fields)
             file.add(file.channel(f"/catgraph/{channel}", own_schema(channel)), at_ns, body)
         zero = {"x": 0.0, "y": 0.0, "z": 0.0}
         file.add(

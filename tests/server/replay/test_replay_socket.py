@@ -1,4 +1,4 @@
-"""A page's replay over a real socket: opened, led, left; live goes on beside it; refusals in words."""
+"""A page's replay over a real socket: opened, controlled, left; live data continues; refusals carry a reason."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ async def test_scans_are_those_of_the_recording(bridge: RosBridge, base: str) ->
         await at(one, 5.0)
         await one.send({"kind": "watch", "scan": True})
         await one.until(lambda: len(one.scans) >= 3)
-        assert len({scan[4:8] for scan in one.scans}) == 1, "it stands at one moment: one scan, told again and again"
+        assert len({scan[4:8] for scan in one.scans}) == 1, "it stands at one moment: the same scan, sent repeatedly"
         assert int.from_bytes(one.scans[0][2:4], "little") == 181
         await order(one, "play")
         await one.until(lambda: len({scan[4:8] for scan in one.scans}) > 3)
@@ -206,8 +206,8 @@ async def test_a_socket_that_begins_with_no_recording_is_told_and_goes_on_live(b
         one = Viewer(socket)
         reading = asyncio.create_task(one.read())
         await one.send({"kind": "hello", "have_event": None})
-        said = await one.until(lambda: next((m for m in one.other if m["kind"] == "replay"), None))
-        assert said["ended"] == "There is no recording named nobody."
+        message = await one.until(lambda: next((m for m in one.other if m["kind"] == "replay"), None))
+        assert message["ended"] == "There is no recording named nobody."
         await one.state(lambda s: "replay" not in s)
         reading.cancel()
         with contextlib.suppress(asyncio.CancelledError):
@@ -263,8 +263,8 @@ async def test_a_process_that_dies_ends_the_replay_in_words_and_live_goes_on(bri
         await at(one, 0.0)
         [process] = replays()
         process.send_signal(signal.SIGKILL)
-        said = await one.until(lambda: next((m for m in one.other if m["kind"] == "replay"), None))
-        assert said["ended"].startswith("The replay failed")
+        message = await one.until(lambda: next((m for m in one.other if m["kind"] == "replay"), None))
+        assert message["ended"].startswith("The replay failed")
         await one.state(lambda s: "replay" not in s)
 
 

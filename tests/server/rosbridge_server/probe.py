@@ -1,4 +1,4 @@
-"""A rosbridge client without a library: what it sends and hears is what is on the wire."""
+"""A rosbridge client without a library: what it sends and receives is exactly what is transmitted."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Probe:
     async def hear_op(self, op: str, within_s: float = 20.0) -> Operation:
         """The next message of this kind; others are passed over."""
         while True:
-            heard = await self.hear(within_s)
-            if heard["op"] == op:
-                return heard
+            message = await self.hear(within_s)
+            if message["op"] == op:
+                return message
 
     async def hears_nothing(self, for_s: float = 0.15) -> bool:
         with contextlib.suppress(TimeoutError):

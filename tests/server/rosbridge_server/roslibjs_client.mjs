@@ -19,13 +19,13 @@ setTimeout(() => fail("the bridge did not send what was expected"), 15_000).unre
 
 function take(name, messageType, count, options = {}) {
   return new Promise((resolve) => {
-    const heard = [];
+    const received = [];
     const topic = new Topic({ ros, name, messageType, ...options });
     topic.subscribe((message) => {
-      heard.push(message);
-      if (heard.length === count) {
+      received.push(message);
+      if (received.length === count) {
         topic.unsubscribe();
-        resolve(heard);
+        resolve(received);
       }
     });
   });

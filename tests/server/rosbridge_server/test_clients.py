@@ -33,7 +33,7 @@ SCAN = {
 
 @pytest.fixture
 async def car(bridge: RosBridge) -> AsyncIterator[RosBridge]:
-    """A car that talks for as long as it is asked to, and answers what it is told."""
+    """A simulated car that publishes until the test ends, and echoes the commands that it receives."""
     commands: list[tuple[str, Json]] = []
     bridge.advertise("/vel", "geometry_msgs/Twist")
     for topic in ("/scan", "/points"):

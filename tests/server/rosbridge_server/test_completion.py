@@ -43,7 +43,7 @@ def test_ros_2_takes_the_names_of_ros_1_and_now() -> None:
 
 
 def test_ros_1_leaves_out_the_names_of_ros_2_and_says_so() -> None:
-    """As rosbridge does, which says nothing."""
+    """As rosbridge does, though without a note."""
     notes: list[str] = []
     point = {"header": {"stamp": {"sec": 3, "nanosec": 4}}}
     made = ROS1.complete("geometry_msgs/PointStamped", point, 12.5, notes)

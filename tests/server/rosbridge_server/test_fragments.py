@@ -70,26 +70,26 @@ def test_the_oldest_unfinished_message_gives_way() -> None:
 
 async def whole(probe: Probe, size: int) -> tuple[int, Any]:
     """Of how many fragments of this size the next operation is made, and the operation."""
-    text, count, heard = "", 0, await probe.hear()
-    while heard["op"] == "fragment":
-        assert (heard["num"], heard["total"] >= 1) == (count, True)
-        text, count = text + heard["data"], count + 1
-        if len(heard["data"]) < size:
+    text, count, message = "", 0, await probe.hear()
+    while message["op"] == "fragment":
+        assert (message["num"], message["total"] >= 1) == (count, True)
+        text, count = text + message["data"], count + 1
+        if len(message["data"]) < size:
             return count, orjson.loads(text)
-        heard = await probe.hear()
-    return count, heard
+        message = await probe.hear()
+    return count, message
 
 
 async def test_a_client_gets_all_text_in_pieces_of_its_size() -> None:
     """Answers, messages and pictures; CBOR is whole."""
     async with bridging() as (bridge, port), probing(port) as probe:
-        bridge.advertise("/word", "std_msgs/String")
+        bridge.advertise("/text", "std_msgs/String")
         for compression, op, is_whole in (("none", "publish", False), ("png", "png", False), ("cbor", "publish", True)):
-            await probe.send(op="subscribe", topic="/word", id="s", compression=compression, fragment_size=61)
+            await probe.send(op="subscribe", topic="/text", id="s", compression=compression, fragment_size=61)
             await probe.send(op="call_service", service="/rosapi/get_time", id="t")
             count, answer = await whole(probe, 61)
             assert (count > 1, answer["id"]) == (True, "t")
-            bridge.publish("/word", {"data": "word " * 20})
+            bridge.publish("/text", {"data": "text " * 20})
             count, message = await whole(probe, 61)
             assert (count == 0, message["op"]) == (is_whole, op)
 
@@ -97,11 +97,11 @@ async def test_a_client_gets_all_text_in_pieces_of_its_size() -> None:
 @pytest.mark.parametrize(("version", "op"), [(1, "publish"), (2, "fragment")])
 async def test_ros_2_takes_what_is_longer_than_its_frames_apart(version: Any, op: str) -> None:
     async with bridging(ros_version=version, max_message_bytes=5_000) as (bridge, port), probing(port) as probe:
-        bridge.advertise("/word", "std_msgs/String")
-        await probe.send(op="subscribe", topic="/word")
+        bridge.advertise("/text", "std_msgs/String")
+        await probe.send(op="subscribe", topic="/text")
         await probe.send(op="call_service", service="/rosapi/get_time", id="t")
         assert (await probe.hear())["id"] == "t"
-        bridge.publish("/word", {"data": "x" * 6_000})
+        bridge.publish("/text", {"data": "x" * 6_000})
         assert (await probe.hear())["op"] == op
 
 

@@ -37,10 +37,10 @@ async def test_a_call_is_answered_by_the_other_client(port: int, probe: Probe) -
             "type": "std_srvs/SetBool"
         }
         await caller.send(op="call_service", service="/lamp", args={"data": True}, id="c1")
-        asked = await request(probe)
-        assert asked == {"op": "call_service", "id": asked["id"], "service": "/lamp", "args": {"data": True}}
+        forwarded = await request(probe)
+        assert forwarded == {"op": "call_service", "id": forwarded["id"], "service": "/lamp", "args": {"data": True}}
         values = {"success": True, "message": "on"}
-        await probe.send(op="service_response", id=asked["id"], service="/lamp", values=values, result=True)
+        await probe.send(op="service_response", id=forwarded["id"], service="/lamp", values=values, result=True)
         assert await caller.hear() == {
             "op": "service_response",
             "service": "/lamp",
@@ -54,8 +54,8 @@ async def test_a_failure_is_passed_on(port: int, probe: Probe) -> None:
     async with probing(port) as caller:
         await offer(probe)
         await caller.send(op="call_service", service="/lamp", id="c1")
-        asked = await request(probe)
-        await probe.send(op="service_response", id=asked["id"], service="/lamp", values="no bulb", result=False)
+        forwarded = await request(probe)
+        await probe.send(op="service_response", id=forwarded["id"], service="/lamp", values="no bulb", result=False)
         answer = await caller.hear()
         assert (answer["result"], answer["values"]) == (False, failed("no bulb"))
 
@@ -75,9 +75,9 @@ async def test_a_caller_that_goes_leaves_nothing_behind(bridge: RosBridge, port:
     await offer(probe)
     async with probing(port) as caller:
         await caller.send(op="call_service", service="/lamp", id="c1")
-        asked = await request(probe)
+        forwarded = await request(probe)
     await until(lambda: bridge.clients == 1)
-    await probe.send(op="service_response", id=asked["id"], service="/lamp", values={}, result=True)
+    await probe.send(op="service_response", id=forwarded["id"], service="/lamp", values={}, result=True)
     assert "no call with this id waits for an answer" in (await probe.hear())["msg"]
 
 
@@ -112,8 +112,8 @@ async def test_a_late_answer_fits_no_call_of_the_service_when_it_is_offered_anew
         await caller.send(op="call_service", service="/lamp", id="c2")
         second = await request(probe)
         assert second["id"] != first["id"]
-        for asked, success in ((first, False), (second, True)):
-            await probe.send(op="service_response", id=asked["id"], values={"success": success}, result=True)
+        for forwarded, success in ((first, False), (second, True)):
+            await probe.send(op="service_response", id=forwarded["id"], values={"success": success}, result=True)
         answer = await caller.hear()
         assert (answer["id"], answer["values"]) == ("c2", {"success": True})
 

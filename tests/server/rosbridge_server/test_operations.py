@@ -68,7 +68,7 @@ async def test_a_client_that_asks_twice_gets_each_message_once(vel: RosBridge, p
     await probe.subscribe("/vel", id="a", compression="none")
     await probe.subscribe("/vel", id="b", compression="cbor")
     vel.publish("/vel", TWIST)
-    assert isinstance(await probe.hear_raw(), bytes)  # CBOR when any of them asked for it
+    assert isinstance(await probe.hear_raw(), bytes)  # CBOR if any subscription requested it
     assert await probe.hears_nothing()
     await probe.send(op="unsubscribe", topic="/vel", id="b")
     await probe.settle()
@@ -166,9 +166,9 @@ async def test_throttling_leaves_out_and_counts_no_loss(vel: RosBridge, probe: P
         vel.publish("/vel", TWIST)
         published += 1
         await asyncio.sleep(0.005)
-    heard = 0
+    received = 0
     while not await probe.hears_nothing(0.1):
-        heard += 1
+        received += 1
     assert vel.sent == 5
     assert (vel.dropped, vel.counters.throttled) == (0, published - vel.sent)
 
@@ -193,15 +193,15 @@ async def test_the_fastest_wish_of_a_client_wins(vel: RosBridge, probe: Probe) -
 
 
 async def test_clients_publish_to_each_other_and_to_us(bridge: RosBridge, port: int, probe: Probe) -> None:
-    heard: list[tuple[str, str, Json]] = []
-    bridge.on_publish.append(lambda *what: heard.append(what))
+    received: list[tuple[str, str, Json]] = []
+    bridge.on_publish.append(lambda *what: received.append(what))
     async with probing(port) as other:
         await other.subscribe("/cmd_vel")
         await probe.send(op="advertise", topic="/cmd_vel", type="geometry_msgs/Twist", id="ad")
         await probe.send(op="publish", topic="/cmd_vel", msg={"linear": {"x": 2}}, id="p")
         message = (await other.hear_op("publish"))["msg"]
     assert message == {"linear": {"x": 2.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
-    assert heard == [("/cmd_vel", "geometry_msgs/Twist", message)]
+    assert received == [("/cmd_vel", "geometry_msgs/Twist", message)]
 
 
 @pytest.mark.parametrize(
@@ -216,14 +216,14 @@ async def test_clients_publish_to_each_other_and_to_us(bridge: RosBridge, port: 
 async def test_a_message_that_is_not_of_its_type_goes_nowhere(
     bridge: RosBridge, probe: Probe, message: Any, why: str
 ) -> None:
-    heard: list[Any] = []
-    bridge.on_publish.append(lambda *what: heard.append(what))
+    received: list[Any] = []
+    bridge.on_publish.append(lambda *what: received.append(what))
     await probe.send(op="advertise", topic="/cmd_vel", type="geometry_msgs/Twist")
     await probe.send(op="publish", topic="/cmd_vel", msg=message, id="p7")
     status = await probe.hear()
     assert (status["level"], status["id"]) == ("error", "p7")
     assert why in status["msg"]
-    assert heard == []
+    assert received == []
 
 
 async def test_times_that_ros_1_leaves_out_are_said_once_for_a_topic(bridge: RosBridge, probe: Probe) -> None:
@@ -361,8 +361,8 @@ async def test_what_is_not_json_is_answered(probe: Probe, frame: str | bytes) ->
     assert (await probe.call("/rosapi/get_time"))["result"] is True
 
 
-async def test_levels_choose_what_is_said(bridge: RosBridge, probe: Probe) -> None:
-    await probe.send(op="unsubscribe", topic="/never", id="quiet")  # a warning: not said by default
+async def test_levels_choose_which_reports_are_sent(bridge: RosBridge, probe: Probe) -> None:
+    await probe.send(op="unsubscribe", topic="/never", id="quiet")  # a warning: not sent by default
     await probe.send(op="set_level", level="info")
     await probe.send(op="subscribe", topic="/a", type="std_msgs/String", id="s")
     assert await probe.hear() == {"op": "status", "level": "info", "msg": "subscribed to /a", "id": "s"}

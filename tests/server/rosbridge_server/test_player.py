@@ -94,17 +94,17 @@ async def test_others_get_their_turn_while_it_hurries(numbers: RosBridge, probe:
     await asyncio.wait({playing})
 
 
-async def test_a_live_source_is_asked_for_one_message_at_a_time(numbers: RosBridge) -> None:
-    asked, played = [], []
+async def test_a_live_source_is_read_one_message_at_a_time(numbers: RosBridge) -> None:
+    requested, played = [], []
 
     def live() -> Iterator[Message]:
         for message in drive(20):
-            asked.append(len(played))
+            requested.append(len(played))
             yield message
 
     ended: list[bool] = []
     await play(live(), numbers, on_message=played.append, on_end=lambda: ended.append(True))
-    assert asked == list(range(20))
+    assert requested == list(range(20))
     assert ended == [True]
 
 

@@ -62,10 +62,10 @@ async def test_a_png_holds_the_json(bridge: RosBridge, probe: Probe) -> None:
     bridge.advertise("/vel", "geometry_msgs/Twist")
     await probe.subscribe("/vel", compression="png")
     bridge.publish("/vel", {**TWIST, "linear": {"x": math.nan, "y": 2.0, "z": 3.0}})
-    heard = await probe.hear()
-    assert set(heard) == {"op", "data"}
-    assert heard["op"] == "png"
-    assert orjson.loads(pixels(base64.b64decode(heard["data"]))) == {
+    received = await probe.hear()
+    assert set(received) == {"op", "data"}
+    assert received["op"] == "png"
+    assert orjson.loads(pixels(base64.b64decode(received["data"]))) == {
         "op": "publish",
         "topic": "/vel",
         "msg": {**TWIST, "linear": {"x": None, "y": 2.0, "z": 3.0}},
@@ -78,8 +78,8 @@ async def test_the_strongest_encoding_of_a_client_wins(bridge: RosBridge, probe:
     for compression, found in (("none", "msg"), ("png", "data"), ("cbor", "linear"), ("cbor-raw", "bytes")):
         await probe.subscribe("/vel", id=compression, compression=compression)
         bridge.publish("/vel", TWIST)
-        heard = await probe.hear()
-        assert found in heard or found in heard["msg"]
+        received = await probe.hear()
+        assert found in received or found in received["msg"]
 
 
 async def test_what_has_no_raw_bytes_is_told_once(bridge: RosBridge, probe: Probe) -> None:
@@ -88,9 +88,9 @@ async def test_what_has_no_raw_bytes_is_told_once(bridge: RosBridge, probe: Prob
     await probe.subscribe("/odd", compression="cbor-raw")
     for _ in range(3):
         bridge.publish("/odd", {"x": 1})
-    heard = await probe.hear()
-    assert (heard["op"], heard["level"]) == ("status", "error")
-    assert heard["msg"] == "subscribe: /odd cannot be sent as cbor-raw: the type my_msgs/Odd is not known"
+    received = await probe.hear()
+    assert (received["op"], received["level"]) == ("status", "error")
+    assert received["msg"] == "subscribe: /odd cannot be sent as cbor-raw: the type my_msgs/Odd is not known"
     assert await probe.hears_nothing()
     await probe.send(op="unsubscribe", topic="/odd")
     await probe.subscribe("/odd")

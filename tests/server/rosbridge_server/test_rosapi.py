@@ -23,8 +23,8 @@ async def car() -> AsyncIterator[tuple[RosBridge, Probe]]:
         yield bridge, probe
 
 
-async def values(car: tuple[RosBridge, Probe], asked: str, **args: object) -> Any:
-    response = await car[1].call(asked, args)
+async def values(car: tuple[RosBridge, Probe], service_name: str, **args: object) -> Any:
+    response = await car[1].call(service_name, args)
     assert response["result"] is True, response
     return response["values"]
 
@@ -116,7 +116,7 @@ async def test_message_details_of_arrays_and_constants(car: tuple[RosBridge, Pro
 
 @pytest.mark.parametrize("version", [1, 2])
 async def test_its_own_services_are_described(version: RosVersion) -> None:
-    """What each answers is what it says of its answers."""
+    """The answer of each service matches its description."""
     args = {"type": "std_msgs/String", "service": "/rosapi/topics", "topic": "/vel", "node": "/car", "name": "/a:b"}
     async with bridging(ros_version=version) as (bridge, port), probing(port) as probe:
         bridge.advertise("/vel", "geometry_msgs/Twist")

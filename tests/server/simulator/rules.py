@@ -28,7 +28,7 @@ class Rules:
         self.broken: dict[str, list[float]] = {}
         self._reaction_s, self._braking_mps2 = reaction_s, braking_mps2
         self._began_s: float | None = None
-        self._heard_s: dict[str, float] = {}
+        self._received_s: dict[str, float] = {}
         self._recent: dict[str, deque[float]] = {signal: deque() for signal in RATES_HZ}
         self._speed_mps = 0.0
         self._tyre_rad = 0.0
@@ -53,7 +53,7 @@ class Rules:
     def take(self, message: Message) -> None:
         if self._began_s is None:
             self._began_s = message.at_s
-            self._heard_s = dict.fromkeys(RATES_HZ, message.at_s)
+            self._received_s = dict.fromkeys(RATES_HZ, message.at_s)
         now_s, signal, fields = message.at_s, SIGNAL_OF_TOPIC[message.topic], message.message
         self._rates(now_s, signal)
         match signal:
@@ -85,13 +85,13 @@ class Rules:
         return max(5.0, stopping_m, 2.0 * speed)
 
     def _rates(self, now_s: float, signal: str) -> None:
-        self._heard_s[signal] = now_s
+        self._received_s[signal] = now_s
         recent = self._recent[signal]
         recent.append(now_s)
         while recent[0] < now_s - 5.0:
             recent.popleft()
-        for name, heard_s in self._heard_s.items():
-            if now_s - heard_s > max(10 / RATES_HZ[name], 1.0):
+        for name, received_s in self._received_s.items():
+            if now_s - received_s > max(10 / RATES_HZ[name], 1.0):
                 self._breaks(f"stale {name}", now_s)
         if self._began_s is not None and now_s - self._began_s > 6.0 and len(recent) > 1:
             rate = (len(recent) - 1) / max(recent[-1] - recent[0], 1e-9)

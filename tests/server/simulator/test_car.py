@@ -225,7 +225,7 @@ def test_messages_are_never_changed_afterwards() -> None:
     assert written(some) == before
 
 
-def test_a_command_from_the_bridge_is_obeyed_with_limits() -> None:
+def test_a_command_from_the_bridge_is_followed_within_limits() -> None:
     car = SimulatedCar()
     steps = car.steps()
     while car.elapsed_s < 12.0:
@@ -234,7 +234,7 @@ def test_a_command_from_the_bridge_is_obeyed_with_limits() -> None:
     assert begun_mps > 6.0
     commands = 0
     while car.elapsed_s < 15.0:
-        car.obey({"linear": {"x": 2.0}, "angular": {"z": -0.1}})
+        car.follow({"linear": {"x": 2.0}, "angular": {"z": -0.1}})
         commands += sum(message.topic == "/catvehicle/cmd_vel" for message in next(steps).messages)
         assert car.motion.acceleration_mps2 >= -4.6
     assert car.motion.speed_mps == pytest.approx(2.0, abs=0.1)
@@ -248,7 +248,7 @@ def test_when_no_more_commands_come_the_driver_returns_to_the_lap() -> None:
     while car.elapsed_s < 10.0:
         next(steps)
     while car.elapsed_s < 13.0:
-        car.obey({"linear": {"x": 4.0, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0.1}})
+        car.follow({"linear": {"x": 4.0, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0.1}})
         next(steps)
     while car.elapsed_s < 40.0:
         next(steps)
@@ -275,7 +275,7 @@ def test_a_command_without_a_speed_is_ignored(message: dict[str, Any]) -> None:
     car, untouched = SimulatedCar(), SimulatedCar()
     steps, others = car.steps(), untouched.steps()
     while car.elapsed_s < 3.0:
-        car.obey(message)
+        car.follow(message)
         next(steps)
         next(others)
     assert car.motion == untouched.motion
@@ -289,7 +289,7 @@ def test_a_command_without_an_angle_keeps_the_tyres(angle: object) -> None:
         next(steps)
     tyre_rad = car.motion.tyre_rad
     while car.elapsed_s < 4.0:
-        car.obey({"linear": {"x": 1.0}, "angular": {"z": angle}})
+        car.follow({"linear": {"x": 1.0}, "angular": {"z": angle}})
         next(steps)
     assert car.motion.tyre_rad == pytest.approx(tyre_rad, abs=0.002)
 
@@ -298,12 +298,12 @@ def test_monstrous_commands_stay_within_what_a_car_can_do() -> None:
     car = SimulatedCar()
     steps = car.steps()
     while car.elapsed_s < 4.0:
-        car.obey({"linear": {"x": 1e300}, "angular": {"z": -1e300}})
+        car.follow({"linear": {"x": 1e300}, "angular": {"z": -1e300}})
         next(steps)
         assert 0 <= car.motion.speed_mps <= 1.5 * car.elapsed_s + 0.1
         assert abs(car.motion.tyre_rad) <= 0.53
     while car.elapsed_s < 8.0:
-        car.obey({"linear": {"x": -1e300}, "angular": {"z": 1e300}})
+        car.follow({"linear": {"x": -1e300}, "angular": {"z": 1e300}})
         next(steps)
     assert car.motion.speed_mps == 0.0
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from server.simulator.console import Console, obey
+from server.simulator.console import Console, run_line
 from server.simulator.scenarios import SCENARIOS
 from server.simulator.service import CarService
 
@@ -19,17 +19,17 @@ def running(service: CarService) -> set[str]:
 
 def test_lines_start_and_stop_scenarios() -> None:
     service = CarService()
-    assert obey(service, "speeding") == "speeding started."
-    assert obey(service, "  Slow-Rate 20 \r") == "slow-rate started for 20 s."
+    assert run_line(service, "speeding") == "speeding started."
+    assert run_line(service, "  Slow-Rate 20 \r") == "slow-rate started for 20 s."
     assert running(service) == {"speeding", "slow-rate"}
-    assert "[20 s left]" in obey(service, "list")
-    assert obey(service, "stop speeding") == "speeding stopped."
-    assert obey(service, "STOP") == "All scenarios stopped."
+    assert "[20 s left]" in run_line(service, "list")
+    assert run_line(service, "stop speeding") == "speeding stopped."
+    assert run_line(service, "STOP") == "All scenarios stopped."
     assert running(service) == set()
 
 
 def test_the_list_names_every_scenario_with_its_sentence() -> None:
-    listing = obey(CarService(), "list")
+    listing = run_line(CarService(), "list")
     for scenario in SCENARIOS.values():
         assert scenario.name in listing
         assert scenario.sentence in listing
@@ -40,19 +40,19 @@ def test_the_list_names_every_scenario_with_its_sentence() -> None:
 )
 def test_what_is_not_understood_is_answered_and_harms_nothing(line: str) -> None:
     service = CarService()
-    answer = obey(service, line)
+    answer = run_line(service, line)
     assert answer
     assert len(answer) < 600
     assert running(service) == set()
 
 
 def test_an_empty_line_has_no_answer() -> None:
-    assert obey(CarService(), "  \n") == ""
+    assert run_line(CarService(), "  \n") == ""
 
 
-async def heard(service: CarService, file: int, pieces: list[bytes], write: int | None) -> list[str]:
-    said: list[str] = []
-    console = Console(service, file, said.append)
+async def answers_to(service: CarService, file: int, pieces: list[bytes], write: int | None) -> list[str]:
+    answers: list[str] = []
+    console = Console(service, file, answers.append)
     console.open()
     try:
         for piece in pieces:
@@ -62,7 +62,7 @@ async def heard(service: CarService, file: int, pieces: list[bytes], write: int 
         await asyncio.sleep(0.02)
     finally:
         console.close()
-    return said
+    return answers
 
 
 @pytest.mark.virtual_time
@@ -70,12 +70,12 @@ async def test_lines_come_through_a_pipe_in_any_pieces() -> None:
     read, write = os.pipe()
     service = CarService()
     try:
-        said = await heard(service, read, [b"spee", b"ding\nslow-", b"rate\n\xff\xfe\n"], write)
+        answers = await answers_to(service, read, [b"spee", b"ding\nslow-", b"rate\n\xff\xfe\n"], write)
     finally:
         os.close(read)
         os.close(write)
-    assert said[:2] == ["speeding started.", "slow-rate started."]
-    assert len(said) == 3
+    assert answers[:2] == ["speeding started.", "slow-rate started."]
+    assert len(answers) == 3
     assert running(service) == {"speeding", "slow-rate"}
 
 
@@ -83,11 +83,11 @@ async def test_lines_come_through_a_pipe_in_any_pieces() -> None:
 async def test_an_endless_line_is_not_kept() -> None:
     read, write = os.pipe()
     try:
-        said = await heard(CarService(), read, [b"x" * 4096] * 4, write)
+        answers = await answers_to(CarService(), read, [b"x" * 4096] * 4, write)
     finally:
         os.close(read)
         os.close(write)
-    assert said, "it is answered before it ends"
+    assert answers, "it is answered before it ends"
 
 
 @pytest.mark.virtual_time
@@ -96,10 +96,10 @@ async def test_the_end_of_the_input_ends_the_listening() -> None:
     os.write(write, b"speeding\nstop")
     os.close(write)
     try:
-        said = await heard(CarService(), read, [], None)
+        answers = await answers_to(CarService(), read, [], None)
     finally:
         os.close(read)
-    assert said[:1] == ["speeding started."]
+    assert answers[:1] == ["speeding started."]
 
 
 @pytest.mark.virtual_time
@@ -109,6 +109,6 @@ async def test_a_file_is_read_and_dev_null_does_no_harm(tmp_path: Path) -> None:
     for path, expected in ((script, ["speeding started."]), (Path(os.devnull), [])):
         file = os.open(path, os.O_RDONLY)
         try:
-            assert await heard(CarService(), file, [], None) == expected
+            assert await answers_to(CarService(), file, [], None) == expected
         finally:
             os.close(file)

@@ -73,7 +73,7 @@ def test_the_driver_goes_as_fast_as_the_sight_allows_and_no_faster(sight_m: floa
 
 @pytest.mark.field
 def test_it_is_much_faster_than_real_time() -> None:
-    """Twenty times real time on an idle core is asked for; a machine busy with other tests must still manage five."""
+    """The goal is twenty times real time on an idle core; a machine busy with other tests must still reach five."""
     car = SimulatedCar()
     steps = car.steps()
     began_s = time.process_time()

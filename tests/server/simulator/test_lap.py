@@ -28,12 +28,12 @@ def test_it_goes_once_round_to_the_left() -> None:
 @pytest.mark.parametrize("station_m", [0.0, 0.3, 250.0, STOP_M, 600.1, LENGTH_M - 0.2])
 def test_a_place_on_it_is_found_again(station_m: float) -> None:
     pose = lap().at(station_m)
-    for guess_m in (None, station_m - 4.0, station_m + 4.0):
-        found_m = lap().nearest_m(pose.x_m, pose.y_m, guess_m=guess_m)
+    for near_m in (None, station_m - 4.0, station_m + 4.0):
+        found_m = lap().nearest_m(pose.x_m, pose.y_m, near_m=near_m)
         assert math.remainder(found_m - station_m, LENGTH_M) == pytest.approx(0, abs=0.02)
 
 
 def test_a_place_beside_it_is_found_too() -> None:
     pose = lap().at(400.0)
     x_m, y_m = pose.x_m - 2 * math.sin(pose.yaw_rad), pose.y_m + 2 * math.cos(pose.yaw_rad)
-    assert lap().nearest_m(x_m, y_m, guess_m=398.0) == pytest.approx(400.0, abs=0.05)
+    assert lap().nearest_m(x_m, y_m, near_m=398.0) == pytest.approx(400.0, abs=0.05)

@@ -16,12 +16,12 @@ async def test_the_car_lives_as_fast_as_the_clock() -> None:
     async with running_car() as (service, port), bridge_client(port) as client:
         await client.subscribe("/catvehicle/vel")
         await client.next("/catvehicle/vel")
-        began_s, driven_s, heard = time.monotonic(), service.car.elapsed_s, 0
+        began_s, driven_s, received = time.monotonic(), service.car.elapsed_s, 0
         while time.monotonic() < began_s + 2.0:
             await client.next("/catvehicle/vel")
-            heard += 1
+            received += 1
         assert service.car.elapsed_s - driven_s == pytest.approx(2.0, abs=0.4)
-        assert heard == pytest.approx(40, rel=0.2)
+        assert received == pytest.approx(40, rel=0.2)
 
 
 async def test_others_on_the_loop_are_hardly_disturbed() -> None:

@@ -34,7 +34,7 @@ def test_the_stopper_steps_in_and_without_one_the_last_command_stays(
 ) -> None:
     for has_stopper, expected in ((True, with_stopper), (False, COMMAND)):
         stack = Stack(has_stopper=has_stopper)
-        stack.hear(COMMAND, 100.0)
+        stack.receive(COMMAND, 100.0)
         stack.see(distance_m)
         assert stack.passed(100.0 + age_s) == expected
 
@@ -62,7 +62,7 @@ class Drive:
         next_s = self.car.elapsed_s + 0.027
         while self.car.elapsed_s < until_s:
             if message is not None and self.car.elapsed_s >= next_s:
-                self.car.obey(message)
+                self.car.follow(message)
                 next_s += 0.05
             next(self._steps)
             accelerations.append(self.car.motion.acceleration_mps2)

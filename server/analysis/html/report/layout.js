@@ -3,11 +3,11 @@
 /**
  * @typedef {{label: string, ink: 'ink' | 'ink2' | 'order' | 'you', limit: boolean, t: number[], v: (number | null)[]}} Curve
  * @typedef {{title: string, unit: string, digits: number, curves: Curve[]}} Panel
- * @typedef {{alarm: string, title: string, priority: string, from: number, to: number, open: boolean, said: number[],
+ * @typedef {{alarm: string, title: string, priority: string, from: number, to: number, open: boolean, announced: number[],
  *   hidden: [number, number][]}} Bar
- * @typedef {{label: string, priority: string, spans: [number, number, string, string][]}} Ribbon
+ * @typedef {{label: string, priority: string, spans: [number, number, string, string][]}} CheckTimeline
  * @typedef {{from: number, to: number, startMs: number | null, panels: Panel[], track: {t: number[], e: number[],
- *   n: number[]} | null, episodes: Bar[], before: Bar[], ribbons: Ribbon[], injected: [string, number, number][]}} Data
+ *   n: number[]} | null, episodes: Bar[], before: Bar[], timelines: CheckTimeline[], injected: [string, number, number][]}} Data
  */
 
 const LEAST_S = 2; // no zoom shows less

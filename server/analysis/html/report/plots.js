@@ -109,23 +109,23 @@ function hatchGaps(/** @type {any} */ u, /** @type {Panel} */ panel) {
   ctx.restore();
 }
 
-export function mountRibbons() {
-  if (data.ribbons.length === 0) return;
-  const root = must('ribbons');
+export function mountCheckTimelines() {
+  if (data.timelines.length === 0) return;
+  const root = must('check-timelines');
   root.append(make('div', { class: 'sep' }, 'Checks'));
-  for (const ribbon of data.ribbons) {
+  for (const timeline of data.timelines) {
     const track = make('div', { class: 'track' });
-    for (const [from, to, verdict] of ribbon.spans) {
+    for (const [from, to, verdict] of timeline.spans) {
       const part = make('i', { 'data-verdict': verdict });
       track.append(part);
       redraws.push(() => lay(part, from, to));
     }
-    const said = make('span');
-    root.append(make('div', { class: 'ribbon', 'data-priority': ribbon.priority }, track, make('div', { class: 'name' }, make('b', {}, ribbon.label), said)));
-    const starts = ribbon.spans.map(([from]) => from);
+    const text = make('span');
+    root.append(make('div', { class: 'check-timeline', 'data-priority': timeline.priority }, track, make('div', { class: 'name' }, make('b', {}, timeline.label), text)));
+    const starts = timeline.spans.map(([from]) => from);
     followers.push(() => {
-      const span = ribbon.spans[Math.max(0, indexAt(starts, view.at))];
-      said.textContent = span ? [REASONS[/** @type {keyof typeof REASONS} */ (span[2])], span[3]].filter(Boolean).join(': ') : '';
+      const span = timeline.spans[Math.max(0, indexAt(starts, view.at))];
+      text.textContent = span ? [REASONS[/** @type {keyof typeof REASONS} */ (span[2])], span[3]].filter(Boolean).join(': ') : '';
     });
   }
 }

@@ -34,7 +34,7 @@ export function mountTrack() {
     scaleBar(ctx, height, step * scale, step);
     north(ctx, width);
   };
-  must('track-said').textContent = `A dot each ${DOT_EVERY_S} s; thick where an alarm stood. Point at it to read the moment.`;
+  must('track-note').textContent = `A dot each ${DOT_EVERY_S} s; thick where an alarm stood. Point at it to read the moment.`;
   redraws.push(draw);
   repaints.push(draw);
   followers.push(draw);
