@@ -249,8 +249,8 @@ test('apart is as the server compared them at one moment; where it did not, as t
   const [car, phone] = [carOf(frame, inked('fresh')), phoneOf(frame, 0)];
   assert.deepEqual(apartOf(frame, 0, car, phone), { distance_m: 10.4, bearing_deg: 323.4, allowed_m: 14 });
   assert.equal(apartOf(frameOf(FIX, { ...PHONE, explained_m: 3 }), 0, car, phone)?.allowed_m, 10);
-  for (const phone of [{ ...PHONE, used: false, why: 'coarse' }, { ...PHONE, apart_m: null }, { ...PHONE, compared_age_s: 5.1 }]) {
-    const found = apartOf(frameOf(FIX, phone), 0, car, phone);
+  for (const given of [{ ...PHONE, used: false, why: 'coarse' }, { ...PHONE, apart_m: null }, { ...PHONE, compared_age_s: 5.1 }]) {
+    const found = apartOf(frameOf(FIX, given), 0, car, phone);
     near(found?.distance_m ?? 0, 10, 0.01);
     near(found?.bearing_deg ?? 0, 323.13, 0.01); // the phone is 6 m east and 8 m south of the car
     assert.equal(found?.allowed_m, null);
