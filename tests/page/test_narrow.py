@@ -7,7 +7,7 @@ from playwright.async_api import expect
 
 from tests.page.canned import Canned, Json, alarm, live, slowed
 from tests.page.conftest import Phone
-from tests.page.screenshots import car
+from tests.page.screenshots import car, too_fast
 
 # What is wider or higher than its own room.
 CUT = """(names) => names.filter((name) => [...document.querySelectorAll(name)].some((one) => one.offsetParent
@@ -145,3 +145,18 @@ async def test_a_critical_alarm_leaves_the_gauge_whole(phone: Phone, canned: Can
             await phone.page.wait_for_timeout(100)
         assert found["apart"] >= 0, (size, found)
         assert size[1] < 480 or found["width"] >= 272, (size, found)
+
+
+@pytest.mark.parametrize("height", [740, 760, 780, 799])
+async def test_a_critical_alarm_leaves_no_empty_band_over_its_sheet(phone: Phone, canned: Canned, height: int) -> None:
+    """Lower phones have no room for its head, higher ones show the tabs."""
+    await phone.page.set_viewport_size({"width": 360, "height": height})
+    canned.state = too_fast(live())
+    await phone.open(canned.address)
+    await expect(phone.page.locator("#sheet-alarm")).to_be_visible()
+    await expect(phone.page.locator("#alarm-title")).to_be_visible()
+    under = await phone.page.evaluate(
+        """() => { const { bottom } = document.querySelector('[data-part="nearest"]').getBoundingClientRect();
+        return document.querySelector('#sheet-alarm').getBoundingClientRect().top - bottom; }"""
+    )
+    assert 0 <= under <= 48, under

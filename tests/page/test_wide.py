@@ -336,6 +336,23 @@ async def test_files_of_a_desktop_show_the_chosen_recording_beside_the_list(phon
 
 
 @pytest.mark.gate
+async def test_files_of_a_tablet_give_the_car_the_wider_column_and_leave_no_gap_among_the_keys(
+    phone: Phone, canned: Canned
+) -> None:
+    """What stands beside a name is longer than it: when, and that the file was recovered."""
+    page = phone.page
+    await page.set_viewport_size({"width": 820, "height": 1180})
+    await phone.open(f"{canned.address}/#files")
+    keys = page.locator(".file-dock [data-f=file-actions] > li:not([hidden])")
+    await expect(keys.last).to_be_visible()
+    name, car = [await page.locator(f".files-heads > :nth-child({n})").bounding_box() for n in (2, 3)]
+    assert name
+    assert car
+    assert car["width"] > 1.2 * name["width"]
+    tops = [round(top) for top in await keys.evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().top)")]
+    assert len({tops.count(top) for top in tops}) == 1, "each row has as many"
+
+
 async def test_advisories_are_in_no_column_of_warnings(phone: Phone, canned: Canned) -> None:
     page = phone.page
     await page.set_viewport_size({"width": 1440, "height": 900})

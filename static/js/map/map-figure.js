@@ -289,7 +289,7 @@ export function besideWay([a, b], { width, height }) {
   const length = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
   let [nx, ny] = [-(b[1] - a[1]) / length, (b[0] - a[0]) / length];
   if (nx > 0.05 || (Math.abs(nx) <= 0.05 && ny < 0)) [nx, ny] = [-nx, -ny]; // to the left; of a level way, beneath
-  const off = 8 + Math.abs(nx) * HALF.x + Math.abs(ny) * HALF.y;
+  const off = 14 + Math.abs(nx) * HALF.x + Math.abs(ny) * HALF.y;
   const [x, y] = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
   const fits = x + nx * off > HALF.x && y + ny * off > HALF.y && y + ny * off < height - HALF.y - 40;
   const side = fits ? off : -off;

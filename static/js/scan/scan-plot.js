@@ -216,7 +216,7 @@ export class ScanPlot {
     g.moveTo(x + 15 * way, y);
     g.lineTo(x + 36 * way, y);
     g.stroke();
-    this.#write(g, text, this.#plate(g, text, ...where), this.#colour.ink);
+    write(g, text, this.#plate(g, text, ...where), { panel: this.#colour.panel, css: this.#colour.ink });
   }
 
   /** Its text is under the plot: here it would hide other returns. @param {Pen} g @param {Scale} scale @param {NonNullable<Around['mark']>} mark */
@@ -263,7 +263,7 @@ export class ScanPlot {
     const plate = clearOf(this.#taken, this.#plate(g, text, x, y, align, size, weight));
     if (!plate) return;
     this.#taken.push(plate);
-    this.#write(g, text, plate, css);
+    write(g, text, plate, { panel: this.#colour.panel, css });
   }
 
   /** Draws a label in the first place where it covers neither a label nor a return; else not: the numbers beside the plot have them. @param {Pen} g @param {string} text @param {Where[]} places @param {string} css @returns {number} which place; -1: none */
@@ -272,7 +272,7 @@ export class ScanPlot {
     const { index, box } = clearPlace(places.map((where) => this.#plate(g, text, ...where)), this.#taken, this.#dots.points, this.#dots.scale);
     if (!box) return -1;
     this.#taken.push(box);
-    this.#write(g, text, box, css);
+    write(g, text, box, { panel: this.#colour.panel, css });
     return index;
   }
 
@@ -283,16 +283,16 @@ export class ScanPlot {
     const left = align === 'left' ? x - 4 : align === 'right' ? x - width + 4 : x - width / 2;
     return { left, top: y - size * 0.72, width, height: size * 1.44 };
   }
+}
 
-  /** Draws a text on its plate, which has the panel's colour, in the font that measured it. @param {Pen} g @param {string} text @param {Box} plate @param {string} css */
-  #write(g, text, { left, top, width, height }, css) {
-    g.textAlign = 'left';
-    g.textBaseline = 'middle';
-    g.fillStyle = this.#colour.panel;
-    g.fillRect(left, top, width, height);
-    g.fillStyle = css;
-    g.fillText(text, left + 4, top + height / 2);
-  }
+/** Draws a text on its plate, which has the panel's colour, in the font that measured it. @param {Pen} g @param {string} text @param {Box} plate @param {{panel: string, css: string}} colours */
+function write(g, text, { left, top, width, height }, { panel, css }) {
+  g.textAlign = 'left';
+  g.textBaseline = 'middle';
+  g.fillStyle = panel;
+  g.fillRect(left, top, width, height);
+  g.fillStyle = css;
+  g.fillText(text, left + 4, top + height / 2);
 }
 
 /** A line through points of the plane, its part behind the laser left out. @param {Pen} g @param {Scale} scale @param {Point[]} points */
