@@ -143,7 +143,7 @@ class Access:
         return device, secret
 
     async def _collect(self) -> None:
-        """Takes the invitations that `catgraph pair` laid into the folder."""
+        """Takes the invitations that `catgraph pair` wrote into the folder."""
         if self._folder is None:
             return
         now_s = self._now()

@@ -47,7 +47,7 @@ class Invitations:
         self._standing: list[Invitation] = []
 
     def new(self, role: Role, *, now_s: float) -> Invitation:
-        """One more; its PIN is another than those that stand."""
+        """One more; its PIN differs from those that are valid."""
         pins = {one.pin for one in self.standing(now_s)}
         pin = new_pin()
         while pin in pins:
