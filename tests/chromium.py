@@ -23,7 +23,7 @@ FLAGS = (
 
 
 class NoChromium(Exception):
-    """No browser to test with; the text says what to do."""
+    """No browser to test with; the text has the remedy."""
 
 
 def find_chromium() -> str:

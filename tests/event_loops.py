@@ -15,7 +15,7 @@ from tests.virtual_time import VirtualClock
 
 
 def pytest_asyncio_loop_factories(item: pytest.Item) -> Mapping[str, Callable[[], asyncio.AbstractEventLoop]]:
-    """The event loops on which a test runs, by its marks: asyncio's own, unless it says more."""
+    """The event loops on which a test runs, by its marks: asyncio's own, unless they name more."""
     if item.get_closest_marker("virtual_time"):
         return {"virtual time": _virtual_loop}
     if item.get_closest_marker("both_loops"):

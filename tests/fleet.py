@@ -52,7 +52,7 @@ async def main() -> None:
                 print(f"{name}: its own page at {at_car.address}/  fault: {fault or 'none'}", flush=True)
                 if fault:
                     faults.append(again(car.type, fault, every_s))
-            expected = [word for name in CARS for word in ("--expect", name)]
+            expected = [argument for name in CARS for argument in ("--expect", name)]
             for name, port in NODES.items():
                 node = await up.enter_async_context(running("web", *options(name, port), *expected))
                 print(f"Web node {name}: {node.address}/  all cars: {node.address}/fleet", flush=True)

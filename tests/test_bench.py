@@ -1,4 +1,4 @@
-"""The bench measures what it says, and leaves nothing running."""
+"""The bench measures what it reports, and leaves nothing running."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ def test_a_slope_is_that_of_the_whole_time_and_not_of_one_step() -> None:
 
 @pytest.mark.field
 @pytest.mark.slow
-def test_a_process_that_fails_says_why_and_none_is_left() -> None:
+def test_a_process_that_fails_prints_the_reason_and_none_is_left() -> None:
     before = psutil.Process().children()
     with Rig(QUICK) as rig:
         with pytest.raises(Failed, match="KeyError: 'no such order'"):
@@ -177,7 +177,7 @@ def test_a_process_that_fails_says_why_and_none_is_left() -> None:
     assert started_since(before) == []
 
 
-def test_a_process_that_does_not_start_says_why() -> None:
+def test_a_process_that_does_not_start_prints_the_reason() -> None:
     before = psutil.Process().children()
     with pytest.raises(Failed, match="No module named"):
         Child("nowhere")

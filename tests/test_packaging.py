@@ -1,4 +1,4 @@
-"""What a newcomer's machine is told to do: versions, commands, the container, the wheel."""
+"""What a newcomer's machine has to do: versions, commands, the container, the wheel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The list of what is shipped: it keeps its schema, is complete, and says what is pinned."""
+"""The list of what is shipped: it keeps its schema, is complete, and has what is pinned."""
 
 from __future__ import annotations
 

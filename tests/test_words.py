@@ -1,4 +1,4 @@
-"""The texts that a person reads, on the page, in messages, help and guides, use the words that were settled."""
+"""The texts that a person reads, on the page, in messages, help and guides, use the settled terms."""
 
 from __future__ import annotations
 

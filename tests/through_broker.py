@@ -46,8 +46,8 @@ async def start(*command: str, listens: bool = True) -> str:
     raise SystemExit(f"{command} ended")
 
 
-async def heard(broker: str, names: list[str]) -> None:
-    """Wait until the agent has said of each vehicle that it is there, and the node has had time to read it."""
+async def agents_ready(broker: str, names: list[str]) -> None:
+    """Wait until the agent has announced each vehicle, and the node has had time to read it."""
     async with connected(broker) as client:
         for name in names:
             here = await client.subscribe(wire.subject(name, "here"))
@@ -55,17 +55,17 @@ async def heard(broker: str, names: list[str]) -> None:
     await asyncio.sleep(0.3)
 
 
-def parted(words: list[str]) -> tuple[list[str], list[str], Path]:
+def parted(arguments: list[str]) -> tuple[list[str], list[str], Path]:
     """The options of the agent, those of the node, and the data folder; the node's own is in it."""
     options: list[list[str]] = []
-    for word in words:
-        if word.startswith("--"):
-            options.append([word])
+    for argument in arguments:
+        if argument.startswith("--"):
+            options.append([argument])
         else:
-            options[-1].append(word)
+            options[-1].append(argument)
     data = [Path(option[1]) for option in options if option[0] == "--data"] or [Path(tempfile.mkdtemp())]
-    agent = [word for option in options if option[0] in OF_AGENT for word in option]
-    page = [word for option in options if option[0] not in (*OF_AGENT, "--data") for word in option]
+    agent = [argument for option in options if option[0] in OF_AGENT for argument in option]
+    page = [argument for option in options if option[0] not in (*OF_AGENT, "--data") for argument in option]
     return agent, page if "--port" in page else ["--port", "0", *page], data[0]
 
 
@@ -83,14 +83,14 @@ async def main(arguments: list[str]) -> None:
     await start(nats_server(), "-a", "127.0.0.1", "-p", str(at_port), "-js", "-sd", store, listens=False)
     await asyncio.sleep(0.3)
     python = (sys.executable, "-m", "server")
-    names = [word.split("=")[0] for word in of_agent if "=" in word.split("://")[0]]
-    expected = [word for name in names or ["car"] for word in ("--expect", name)]
+    names = [argument.split("=")[0] for argument in of_agent if "=" in argument.split("://")[0]]
+    expected = [argument for name in names or ["car"] for argument in ("--expect", name)]
     agent = (*python, "agent", "--no-require-signed", "--broker", broker)  # the tests' own requests sign nothing
     console, node = await asyncio.gather(
         start(*agent, "--port", "0", "--data", str(data), *of_agent),
         start(*python, "web", "--broker", broker, "--data", str(data / NODE), *expected, *of_page),
     )
-    await heard(broker, names or ["car"])
+    await agents_ready(broker, names or ["car"])
     print(f"console at {console.split('//')[1]}\ncatgraph listens on {node}/", flush=True)
     await asyncio.Event().wait()
 

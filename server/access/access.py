@@ -47,7 +47,7 @@ class Admitted:
 
 
 class Access:
-    """Everything of one server that decides who is let in."""
+    """The authentication of one server: who is admitted."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class Access:
         self.visits = ActiveConnections()
         self._invitations = Invitations()
         self._printed: dict[Role, Invitation] = {}  # the one shown on the terminal
-        self._guesses = PinThrottle()
+        self._pin_throttle = PinThrottle()
         self._tickets = Tickets()
         self.use_identity()
         self.removed: dict[str, str] = {}  # devices that were removed in this run: why
@@ -90,7 +90,7 @@ class Access:
         """From now on cookies are signed with the key of the list of devices."""
         self._cookies = Cookies(self.devices.signing_key, self.devices.server, wall_ms=self._wall_ms)
 
-    # -- invitations -------------------------------------------------------------------------------------------------
+    # -- invitations ---------------------------------------------------------------------------------------------------
 
     def invitation(self, role: Role = Role.OPERATOR) -> Invitation:
         """The invitation shown on the terminal for this role: the same until it is used or expires."""
@@ -121,7 +121,7 @@ class Access:
             except OSError as why:
                 log.warning("catgraph pair will not find this server: %s", why)
 
-    # -- pairing -----------------------------------------------------------------------------------------------------
+    # -- pairing -------------------------------------------------------------------------------------------------------
 
     async def pair(self, *, token: str | None, pin: str | None, name: str, peer: str) -> tuple[Device, str]:
         """Lets a new device in for its invitation; the device and its secret, once the disk has it.
@@ -143,7 +143,7 @@ class Access:
         return device, secret
 
     async def _collect(self) -> None:
-        """Takes the invitations that `catgraph pair` laid into the folder."""
+        """Takes the invitations that `catgraph pair` wrote into the folder."""
         if self._folder is None:
             return
         now_s = self._now()
@@ -165,22 +165,22 @@ class Access:
         return self._by_pin(pin or "", _peer(peer), now_s)
 
     def _by_pin(self, pin: str, peer: str, now_s: float) -> Invitation:
-        wait_s = self._guesses.wait_s(peer, now_s=now_s)
+        wait_s = self._pin_throttle.wait_s(peer, now_s=now_s)
         if wait_s > 0:
             raise NotPaired("wait", "Too many wrong PINs. Wait, or scan the QR code instead.", wait_s=wait_s)
         digits = "".join(letter for letter in pin if letter.isdecimal() and letter.isascii())
         standing = self._invitations.standing(now_s)
         found = self._invitations.take(pin=digits, now_s=now_s) if len(digits) == PIN_DIGITS else None
         if found is not None:
-            self._guesses.right(peer)
+            self._pin_throttle.right(peer)
             return found
-        self._guesses.wrong(peer, now_s=now_s)
-        wait_s = self._guesses.wait_s(peer, now_s=now_s)
+        self._pin_throttle.wrong(peer, now_s=now_s)
+        wait_s = self._pin_throttle.wait_s(peer, now_s=now_s)
         if not standing:
             raise NotPaired("expired", "No PIN is valid now: it was used or is older than 10 minutes.", wait_s=wait_s)
         raise NotPaired("wrong", "This PIN is wrong.", wait_s=wait_s)
 
-    # -- devices -----------------------------------------------------------------------------------------------------
+    # -- devices -------------------------------------------------------------------------------------------------------
 
     async def remove(self, id: str, *, by: str, but: object = None) -> Device | None:
         """The device may not come any more, and what it has open ends now. `but`: a task that may end its answer.
@@ -217,7 +217,7 @@ class Access:
             self.visits.end(device.id, because, only_sockets=only_sockets, but=but)
             raise
 
-    # -- who asks ----------------------------------------------------------------------------------------------------
+    # -- identities ----------------------------------------------------------------------------------------------------
 
     def known(self, headers: Mapping[str, str], *, scheme: str) -> Admitted | None:
         """The principal that these headers authenticate; None: unknown. `scheme`: http or https."""
@@ -267,7 +267,7 @@ class Access:
         is_secure = self.is_secure(scheme, headers.get("host", ""))
         return self._cookies.read(headers.get("cookie", ""), is_secure=is_secure)
 
-    # -- tickets -----------------------------------------------------------------------------------------------------
+    # -- tickets -------------------------------------------------------------------------------------------------------
 
     def ticket(self, who: Principal) -> str:
         """A ticket for one socket of `who`, within 5 s."""
@@ -300,7 +300,7 @@ async def _to_its_end(work: Coroutine[Any, Any, T]) -> T:
 
 
 def _peer(address: str) -> str:
-    """Who counts as one who guesses: an IPv4 address, or the network of an IPv6 one."""
+    """By what failed attempts are counted: an IPv4 address, or the network of an IPv6 address."""
     try:
         found = ipaddress.ip_address(address.partition("%")[0])
     except ValueError:

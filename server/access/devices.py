@@ -206,7 +206,7 @@ class Devices:
                 raise ValueError("its keys are too short")
         except (ValueError, KeyError, TypeError, AttributeError) as why:
             aside = set_aside(path, "damaged")
-            log.error("the list of paired devices cannot be read (%s): all pair anew; it is kept as %s", why, aside)
+            log.error("the list of paired devices cannot be read (%s): all pair again; it is kept as %s", why, aside)
             self._write(self._content())
             return
         self.server, self.signing_key = server, key

@@ -20,7 +20,7 @@ from server.access.shared_access import IDENTITY, BadEntry, SharedDevices
 log = logging.getLogger("catgraph.access")
 
 BUCKET = "catgraph_devices"  # broker_users.py lets nodes use it
-LOOKS_EVERY_S = 2.0  # whether all entries were heard
+CHECK_EVERY_S = 2.0  # whether all entries were received
 AGAIN_S = 5.0
 
 
@@ -34,7 +34,7 @@ class DevicesBucket:
         self._shared = shared
         self._changed = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
-        self._said = ""
+        self._logged = ""
         self.is_alike = False  # the bucket was read, and what this node has is in it
 
     def changed(self) -> None:
@@ -61,7 +61,7 @@ class DevicesBucket:
         while True:
             try:
                 await self._follow(client)
-            except Exception as why:  # nobody is let in or kept out by an error here
+            except Exception as why:  # an error here neither admits nor refuses anybody
                 self._complain(why)
             self.is_alike = False
             await asyncio.sleep(AGAIN_S)
@@ -75,19 +75,19 @@ class DevicesBucket:
         self._shared.begin()
         watcher = await bucket.watchall()
         putting: asyncio.Task[None] | None = None
-        heard, is_read = 0, False
+        newest, is_read = 0, False
         try:
             while True:
                 try:
-                    entry = await watcher.updates(timeout=LOOKS_EVERY_S)  # type: ignore[no-untyped-call]
+                    entry = await watcher.updates(timeout=CHECK_EVERY_S)  # type: ignore[no-untyped-call]
                 except nats.errors.TimeoutError:
                     if putting is not None and putting.done():
                         putting.result()  # raises what it raised
-                    if (await bucket.status()).stream_info.state.last_seq > heard:
+                    if (await bucket.status()).stream_info.state.last_seq > newest:
                         return
                     continue
                 if isinstance(entry, KeyValue.Entry):
-                    heard = max(heard, entry.revision or 0)
+                    newest = max(newest, entry.revision or 0)
                     self._take(entry)
                 elif not is_read:  # all that was there
                     is_read = True
@@ -114,10 +114,10 @@ class DevicesBucket:
                 await bucket.delete(key)
             for key, value in self._shared.due().items():
                 await bucket.put(key, value)
-            self.is_alike, self._said = True, ""
+            self.is_alike, self._logged = True, ""
             await self._changed.wait()
 
     def _complain(self, why: Exception) -> None:
-        if (said := f"{type(why).__name__}: {why}".strip(": ")) != self._said:
-            self._said = said
-            log.warning("devices_not_shared why=%s: a device is known at this node only", said)
+        if (line := f"{type(why).__name__}: {why}".strip(": ")) != self._logged:
+            self._logged = line
+            log.warning("devices_not_shared why=%s: a device is known at this node only", line)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Protocol
 
-SCOPE_KEY = "catgraph.who"  # in the ASGI scope of a request that was let in
+SCOPE_KEY = "catgraph.who"  # in the ASGI scope of an admitted request
 
 
 class Connection(Protocol):
@@ -25,12 +25,12 @@ class Role(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Principal:
-    """A device or program that was let in."""
+    """An admitted device or program."""
 
     id: str  # stable over restarts, never shown as a secret: safe in logs
     name: str  # as the list of devices has it
     role: Role
-    is_program: bool = False  # let in by a key instead of a paired browser
+    is_program: bool = False  # admitted by a key instead of a paired browser
 
     @property
     def is_operator(self) -> bool:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from server.access.identity import Role
 
 LASTS_S = 600.0
-MOST_STANDING = 6  # each valid PIN makes a guess likelier; the oldest is dropped
+MOST_STANDING = 6  # with each valid PIN a random one is likelier to match; the oldest is dropped
 PIN_DIGITS = 6
 TOKEN_BYTES = 18  # 144 bits cannot be guessed, so unlike the PIN it needs no throttle
 
@@ -47,7 +47,7 @@ class Invitations:
         self._standing: list[Invitation] = []
 
     def new(self, role: Role, *, now_s: float) -> Invitation:
-        """One more; its PIN is another than those that stand."""
+        """One more; its PIN differs from those that are valid."""
         pins = {one.pin for one in self.standing(now_s)}
         pin = new_pin()
         while pin in pins:
@@ -127,5 +127,5 @@ class PinThrottle:
                 tries.until_s = now_s + min(longest_s, 2.0 ** min(tries.wrong - free + 1, 16))
 
     def right(self, peer: str) -> None:
-        """The peer was let in: its own wrong tries are forgotten, those of the others are not."""
+        """The peer was admitted: its own wrong tries are forgotten, those of the others are not."""
         self._peers.pop(peer, None)

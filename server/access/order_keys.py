@@ -1,4 +1,4 @@
-"""The keys of the devices that ordered something at this agent, and the name that each of them goes by here.
+"""The keys of the devices that ordered something at this agent, and the name of each of them here.
 
 A name belongs to the key that used it first. A list of the operator may limit them: then no other key counts.
 """
@@ -140,7 +140,7 @@ class KnownDevices:
         self._names = read_list(path)
 
     async def name(self, id: str) -> str | None:
-        """The name of the device with this key; None: it is not in the list, also where that was read anew."""
+        """The name of the device with this key; None: it is not in the list, also where that was read again."""
         if id not in self._names and self._now() - self._read_s >= 1.0:
             self._read_s = self._now()
             if self._storage is None:

@@ -50,8 +50,15 @@ class OrderSigner:
     ) -> dict[str, str]:
         """What is sent as `signed`; `more`: further fields of the text."""
         nonce = secrets.token_urlsafe(16)
-        said = {"command": command, "vehicle": vehicle, "by": by, "page": page, "challenge": challenge, "nonce": nonce}
-        return self.sign_text(orjson.dumps({**said, **more}).decode())
+        fields = {
+            "command": command,
+            "vehicle": vehicle,
+            "by": by,
+            "page": page,
+            "challenge": challenge,
+            "nonce": nonce,
+        }
+        return self.sign_text(orjson.dumps({**fields, **more}).decode())
 
     def sign_text(self, text: str) -> dict[str, str]:
         made = self._key.sign(signed_order.PREFIX + text.encode(), ec.ECDSA(hashes.SHA256()))

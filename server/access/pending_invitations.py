@@ -62,7 +62,7 @@ def lay(folder: Path, role: Role, *, wall_ms: int) -> Invitation:
 
 
 def collect(folder: Path, *, now_s: float, wall_ms: int) -> list[Invitation]:
-    """The invitations laid there since, which are not there afterwards."""
+    """The invitations written there since; they are removed from there."""
     found = []
     with contextlib.suppress(FileNotFoundError):
         for path in sorted((folder / _FOLDER).glob("*.json"))[:_MOST]:

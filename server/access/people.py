@@ -50,7 +50,7 @@ class People:
     # -- who is on duty ----------------------------------------------------------------------------------------------
 
     def sent(self, device: str | None) -> dict[str, Any]:
-        """What goes with every request of a device to a car: who is on duty there, and who is or was anywhere."""
+        """What is sent with every request of a device to a car: who is on duty there, and who is or was anywhere."""
         found = None if device is None else self.board.on_duty(device)
         duties = self.board.duties()
         names = [self.board.people[one.person or ""].name for one in duties if one.role == "supervisor"]

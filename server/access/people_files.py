@@ -65,7 +65,7 @@ class PeopleFiles:
                 self._complain(f"{name} cannot be used{self._set_aside(path)}: {sentence[:200]}")
 
     def _set_aside(self, path: Path) -> str:
-        """What became of a file that cannot be used, in words."""
+        """Set aside a file that cannot be used; return what became of it, as the end of a sentence."""
         try:
             return f" and is kept as {set_aside(path).name}"
         except OSError:

@@ -1,7 +1,7 @@
 """The required role of each request, in one table; other requests need the role of their method.
 
 Reading needs a viewer, everything else an operator, new routes included. Public routes are listed with their method,
-and a test goes through all routes of the app.
+and a test checks all routes of the app.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from server.access.identity import Role
 
 
 class Needs(Enum):
-    """Who may ask: anybody, any device or program that was let in, or only an operator."""
+    """Who may send a request: anybody, any admitted device or program, or only an operator."""
 
     NOBODY = "nobody"
     VIEWER = "viewer"

@@ -29,7 +29,7 @@ KEPT_MS = FORGOTTEN_AFTER_MS + 10 * 86_400_000  # an entry, after the device was
 
 
 class BadPeopleEntry(ValueError):
-    """An entry of another node that is none; `str()` says why."""
+    """An invalid entry of another node; `str()` is the reason."""
 
 
 class SharedPeople:
@@ -136,7 +136,7 @@ class SharedPeople:
 
 
 class BadEntry(ValueError):
-    """An entry of another node that is none; `str()` says why."""
+    """An invalid entry of another node; `str()` is the reason."""
 
 
 class SharedDevices:
@@ -185,7 +185,7 @@ class SharedDevices:
         return entries if self._people is None else entries | self._people.due()
 
     def outdated(self) -> list[str]:
-        """The keys of entries of devices that nobody knows any more."""
+        """The keys of entries of devices that are in no list any more."""
         until_ms = self._wall_ms() - KEPT_MS
         gone = [id for id, at_ms in self._removed.items() if at_ms < until_ms]
         unused = [id for id, at_ms in self._changed.items() if max(at_ms, self._seen.get(id, 0)) < until_ms]

@@ -116,7 +116,7 @@ class SignedOrders:
             raise
 
     def _unsigned(self, message: Mapping[str, Any], mark: str) -> Mapping[str, Any]:
-        """As the node says, which is believed; but nobody is taken for one of this machine, or for who signs."""
+        """The command as the node states it, trusted; but its sender is never this machine, nor a device that signs."""
         who = str(message.get("who") or "")
         is_key = re.fullmatch(KEY_ID, who) is not None
         known = self._keys.get(who) if is_key and not mark else None
@@ -147,14 +147,14 @@ class SignedOrders:
         by, line = (listed, None) if listed is not None else self._keys.name(id, text.by, now_ms=self._wall_ms())
         if line is not None:
             self._note(vehicle, by, line)
-        if "heard_ms" in found:  # of the node's clock; the challenge says it by this one
+        if "heard_ms" in found:  # by the node's clock; the challenge gives it by this one
             found["heard_ms"] = self._wall_ms() - age_s * 1000
         sender = {
             "by": by,
             "who": id,
             "page": text.page,
             "person": _person(message, text),
-            "supervisors": message.get("supervisors"),  # as the node says; it gives nobody a right
+            "supervisors": message.get("supervisors"),  # as the node states; it grants no right
             "duties": message.get("duties"),
             "console": False,
             "replaying": message.get("replaying"),
@@ -223,7 +223,7 @@ def _verify(envelope: signed_order.Envelope) -> str:
 
 
 def _person(message: Mapping[str, Any], text: SignedText) -> dict[str, Any] | None:
-    """Who is on duty, as the device says it; under which key, as its node does."""
+    """Who is on duty, as the device states; for which device, as its node states."""
     if text.person is None:
         return None
     stated = message.get("person")

@@ -48,44 +48,44 @@ class Announcement:
     pairing: Pairing | None = None
 
 
-def lines(said: Announcement, *, draws: bool) -> Iterator[str]:
+def lines(announcement: Announcement, *, draws: bool) -> Iterator[str]:
     """Line by line; `draws`: with QR codes, for a person before a terminal."""
-    config = said.config
-    yield f"catgraph listens on {said.url}"
+    config = announcement.config
+    yield f"catgraph listens on {announcement.url}"
     for vehicle in config.vehicles:
         yield f"  {vehicle.name}: {vehicle.address or 'no address yet, set on the page'}"
     if config.is_open:
         yield "  Only this machine can open it; for phones use --host 0.0.0.0."
-    if said.others and not config.is_open:
-        yield f"  Also: {'  '.join(said.others)}"
-    if said.warning:
-        yield f"  Warning: {said.warning}."
-    if said.left_out:
-        shown = ", ".join(said.left_out)
+    if announcement.others and not config.is_open:
+        yield f"  Also: {'  '.join(announcement.others)}"
+    if announcement.warning:
+        yield f"  Warning: {announcement.warning}."
+    if announcement.left_out:
+        shown = ", ".join(announcement.left_out)
         yield f"  Not covered by the server's own certificate (not private): {shown} (use --tls CERT KEY)."
     if not config.is_tls and not config.is_open:
         yield from (f"  {line}" for line in WITHOUT_HTTPS)
-    if said.setup is not None and said.fingerprint is not None:
+    if announcement.setup is not None and announcement.fingerprint is not None:
         yield ""
-        yield f"  1. A phone that was never here, once: {said.setup}"
+        yield f"  1. A phone that was never here, once: {announcement.setup}"
         if draws:
-            yield from code(said.setup)
-        yield f"     It shows a fingerprint. Go on only if it is this one, of “{said.authority}” (SHA-256):"
-        yield from (f"       {line}" for line in fingerprint_lines(said.fingerprint))
+            yield from code(announcement.setup)
+        yield f"     It shows a fingerprint. Go on only if it is this one, of “{announcement.authority}” (SHA-256):"
+        yield from (f"       {line}" for line in fingerprint_lines(announcement.fingerprint))
         yield ""
-    yield from _pairing(said, draws=draws)
+    yield from _pairing(announcement, draws=draws)
     yield from (f"  {line}" for line in config.next_steps)
     yield "  Press Ctrl-C to stop."
 
 
-def _pairing(said: Announcement, *, draws: bool) -> Iterator[str]:
-    step = "2. " if said.setup is not None else ""
-    if said.pairing is None or said.config.is_open:
+def _pairing(announcement: Announcement, *, draws: bool) -> Iterator[str]:
+    step = "2. " if announcement.setup is not None else ""
+    if announcement.pairing is None or announcement.config.is_open:
         return
     if draws:
-        yield from invitation(said.url, said.pairing, f"  {step}Pair a device:")
+        yield from invitation(announcement.url, announcement.pairing, f"  {step}Pair a device:")
     else:  # what is not read by a person at a terminal ends in a log, where no PIN belongs
-        yield f"  {step}Pair a device: on this machine `{said.pairing.command}` shows a code and a PIN."
+        yield f"  {step}Pair a device: on this machine `{announcement.pairing.command}` shows a code and a PIN."
 
 
 def pair_command(data: Path | None) -> str:

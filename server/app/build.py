@@ -160,7 +160,7 @@ def _fleet(
     now: Callable[[], float],
     wall_ms: Callable[[], int],
 ) -> tuple[PageBus, Link | None, HttpNode | None]:
-    """The bus of the pages, the connection to the broker, and at a web node the way to what agents keep.
+    """The bus of the pages, the connection to the broker, and at a web node the client for what agents keep.
 
     Raises BrokerRefused.
     """
@@ -181,7 +181,7 @@ def _fleet(
         expected = known.names.union(config.expected)
         remote = NatsBus(
             now=now, read=RemoteFrames(wall_ms), read_event=event, expected=expected,
-            on_new=known.note, on_heard=off.heard,
+            on_new=known.note, on_message=off.end_by_data,
         )  # fmt: skip
         agents = HttpNode(remote.link_trouble, now=now)
         if not config.is_open:

@@ -45,7 +45,7 @@ class Config:
     allowed_hosts: tuple[str, ...] = ()  # non-empty: no other car is ever dialled
     found: tuple[Vehicle, ...] = field(default=())  # offered on the connect screen
     maps: tuple[Path, ...] = ()  # MBTiles under the map, the last on top
-    site_image: Path | None = None  # above them; its corners stand in a .toml beside it
+    site_image: Path | None = None  # above them; its corners are in a .toml beside it
     map_upstream: MapUpstream | None = None  # below the maps; None: no tile is ever fetched
     worker: bool = True  # phones store the page's shell; False: they delete it at the next visit
     names: tuple[str, ...] = ()  # what else this server is called: hosts, or origins (https://…) of a proxy before it
@@ -55,8 +55,8 @@ class Config:
     requires_signed: bool = True  # at a broker: orders that web nodes pass on are signed by the device that gives them
     known_devices: Path | None = None  # the list of devices whose orders count; None: those of any that signs
     is_node: bool = False  # a web node: the vehicles are those of agents at the broker, and `vehicles` has none
-    expected: tuple[str, ...] = ()  # at a web node: vehicles that are listed before they are heard
-    forgotten: tuple[str, ...] = ()  # at a web node: vehicles that were heard once and are listed no more
+    expected: tuple[str, ...] = ()  # at a web node: vehicles that are listed before they send anything
+    forgotten: tuple[str, ...] = ()  # at a web node: vehicles that were known once and are listed no more
     store: Store | None = None  # recordings are uploaded into it; at a web node those of all cars are listed
     limits: Limits = field(default_factory=Limits)
     next_steps: tuple[str, ...] = ()  # printed at the start below the addresses, a line each

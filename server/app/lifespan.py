@@ -46,7 +46,7 @@ def _close(storage: StorageThread, journal: Journal) -> None:
 
 
 async def _start(running: Services) -> asyncio.Task[None] | None:
-    """Start all parts; the recovery of what the last run left, which goes on meanwhile."""
+    """Start all parts; the recovery of what the last run left continues in the background."""
     if running.recordings is not None:
         await running.recordings.start()
     running.people.start()

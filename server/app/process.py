@@ -169,14 +169,14 @@ def _listen_to_explain(config: Config, secured: Secured | None, port: int) -> so
     """The plain HTTP port. If the default is in use, the page's own port serves both."""
     if secured is None:
         return None
-    asked = (config.tls or Tls()).setup_port
-    if asked is None and secured.authority is None:
+    chosen = (config.tls or Tls()).setup_port
+    if chosen is None and secured.authority is None:
         return None
     usual = 0 if config.port == 0 else port + 1 if port < 65535 else port - 1
     try:
-        return _listen(config.host, usual if asked is None else asked)
+        return _listen(config.host, usual if chosen is None else chosen)
     except CannotServe as why:
-        if asked is not None:
+        if chosen is not None:
             raise
         log.warning("%s The instructions for phones are on the page's own port.", why)
         return None
@@ -186,27 +186,29 @@ def _announce(
     config: Config, port: int, secured: Secured | None, explainer: socket.socket | None, running: Services
 ) -> None:
     """Print the addresses; the first line is for scripts too."""
-    said = Announcement(config=config, url=_plain_url(config.host, port))
+    announcement = Announcement(config=config, url=_plain_url(config.host, port))
     if not config.is_open:
-        said = replace(said, pairing=_pairing(running, config))
+        announcement = replace(announcement, pairing=_pairing(running, config))
     if secured is not None:
         setup_port = explainer.getsockname()[1] if explainer is not None else port
         where = SetupAddresses(hosts=secured.hosts(), port=port, setup_port=setup_port)
         url, others = addresses(where)
-        said = replace(said, url=url, others=others)
+        announcement = replace(announcement, url=url, others=others)
         if secured.authority is not None:
             authority = secured.authority
-            said = replace(said, setup=where.setup(), fingerprint=authority.fingerprint, authority=authority.name)
-            said = replace(said, left_out=secured.names.left_out if _is_any(config.host) else ())
+            announcement = replace(
+                announcement, setup=where.setup(), fingerprint=authority.fingerprint, authority=authority.name
+            )
+            announcement = replace(announcement, left_out=secured.names.left_out if _is_any(config.host) else ())
         else:
-            said = replace(said, warning=secured.warning)
+            announcement = replace(announcement, warning=secured.warning)
     draws = sys.stdout.isatty()
-    for line in lines(said, draws=draws):
+    for line in lines(announcement, draws=draws):
         print(line, flush=True)
-    running.access.listens_at(said.url)
+    running.access.listens_at(announcement.url)
     if draws and not config.is_open:
         running.access.on_paired = lambda name, role: _print_invitation(
-            running, config, said.url, f"{name} was paired as {role}."
+            running, config, announcement.url, f"{name} was paired as {role}."
         )
 
 

@@ -1,6 +1,6 @@
 """The store of a server: `--store` and what belongs to it on the command line, and the parts that use it.
 
-The login never stands on the command line. The parts are the uploader of recordings and the list of what is there.
+The login is never on the command line. The parts are the uploader of recordings and the list of what is there.
 """
 
 from __future__ import annotations

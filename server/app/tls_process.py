@@ -111,18 +111,18 @@ class Secured:
     def typed(self, host: str | None) -> None:
         """Somebody came to the plain page by this name."""
         if self.outside is not None and self.outside.learn(host):
-            said = self.certificate.refresh(self.now())
-            if said is not None:
-                log.warning("%s", said)
+            notice = self.certificate.refresh(self.now())
+            if notice is not None:
+                log.warning("%s", notice)
 
     def hosts(self) -> tuple[str, ...]:
-        """What may stand in the page's address, the likeliest first."""
+        """The hosts that the page's address may have, the likeliest first."""
         if isinstance(self.certificate, ProvidedCertificateRenewal):
             return tuple(name for name in self.certificate.given.names if "*" not in name) or (host_now(),)
         names = self.names
-        heard = [ip for ip in names.ips if ip.version == 4 or ":" in self.host]
-        reachable = [ip for ip in names.reachable if ip in heard]
-        all = [*map(str, reachable), *names.dns, *(str(ip) for ip in heard if ip not in reachable)]
+        served = [ip for ip in names.ips if ip.version == 4 or ":" in self.host]
+        reachable = [ip for ip in names.reachable if ip in served]
+        all = [*map(str, reachable), *names.dns, *(str(ip) for ip in served if ip not in reachable)]
         return tuple(dict.fromkeys([self.host, *all] if self.host in all else all))
 
 

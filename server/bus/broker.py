@@ -11,7 +11,7 @@ class Broker:
     """Where the broker is, and by what a program proves who it is."""
 
     address: str  # nats://HOST:4222 or tls://HOST:4222
-    key: Path | None = None  # the file with the program's NKEY seed; None: the broker asks for none
+    key: Path | None = None  # the file with the program's NKEY seed; None: the broker requires none
     authority: Path | None = None  # the certificate that signed the broker's, as PEM; None: those of the system
 
 

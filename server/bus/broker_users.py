@@ -128,7 +128,7 @@ def _row(user: User) -> str:
 
 
 def permissions(user: User) -> dict[str, Any]:
-    """An agent: its own subjects, and answers to who asked it. A node: what nodes ask, and its own answers."""
+    """An agent: its own subjects, and replies to requests. A node: requests to agents, and the replies to them."""
     if user.kind == "agent":
         return {
             "publish": [wire.subject(user.name, "events"), wire.subject(user.name, "here")],
@@ -142,7 +142,7 @@ def permissions(user: User) -> dict[str, Any]:
 
 
 def _checked(user: User) -> User:
-    """Raises FleetRefused: what stands in the list goes into the broker's configuration as it is."""
+    """Raises FleetRefused: the list is written into the broker's configuration as it is."""
     if not _NAME.fullmatch(user.name) or user.name == "cars":  # so is called the list of all of them
         raise FleetRefused(f"“{user.name[:40]}” is no name: use letters of ASCII, digits, - and _.")
     if user.kind not in ("agent", "web"):

@@ -1,6 +1,7 @@
 """The contract between sessions and pages: newest frames by key, numbered events, requests with a deadline.
 
-A session uses a `SessionBus`, a page's handler a `PageBus`; neither knows the other, nor whether they share a process.
+A session uses a `SessionBus`, a page's handler a `PageBus`; neither depends on the other,
+nor on whether they share a process.
 """
 
 from __future__ import annotations
@@ -33,11 +34,11 @@ class Frame:
 
 
 Outcome = Literal["not_delivered", "unknown"]
-Cut = Literal["server-broker", "broker-agent"]  # where the way to the session is broken
+Cut = Literal["server-broker", "broker-agent"]  # where the path to the session is broken
 
 
 class NotServed(LookupError):
-    """No session serves the vehicle, or it did not answer in time; `str()` says why.
+    """No session serves the vehicle, or it did not answer in time; `str()` is the reason.
 
     `outcome`: a command was not delivered and never will be, or it may have been carried out.
     """
@@ -92,7 +93,7 @@ class SessionBus(Protocol):
 
 
 class PageBus(Protocol):
-    """What a page's handler needs: to read, to ask, and to say what it looks at."""
+    """What a page's handler needs: to read, to send requests, and to state which frames it shows."""
 
     def newest(self, vehicle: str, kind: str) -> Frame | None:
         """The newest frame of a kind; None where there is none that is younger than `FRAME_LIVES_S`."""
@@ -130,10 +131,10 @@ class PageBus(Protocol):
         """Whether it is known which events the vehicle has; before, pages of it are not greeted."""
 
     def run(self, vehicle: str) -> str:
-        """In which run of a server the vehicle's events are numbered; "": it was not heard."""
+        """In which run of a server the vehicle's events are numbered; "": nothing was received from it yet."""
 
     async def resume(self, vehicle: str, run: str, n: int) -> Resumed:
-        """Where a reader goes on who has read up to `n` in another `run`. Raises NotServed."""
+        """Where a reader continues who has read up to `n` in another `run`. Raises NotServed."""
 
     async def request(
         self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0, comes_within_s: float | None = None

@@ -48,7 +48,7 @@ _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 _FILES = ("", "-wal", "-shm", "-journal")  # of a database
 _NO_ROOM = (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_FULL, sqlite3.SQLITE_CANTOPEN)
 _OPEN_WITHIN_S = 5.0  # so long a program that holds the file is waited for at the start; afterwards not at all
-_RUNS_KNOWN = 1000  # the newest; who names an older one is sent the newest events anew
+_RUNS_KNOWN = 1000  # the newest; a page of an older one gets the newest events again
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +78,7 @@ class Opened:
 
 
 def why(error: Exception) -> str:
-    """In few words, for the operator."""
+    """A short reason for the operator."""
     if isinstance(error, orjson.JSONDecodeError):
         return "the file is damaged"
     return _WHY.get(_code(error), str(error)[:80])

@@ -152,7 +152,7 @@ class LocalBus:
         return self._journal.runs.present.id
 
     async def resume(self, vehicle: str, run: str, n: int) -> Resumed:
-        """Where a reader goes on who has read up to `n` in `run`."""
+        """Where a reader continues who has read up to `n` in `run`."""
         return self._journal.runs.resume(vehicle, run, n, self.last_event(vehicle))
 
     async def request(

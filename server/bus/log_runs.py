@@ -1,7 +1,7 @@
 """The runs of the server that wrote a log, and where somebody reads on who read it in another run.
 
-Numbers are of a run: a restored, copied or shortened log goes on under a run of its own, so that no number of a run is
-ever given twice. The log keeps where each run began, so that two logs are known to be the same up to a number.
+Numbers are of a run: a restored, copied or shortened log continues under a run of its own, so that no number of a run
+is ever given twice. The log keeps where each run began, so that two logs are known to be the same up to a number.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-SENT_ANEW = 500  # events of earlier runs, to whoever names a run that the log does not know: as many as a page keeps
+SENT_ANEW = 500  # events of earlier runs, to a reader with a run that is not in the log: as many as a page keeps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resumed:
-    """Where a reader goes on."""
+    """Where a reader continues."""
 
     common: int  # up to this number the log is what was read
     after: int  # the events after this number are to be read

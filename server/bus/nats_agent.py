@@ -27,9 +27,9 @@ log = logging.getLogger("catgraph.bus")
 
 WANTED_FOR_S = 2.5  # after the last pull a node is taken to look no longer
 MOST_PULLS = 256  # that wait at once, of all nodes
-MOST_ASKED = 64  # requests at once; a flood is refused
+MOST_REQUESTS = 64  # requests at once; a flood is refused
 Admit = Callable[[str, Mapping[str, Any]], Awaitable[Mapping[str, Any]]]  # of vehicle, message; raises NotAdmitted
-SAID_AGAIN_S = 60.0  # the same complaint is logged no more often
+LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
 FILTERS = frozenset({"before", "alarm", "change", "since_ms", "until_ms"})
 
 
@@ -86,7 +86,7 @@ class NatsAgent:
         self._now = now
         self._looked: dict[tuple[str, str], Looked] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        self._pulls = self._asked = 0
+        self._pulls = self._requests = 0
         self._published: dict[str, int] = {}  # the number of each vehicle's newest event that was published
         self._stops: list[Callable[[], None]] = []
         self._subscriptions: list[Subscription] = []
@@ -107,7 +107,7 @@ class NatsAgent:
             for what, answer in (("pull.*", self._on_pull), ("ask", self._on_ask)):
                 self._subscriptions.append(await client.subscribe(wire.subject(vehicle, what), cb=answer))
             self._stops.append(self._bus.watch_events(vehicle, lambda name: self._spawn(self._publish_events(name))))
-        await processed(client)  # from now on it is asked
+        await processed(client)  # from now on requests arrive
         self._spawn(self._be_here())
 
     async def stop(self) -> None:
@@ -116,7 +116,7 @@ class NatsAgent:
             for subscription in self._subscriptions:
                 await subscription.unsubscribe()
             if client is not None:
-                await processed(client, within_s=1)  # from now on it is not asked
+                await processed(client, within_s=1)  # from now on no request arrives
         self._subscriptions.clear()
         while self._stops:
             self._stops.pop()()
@@ -160,7 +160,7 @@ class NatsAgent:
         data = self._framed(came_s, frame)
         if len(data) > self._largest:
             refused = self._note_too_large(f"{kind} frame", vehicle, len(data))
-            await asyncio.sleep(wire.PULL_WAITS_S)  # it would be asked for again at once
+            await asyncio.sleep(wire.PULL_WAITS_S)  # it would be requested again at once
             data = self._framed(came_s, None, refused)
         await self._respond(message, data)
 
@@ -178,7 +178,7 @@ class NatsAgent:
     # -- events --------------------------------------------------------------------------------------------------------
 
     async def _publish_events(self, vehicle: str) -> None:
-        """Publishes the events that pages may have since the last time; what is lost on the way is asked for."""
+        """Publishes the events that pages may have since the last time; nodes request those that were lost."""
         while (n := self._published[vehicle]) < self._bus.last_event(vehicle):
             events = await self._bus.events_after(vehicle, n, wire.PORTION)
             if not events or self._published[vehicle] != n:  # another task was faster
@@ -201,50 +201,50 @@ class NatsAgent:
 
     async def _on_ask(self, message: Msg) -> None:
         try:
-            asked = wire.decode(wire.Ask, message.data)
+            ask = wire.decode(wire.Ask, message.data)
         except wire.Malformed as why:
             self.refused += 1
             log.warning("request not read: subject=%s why=%s", message.subject, why)
             return
-        if self._asked >= MOST_ASKED:
+        if self._requests >= MOST_REQUESTS:
             self.refused += 1
             return
         vehicle = wire.vehicle_of(message.subject)
         if (trace := (message.headers or {}).get(wire.TRACE)) is None:
-            self._spawn(self._answer(message, vehicle, asked))
+            self._spawn(self._answer(message, vehicle, ask))
             return
         with log_context.tracing(trace):
-            self._spawn(self._answer(message, vehicle, asked))
+            self._spawn(self._answer(message, vehicle, ask))
 
-    async def _answer(self, message: Msg, vehicle: str, asked: wire.Ask) -> None:
-        self._asked += 1
+    async def _answer(self, message: Msg, vehicle: str, ask: wire.Ask) -> None:
+        self._requests += 1
         found: dict[str, Any] = {}
         try:
-            if asked.do == "command":
-                found["answer"] = dict(await self._command(vehicle, asked))
-            elif asked.do == "after":
-                found["events"] = await self._bus.events_after(vehicle, asked.n, asked.limit)
-            elif asked.do == "find":
-                filters = {name: value for name, value in asked.filters.items() if name in FILTERS}
-                found["events"] = await self._bus.find_events(vehicle, **filters, limit=asked.limit)
-            elif asked.do == "resume":
-                resumed = await self._bus.resume(vehicle, asked.run, asked.n)
+            if ask.do == "command":
+                found["answer"] = dict(await self._command(vehicle, ask))
+            elif ask.do == "after":
+                found["events"] = await self._bus.events_after(vehicle, ask.n, ask.limit)
+            elif ask.do == "find":
+                filters = {name: value for name, value in ask.filters.items() if name in FILTERS}
+                found["events"] = await self._bus.find_events(vehicle, **filters, limit=ask.limit)
+            elif ask.do == "resume":
+                resumed = await self._bus.resume(vehicle, ask.run, ask.n)
                 found["resumed"] = [resumed.common, resumed.after, resumed.new_after]
         except NotServed as why:
             found["refused"], found["is_unknown"] = str(why), why.outcome == "unknown"
         finally:
-            self._asked -= 1
+            self._requests -= 1
         if events := found.get("events"):
             found["events"] = wire.fitting(events, self._largest)
             found["is_cut"] = len(found["events"]) < len(events)
         body = wire.Answer(run=self._run, now_s=self._now(), last=self._bus.last_event(vehicle), **found)
         data = wire.encode(body)
         if len(data) > self._largest:
-            self._note_too_large(f"answer to {asked.do}", vehicle, len(data))
+            self._note_too_large(f"answer to {ask.do}", vehicle, len(data))
             refusal = f"the answer of {vehicle} is too large for the broker ({len(data) // 1000} kB)"
             data = wire.encode(
                 wire.Answer(
-                    run=body.run, now_s=body.now_s, last=body.last, refused=refusal, is_unknown=asked.do == "command"
+                    run=body.run, now_s=body.now_s, last=body.last, refused=refusal, is_unknown=ask.do == "command"
                 )
             )
         await self._respond(message, data)
@@ -257,42 +257,42 @@ class NatsAgent:
     @property
     def unsent(self) -> str | None:
         """What of late was too large for the broker, in sentences; None: nothing."""
-        since_s = self._now() - SAID_AGAIN_S
-        return " ".join(words for words, at_s, _ in self._too_large.values() if at_s > since_s) or None
+        since_s = self._now() - LOG_AGAIN_S
+        return " ".join(text for text, at_s, _ in self._too_large.values() if at_s > since_s) or None
 
     def _note_too_large(self, what: str, vehicle: str, size: int) -> str:
         """A sentence on it."""
         self.refused += 1
         now_s, key = self._now(), f"{what} {vehicle}"
-        _, _, logged_s = self._too_large.get(key, ("", 0.0, -SAID_AGAIN_S))
-        if now_s - logged_s >= SAID_AGAIN_S:
+        _, _, logged_s = self._too_large.get(key, ("", 0.0, -LOG_AGAIN_S))
+        if now_s - logged_s >= LOG_AGAIN_S:
             logged_s = now_s
             log.error("too_large_for_the_broker what=%s vehicle=%s bytes=%d", what, vehicle, size)
-        words = (
+        text = (
             f"The {what} of {vehicle} has {size // 1000} kB, and the broker takes {self._largest // 1000} kB: "
             "it is not sent to web nodes."
         )
-        self._too_large[key] = (words, now_s, logged_s)
-        return words
+        self._too_large[key] = (text, now_s, logged_s)
+        return text
 
-    async def _command(self, vehicle: str, asked: wire.Ask) -> Any:
+    async def _command(self, vehicle: str, ask: wire.Ask) -> Any:
         """Raises NotServed, also for a command that came too late or was meant for an earlier run."""
-        if asked.run != self._run:
+        if ask.run != self._run:
             raise NotServed(f"{vehicle} has started again since the command was given")
-        self._check_time(vehicle, asked)
+        self._check_time(vehicle, ask)
         try:
-            command = await self._admit(vehicle, asked.command)
+            command = await self._admit(vehicle, ask.command)
         except NotAdmitted as why:
             log.warning("command_not_admitted vehicle=%s why=%s", vehicle, why)
             return {"ok": False, "reason": str(why)}
-        self._check_time(vehicle, asked)
-        until_s = asked.not_after_s if asked.answered_by_s is None else asked.answered_by_s
+        self._check_time(vehicle, ask)
+        until_s = ask.not_after_s if ask.answered_by_s is None else ask.answered_by_s
         return await self._bus.request(vehicle, command, deadline_s=until_s - self._now())
 
-    def _check_time(self, vehicle: str, asked: wire.Ask) -> None:
+    def _check_time(self, vehicle: str, ask: wire.Ask) -> None:
         """Raises NotServed: the command may not be carried out any more."""
-        if self._now() >= asked.not_after_s:
-            log.warning("command_too_late vehicle=%s kind=%s", vehicle, asked.command.get("kind"))
+        if self._now() >= ask.not_after_s:
+            log.warning("command_too_late vehicle=%s kind=%s", vehicle, ask.command.get("kind"))
             raise NotServed(f"the command reached {vehicle} too late and was not carried out")
 
     async def _publish(self, vehicle: str, what: str, body: wire.Body) -> None:

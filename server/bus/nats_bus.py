@@ -12,7 +12,7 @@ from nats.aio.msg import Msg
 from server.bus import nats_wire as wire
 from server.bus.bus import ALL, FRAME_LIVES_S, SUMMARY, UNSERVED, Frame, NotServed, Watcher
 from server.bus.log_runs import Resumed
-from server.bus.nats_heard import GONE_AFTER_S, Heard
+from server.bus.nats_heard import GONE_AFTER_S, AgentLiveness
 from server.bus.nats_logs import RemoteLogs
 from server.bus.nats_pulls import Pulls
 from server.bus.nats_questions import Questions, ReadEvent
@@ -20,7 +20,7 @@ from server.bus.nats_sync import processed
 from server.bus.watchers import Watchers
 
 NOTIFY_EVERY_S = 0.5
-REFUSED_FOR_S = FRAME_LIVES_S + wire.PULL_WAITS_S  # after it was said last
+REFUSED_FOR_S = FRAME_LIVES_S + wire.PULL_WAITS_S  # after the last refusal
 
 
 Read = Callable[[str, str, str | bytes, float], str | bytes]  # of vehicle, kind, payload, age [s]; raises Malformed
@@ -41,15 +41,15 @@ class NatsBus:
         expected: Collection[str] = (),
         read_event: ReadEvent = lambda event: event,
         on_new: Watcher = lambda _: None,
-        on_heard: Watcher = lambda _: None,
+        on_message: Watcher = lambda _: None,
     ) -> None:
         """`read` frames of agents, `read_event` their events; `expected`: vehicles that are listed from the start, the
-        others once heard.
+        others once something was received from them.
 
-        `on_new` is called with the name of each vehicle that is heard for the first time, `on_heard` each time.
+        `on_new` is called with the name of each vehicle that sends something for the first time, `on_message` always.
         """
         self._on_new = on_new
-        self._on_heard = on_heard
+        self._on_message = on_message
         self._now = now
         self._read_frame = read
         self._frames: dict[tuple[str, str], Frame] = {}
@@ -57,7 +57,7 @@ class NatsBus:
         self._wanted: dict[tuple[str, str], int] = {}
         self._notifying: asyncio.Task[None] | None = None
         self._questions = Questions(now=now, read_event=read_event)
-        self._heard = Heard(self._questions, now=now, expected=expected)
+        self._agents = AgentLiveness(self._questions, now=now, expected=expected)
         self._logs = RemoteLogs(self._questions, lambda vehicle: self._watchers.wake(vehicle, "events"))
         self._refused: dict[tuple[str, str], tuple[str, float]] = {}  # why there is no frame of a kind, and since when
         self._pulls = Pulls(self._questions, self._take_frame, self._note_refused, now=now)
@@ -86,15 +86,15 @@ class NatsBus:
 
     @property
     def vehicles(self) -> tuple[str, ...]:
-        return self._heard.vehicles
+        return self._agents.vehicles
 
     @property
     def grows(self) -> bool:
         return True
 
     def link_trouble(self, vehicle: str) -> str | None:
-        """Why its agent cannot be asked; None: it can, whatever its values are."""
-        return self._heard.trouble(vehicle)
+        """Why no request reaches its agent; None: one does, whatever its values are."""
+        return self._agents.trouble(vehicle)
 
     def trouble(self, vehicle: str) -> str | None:
         trouble = self.link_trouble(vehicle)
@@ -130,8 +130,8 @@ class NatsBus:
 
     def _meet(self, vehicle: str, run: str, last: int) -> None:
         is_new = vehicle not in self._logs
-        self._heard.note(vehicle)
-        self._on_heard(vehicle)
+        self._agents.note(vehicle)
+        self._on_message(vehicle)
         self._logs.begin(vehicle, run, last)
         if is_new:
             self._on_new(vehicle)
@@ -172,7 +172,7 @@ class NatsBus:
         self._look(vehicle)
 
     def _look(self, vehicle: str) -> None:
-        """Pull what somebody looks at, and nothing else; `ALL`: of each vehicle that was heard."""
+        """Pull only the frames that a page shows; `ALL`: of each vehicle from which something was received."""
         for one in self._logs if vehicle == ALL else (vehicle,):
             looked = {
                 "state": self._watchers.viewers(one) > 0,
@@ -184,7 +184,7 @@ class NatsBus:
 
     @property
     def _shows_summaries(self) -> bool:
-        """The pages of a node that knows one car have no use for its summary, and its pulls would delay their states;
+        """The pages of a node with one car have no use for its summary, and its pulls would delay their states;
         the page of all cars wants it."""
         is_wanted = len(self.vehicles) > 1 or self._wanted.get((ALL, SUMMARY), 0) > 0
         return is_wanted and self._watchers.viewers(ALL) > 0
@@ -211,7 +211,7 @@ class NatsBus:
 
     async def events_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
         """Raises NotServed where they are at the agent and it does not answer."""
-        self._heard.check_known(vehicle)
+        self._agents.check_known(vehicle)
         recent = self.recent_events(vehicle, n, limit)
         if recent is not None:
             return recent
@@ -219,13 +219,13 @@ class NatsBus:
         found = await self._questions.read(
             vehicle, limit, lambda last, portion: wire.Ask(do="after", n=n if last is None else last, limit=portion)
         )
-        if self._questions.clocks[vehicle].run != run:  # of another run: whoever asked goes on there
+        if self._questions.clocks[vehicle].run != run:  # of another run: the caller continues there
             raise NotServed(f"{vehicle} has started again")
         return found
 
     async def resume(self, vehicle: str, run: str, n: int) -> Resumed:
         """Raises NotServed, as `events_after`."""
-        self._heard.check_known(vehicle)
+        self._agents.check_known(vehicle)
         return await self._logs.resume(vehicle, run, n)
 
     async def find_events(self, vehicle: str, **filters: Any) -> list[dict[str, Any]]:
@@ -256,9 +256,9 @@ class NatsBus:
         began_s = self._now()
         ends_s = began_s + deadline_s
         due_s = ends_s if comes_within_s is None else began_s + min(deadline_s, comes_within_s)
-        self._heard.check(vehicle)
+        self._agents.check(vehicle)
         clock = self._questions.clocks.get(vehicle)
-        if clock is None or clock.run != self._logs.run(vehicle) or self._now() - clock.heard_s > GONE_AFTER_S:
+        if clock is None or clock.run != self._logs.run(vehicle) or self._now() - clock.received_s > GONE_AFTER_S:
             try:
                 await self._questions.ask(vehicle, wire.Ask(do="clock"), within_s=deadline_s)
             except NotServed as why:  # the command itself was not sent
@@ -266,14 +266,14 @@ class NatsBus:
             clock = self._questions.clocks[vehicle]
         now_s = self._now()
         ahead_s = clock.earliest(now_s) - now_s
-        asked = wire.Ask(
+        command_request = wire.Ask(
             do="command",
             command=dict(command),
             not_after_s=due_s + ahead_s,
             answered_by_s=ends_s + ahead_s,
             run=clock.run,
         )
-        answer = await self._questions.ask(vehicle, asked, within_s=ends_s - now_s)
+        answer = await self._questions.ask(vehicle, command_request, within_s=ends_s - now_s)
         # What the command caused may be shown before it is answered; the answer does not wait longer than it may.
         await self._logs.caught_up(vehicle, answer.last, ends_s - self._now())
         return answer.answer

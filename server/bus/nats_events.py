@@ -1,4 +1,4 @@
-"""The newest events of one vehicle at a web node: in order, once, and what is missing is asked for."""
+"""The newest events of one vehicle at a web node: in order, once; missing ones are requested."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
-RECENT = 200  # kept in memory; older ones are asked of the agent
+RECENT = 200  # kept in memory; older ones are requested from the agent
 
 
 class EventCache:
-    """Takes what is published and what was asked for, in any order."""
+    """Takes events that were published or requested, in any order."""
 
     def __init__(self) -> None:
         self.run = ""

@@ -9,7 +9,7 @@
 
 Each message is a line of JSON and then bytes, and is far below the broker's largest. An answer is pulled, never pushed:
 the node has a few pulls under way, fewer where they take long, so that a download does not delay the frames that share
-the connection. What is lost on the way is asked for again; a request is carried out once, by its id.
+the connection. What is lost on the way is requested again; a request is carried out once, by its id.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from server.bus.nats_wire import Body, Malformed, Number, decode, encode
 CHUNK = 48 * 1024  # bytes of a request's or an answer's body in one message
 MOST_PARTS = 171  # of a request's body: a photo of 8 MB is the largest
 FEW_PARTS = 6  # of all other requests
-MOST_AHEAD = 8  # chunks that an agent makes before they are asked for, and that a node has under way
+MOST_AHEAD = 8  # chunks that an agent makes before they are pulled, and that a node has under way
 LONGEST_MESSAGE = 128 * 1024
 WAITS_S = 1.0  # an agent that has nothing yet answers so after so long
-UNASKED_S = 15.0  # an answer that nobody asks for so long is given up
+UNASKED_S = 15.0  # an answer that is not pulled for so long is given up
 
 Id = Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]
 Headers = Annotated[
@@ -44,7 +44,7 @@ class Refused(Exception):
 
 
 class Sender(Body):
-    """Who asked the node, as it was let in there."""
+    """Who sent the request to the node, as authenticated there."""
 
     id: Annotated[str, Field(max_length=100)]
     name: Annotated[str, Field(max_length=200)] = ""
@@ -52,7 +52,7 @@ class Sender(Body):
 
 
 class Begin(Body):
-    """A request without its body, which comes in `parts`; `root_path` is what stands before `path` at the node."""
+    """A request without its body, which comes in `parts`; `root_path` is the part before `path` at the node."""
 
     id: Id
     method: Annotated[str, Field(pattern=r"^[A-Z]{3,10}$")]

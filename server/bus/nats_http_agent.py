@@ -23,7 +23,7 @@ MOST = 32  # requests at once, of all nodes
 MOST_OF_ONE = 12  # of one device or program
 MOST_LARGE = 4  # of them with a photo in their body
 MOST_TASKS = 300  # messages at once that wait for their answer; a flood is refused
-LOOKS_EVERY_S = 2.0
+CHECK_EVERY_S = 2.0
 
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]
@@ -49,11 +49,11 @@ class Answering:
         self._is_over = self._is_broken = False
         self._changed = asyncio.Event()
         self.task: asyncio.Task[None] | None = None
-        self.asked_s = now()
+        self.requested_s = now()
 
     def take(self, n: int, payload: bytes) -> bool:
         """A part of the body came; answers whether the body is whole now for the first time."""
-        self.asked_s = self._now()
+        self.requested_s = self._now()
         if n >= len(self._parts) or self._parts[n] is not None:
             return False
         self._parts[n] = payload
@@ -71,7 +71,7 @@ class Answering:
 
     async def chunk(self, n: int, have: int) -> tuple[http.Chunk, bytes]:
         """Chunk `n` once it is there, or what there is instead."""
-        began_s = self.asked_s = self._now()
+        began_s = self.requested_s = self._now()
         self._have = max(self._have, min(have, self._made))
         for number in [number for number in self._chunks if number < self._have]:
             del self._chunks[number]
@@ -80,8 +80,8 @@ class Answering:
             async with asyncio.timeout(http.WAITS_S):
                 while n not in self._chunks and not (self._is_over or self._is_broken):
                     await self._changed.wait()
-        self.asked_s = self._now()
-        waited_s = self.asked_s - began_s
+        self.requested_s = self._now()
+        waited_s = self.requested_s - began_s
         if n not in self._chunks:
             return http.Chunk(state="gone" if self._is_over or self._is_broken else "wait", waited_s=waited_s), b""
         state: Any = "last" if self._is_over and n == self._made - 1 else "more"
@@ -111,7 +111,7 @@ class Answering:
             await self._put(bytes(self._rest), is_last=True)
 
     async def _put(self, payload: bytes, *, is_last: bool = False) -> None:
-        """One more chunk; waits while the node has not asked for those before."""
+        """One more chunk; waits while the node has not pulled those before."""
         while self._made >= self._have + http.MOST_AHEAD:
             await self._changed.wait()
         self._chunks[self._made] = payload
@@ -173,9 +173,9 @@ class HttpAgent:
 
     async def _give_up_unasked(self) -> None:
         while True:
-            await asyncio.sleep(LOOKS_EVERY_S)
+            await asyncio.sleep(CHECK_EVERY_S)
             now_s = self._now()
-            for id in [id for id, one in self._answering.items() if now_s - one.asked_s > http.UNASKED_S]:
+            for id in [id for id, one in self._answering.items() if now_s - one.requested_s > http.UNASKED_S]:
                 self._drop(id)
 
     def _drop(self, id: str) -> None:

@@ -1,4 +1,4 @@
-"""Asks agents for what they keep, from a web node through a NATS broker."""
+"""Requests what agents keep, from a web node through a NATS broker."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from server.bus.bus import NotServed
 ANSWERS_WITHIN_S = 3.0  # one message; it waits at the agent for a second at most
 RETRY_S = 0.3
 SILENT_S = 8.0  # an agent that answers nothing for so long is given up
-ABSENT_S = 2.0  # where the broker knows nobody who would answer: an agent that starts again comes later
+ABSENT_S = 2.0  # where the broker has no responder: an agent that restarts subscribes later
 BEGINS_WITHIN_S = 180.0  # an export is made first
 GOES_ON_WITHIN_S = 30.0  # between two chunks
 TOO_MUCH = "this is more than a request may carry"
@@ -141,7 +141,7 @@ class _Request:
     async def chunks(self, head: http.Chunk, payload: bytes) -> AsyncIterator[bytes]:
         """All chunks, in order, with as many pulls under way as the pace allows. Raises BrokeOff."""
         pulls: deque[asyncio.Task[tuple[http.Chunk, bytes]]] = deque()
-        asked = 1
+        requested = 1
         self._pace.answers += 1
         try:
             while True:
@@ -149,8 +149,8 @@ class _Request:
                 if head.state == "last":
                     return
                 while len(pulls) < self._pace.ahead:
-                    pulls.append(asyncio.create_task(self._pull(asked)))
-                    asked += 1
+                    pulls.append(asyncio.create_task(self._pull(requested)))
+                    requested += 1
                 head, payload = await pulls.popleft()
                 self._have += 1
         except NotServed as why:
@@ -174,7 +174,7 @@ class _Request:
                 raise NotServed(f"the answer of the agent of {self._vehicle} broke off")
 
     async def _patiently(self, what: str, head: wire.Body, payload: bytes = b"") -> tuple[http.Chunk, bytes]:
-        """Asks again while no answer comes: each message may be sent twice. Raises NotServed."""
+        """Sends the request again while no answer comes: each message may be sent twice. Raises NotServed."""
         began_s = self._now()
         while True:
             within_s = SILENT_S

@@ -22,9 +22,9 @@ log = logging.getLogger("catgraph.bus")
 RETRY_S = 1
 CONNECTS_WITHIN_S = 3
 PING_EVERY_S = 2  # a broker that has not answered two of them is gone: after 4 to 6 s
-SAID_AGAIN_S = 60.0  # the same complaint is logged no more often
+LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
 MOST_REFUSED = 20  # subjects that are named
-NO_RIGHT = "permissions violation"  # as a broker says it; the connection stays
+NO_RIGHT = "permissions violation"  # as a broker words it; the connection stays
 
 
 class Part(Protocol):
@@ -65,14 +65,14 @@ class BrokerLink:
         self._task: asyncio.Task[None] | None = None
         self._is_started = False
         self._why = "it was not reached yet"
-        self._said: tuple[str, float] = ("", 0.0)
+        self._logged: tuple[str, float] = ("", 0.0)
         self._refused: dict[str, None] = {}  # what the broker refused by this connection, in its order
 
     @property
     def refused(self) -> str | None:
         """What the broker does not allow this program, as a sentence; None: it refused nothing by this connection.
 
-        Nothing else says so: what is subscribed to does not come, and what is published does not arrive.
+        Nothing else shows it: subscriptions deliver nothing, and what is published does not arrive.
         """
         if not self._refused:
             return None
@@ -92,7 +92,7 @@ class BrokerLink:
         return f"The broker {self._broker.address} is not connected: {self._why}."
 
     def start(self) -> None:
-        """Begin to connect; it goes on in the background, because everything else works without a broker."""
+        """Begin to connect, in the background, because everything else works without a broker."""
         for part in self._parts:
             part.open()
         self._task = asyncio.create_task(self._run(), name="broker link")
@@ -154,13 +154,13 @@ class BrokerLink:
         )
 
     async def _on_error(self, why: Exception) -> None:
-        self._why = _words(why)
+        self._why = _reason(why)
         if NO_RIGHT in self._why.lower() and len(self._refused) < MOST_REFUSED:
             self._refused[self._why] = None
         now_s = asyncio.get_running_loop().time()
-        said, at_s = self._said
-        if self._why != said or now_s - at_s > SAID_AGAIN_S:
-            self._said = (self._why, now_s)
+        logged, at_s = self._logged
+        if self._why != logged or now_s - at_s > LOG_AGAIN_S:
+            self._logged = (self._why, now_s)
             log.warning("broker_error address=%s why=%s", self._broker.address, self._why)
 
 
@@ -171,7 +171,7 @@ def _check_size(client: Client) -> None:
         raise BrokerRefused(f"it takes messages of {takes} kB at most, and {needed} kB are needed (max_payload)")
 
 
-def _words(why: Exception) -> str:
+def _reason(why: Exception) -> str:
     text = (getattr(why, "strerror", None) or str(why) or type(why).__name__).removeprefix("nats: ").strip("'. ")
     return "it does not know this program's key" if "authorization" in text.lower() else text
 

@@ -1,4 +1,4 @@
-"""The newest events of every vehicle at a web node; what was lost on the way is asked of the agents."""
+"""The newest events of every vehicle at a web node; those lost on the way are requested from the agents."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class RemoteLogs:
         self._questions = questions
         self._on_new = on_new
         self._caches: dict[str, EventCache] = {}
-        self._resuming: dict[str, bool] = {}  # whether their agents answer `resume`, once they said it
+        self._resuming: dict[str, bool] = {}  # whether their agents answer `resume`, once they announced it
         self._fetches: dict[str, asyncio.Task[None]] = {}
         self._changed = asyncio.Event()
 
@@ -32,14 +32,14 @@ class RemoteLogs:
         return iter(tuple(self._caches))
 
     async def stop(self) -> None:
-        """End what is being asked for."""
+        """Cancel the running requests."""
         for task in self._fetches.values():
             task.cancel()
         await asyncio.gather(*self._fetches.values(), return_exceptions=True)
         self._fetches.clear()
 
     def run(self, vehicle: str) -> str:
-        """In which the agent numbers; "": it was not heard."""
+        """In which the agent numbers; "": nothing was received from it."""
         cache = self._caches.get(vehicle)
         return "" if cache is None else cache.run
 
@@ -60,7 +60,7 @@ class RemoteLogs:
         if is_other:
             self._changed.set()
             self._changed = asyncio.Event()
-            self._on_new(vehicle)  # whoever follows it goes on in this run
+            self._on_new(vehicle)  # its readers continue in this run
         self._fetch_missing(vehicle)
 
     def note_resuming(self, vehicle: str, *, is_able: bool) -> None:
@@ -70,7 +70,7 @@ class RemoteLogs:
     async def resume(self, vehicle: str, run: str, n: int) -> Resumed:
         """As `PageBus.resume`."""
         if vehicle not in self._resuming:
-            raise NotServed(f"{vehicle} has not said yet what it answers")
+            raise NotServed(f"{vehicle} has not announced yet which requests it answers")
         if not self._resuming[vehicle]:  # of an agent of before, only a shorter log is known to be another one
             common = n if n <= self.last(vehicle) else 0
             return Resumed(common=common, after=common, new_after=common)
@@ -81,7 +81,7 @@ class RemoteLogs:
         return Resumed(common=common, after=after, new_after=new_after)
 
     def take(self, vehicle: str, events: list[dict[str, Any]]) -> None:
-        """Events that were published or asked for."""
+        """Events that were published or requested."""
         if self._caches[vehicle].take(events):
             self._changed.set()
             self._changed = asyncio.Event()
@@ -94,13 +94,13 @@ class RemoteLogs:
             self._fetches[vehicle] = asyncio.create_task(self._fetch(vehicle))
 
     async def _fetch(self, vehicle: str) -> None:
-        """What was lost on the way; where the agent does not answer, its next word begins it again."""
+        """Request the events lost on the way; where the agent does not answer, its next message starts this again."""
         cache = self._caches[vehicle]
         with contextlib.suppress(NotServed):
             while cache.is_behind:
                 before = cache.last
                 answer = await self._questions.ask(vehicle, wire.Ask(do="after", n=before))
-                if answer.run != cache.run:  # it says so itself, and then the rest is another's
+                if answer.run != cache.run:  # it announces its new run itself; the rest is of another log
                     return
                 self.take(vehicle, answer.events)
                 if cache.last == before:

@@ -46,17 +46,17 @@ class Pulls:
         await asyncio.gather(*tasks.values(), return_exceptions=True)
 
     async def _pull(self, vehicle: str, kind: str) -> None:
-        """One frame after the other: the next is asked for when the last is here, so that none waits on the way."""
+        """One frame after the other: the next is requested when the last is here, so that none waits on the way."""
         have, run = 0, ""
         subject = wire.subject(vehicle, f"pull.{kind}")
-        began_s, asked = self._now(), 0  # in the second that began then
+        began_s, requests = self._now(), 0  # in the second that began then
         while True:
-            if asked >= MOST:
+            if requests >= MOST:
                 await asyncio.sleep(max(0.0, began_s + 1.0 - self._now()))
             if self._now() >= began_s + 1.0:
-                began_s, asked = self._now(), 0
-            asked += 1
-            asked_s = self._now()
+                began_s, requests = self._now(), 0
+            requests += 1
+            requested_s = self._now()
             if (client := self._questions.client) is None:
                 await asyncio.sleep(RETRY_S)
                 continue
@@ -77,8 +77,8 @@ class Pulls:
             if not head.number or (head.number, head.run) == (have, run):
                 continue
             have, run = head.number, head.run
-            # By our clock, and no later than it was: the pull was at the agent after `asked_s`.
-            put_s = min(asked_s + max(0.0, head.waited_s), self._now()) - max(0.0, head.age_s)
+            # By our clock, and no later than it was: the pull was at the agent after `requested_s`.
+            put_s = min(requested_s + max(0.0, head.waited_s), self._now()) - max(0.0, head.age_s)
             try:
                 self._keep(vehicle, kind, payload, put_s)
             except wire.Malformed as why:

@@ -1,4 +1,4 @@
-"""What a web node asks of agents, and what it knows of their clocks."""
+"""Requests of a web node to its agents, and the agents' clocks."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from server.bus.bus import NotServed, Outcome
 
 log = logging.getLogger("catgraph.bus")
 
-SAID_AGAIN_S = 10.0  # what an agent sends fills no log
+LOG_AGAIN_S = 10.0  # what an agent sends fills no log
 ReadEvent = Callable[[dict[str, Any]], dict[str, Any]]
 ANSWER_S = 2.0  # for a question; a command has its own deadline
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AgentClock:
-    """The agent's clock as it answered: `now_s` of its run, read by us at `heard_s` of our own clock."""
+    """The agent's clock as it answered: `now_s` of its run, read by us at `received_s` of our own clock."""
 
     run: str
     now_s: float
-    heard_s: float
+    received_s: float
 
     def earliest(self, now_s: float) -> float:
         """What the agent's clock shows now at least: what is on its way makes it later."""
-        return self.now_s + now_s - self.heard_s
+        return self.now_s + now_s - self.received_s
 
 
 class Questions:
-    """Asks the agents. `now`: a monotonic clock in seconds."""
+    """Sends requests to the agents. `now`: a monotonic clock in seconds."""
 
     def __init__(self, *, now: Callable[[], float], read_event: ReadEvent = lambda event: event) -> None:
         """`read_event`: an event of an agent as pages get it."""
@@ -43,29 +43,29 @@ class Questions:
         self.client: Client | None = None  # None: there was no connection yet
         self._now = now
         self.clocks: dict[str, AgentClock] = {}
-        self.heard_s = 0.0  # when any agent answered last
-        self._said_s: dict[str, float] = {}  # of each subject
+        self.received_s = 0.0  # when any agent answered last
+        self._logged_s: dict[str, float] = {}  # of each subject
         self.refused = 0  # bodies of agents that could not be read
 
     def refuse(self, subject: str, why: wire.Malformed) -> None:
         """Counts and logs what cannot be read."""
         self.refused += 1
-        if self._now() - self._said_s.get(subject, -SAID_AGAIN_S) < SAID_AGAIN_S:
+        if self._now() - self._logged_s.get(subject, -LOG_AGAIN_S) < LOG_AGAIN_S:
             return
-        self._said_s[subject] = self._now()
+        self._logged_s[subject] = self._now()
         log.warning("message not read: subject=%s why=%s", subject, why)
 
     def set_clock(self, vehicle: str, run: str, now_s: float) -> None:
         """An answer that was just received showed `now_s` on the agent's clock."""
-        self.heard_s = self._now()
-        self.clocks[vehicle] = AgentClock(run=run, now_s=now_s, heard_s=self.heard_s)
+        self.received_s = self._now()
+        self.clocks[vehicle] = AgentClock(run=run, now_s=now_s, received_s=self.received_s)
 
-    async def ask(self, vehicle: str, asked: wire.Ask, *, within_s: float = ANSWER_S) -> wire.Answer:
+    async def ask(self, vehicle: str, request: wire.Ask, *, within_s: float = ANSWER_S) -> wire.Answer:
         """Raises NotServed: no agent, no broker, no answer in time, or refused by the agent."""
         client = self.client
         if client is None or not client.is_connected:  # else it would wait in the client and come late
             raise NotServed("the broker is not connected", cut="server-broker")
-        data = wire.encode(asked)
+        data = wire.encode(request)
         if len(data) > wire.largest(client.max_payload):  # the broker would end the connection
             raise NotServed(
                 f"the request is too large for the broker ({len(data) // 1000} kB)", outcome="not_delivered"

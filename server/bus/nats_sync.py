@@ -9,7 +9,7 @@ async def processed(client: Client, *, within_s: int = 10) -> None:
     """Return once the broker has processed all that was sent before. Raises the errors of the client and TimeoutError.
 
     One flush is not enough: nats-py writes its PING at once, ahead of what waits for its writing task, so the PONG of
-    the first says only that this task has run meanwhile.
+    the first shows only that this task has run meanwhile.
     """
     for _ in range(2):
         await client.flush(timeout=within_s)

@@ -2,9 +2,9 @@
 
 | subject | direction | body |
 |---|---|---|
-| `pull.<kind>` | node asks, agent answers | `Pull`; a frame's head as a line of JSON, then the frame |
-| `ask` | node asks, agent answers | a request, or a question for events or the clock |
-| `http.…` | node asks, agent answers | requests for what the agent keeps: `nats_http.py` |
+| `pull.<kind>` | node requests, agent answers | `Pull`; a frame's head as a line of JSON, then the frame |
+| `ask` | node requests, agent answers | a command, or a request for events or the clock |
+| `http.…` | node requests, agent answers | requests for what the agent keeps: `nats_http.py` |
 | `events` | agent publishes | events in order, once pages may have them |
 | `here` | agent publishes every second | its run and the number of its newest event |
 
@@ -57,7 +57,7 @@ Run = Annotated[str, Field(max_length=40)]
 
 
 class Pull(Body):
-    """A node asks for a frame newer than number `have` of the agent's run `run`."""
+    """A node requests a frame newer than number `have` of the agent's run `run`."""
 
     have: Number
     run: Run

@@ -1,4 +1,4 @@
-"""`catgraph doctor`: what a car publishes, how often, and which signals catgraph makes of it."""
+"""`catgraph doctor`: what a car publishes, how often, and which signals catgraph derives from it."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 class _Listener:
-    """Listens to the link for the doctor."""
+    """The receiver of the link for the doctor."""
 
     def __init__(self) -> None:
         self.opened = asyncio.Event()
         self.decided = asyncio.Event()  # opened, or the first try failed
-        self.spoke = asyncio.Event()
+        self.has_received = asyncio.Event()
         self.problem: Problem | None = None
         self.reception = Reception()
         self.evidence = Evidence()
@@ -70,7 +70,7 @@ class _Listener:
         self.counts: dict[str, int] = {}
         self.values: dict[str, Any] = {}
         self.client_count: Any = None  # of the bridge, as it last published it
-        self.words: list[str] = []
+        self.statuses: list[str] = []
 
     def link_opened(self) -> None:
         self.opened.set()
@@ -84,7 +84,7 @@ class _Listener:
         self.decided.set()
 
     def message_received(self, topic: str, message: Any, note: str | None) -> None:
-        self.spoke.set()
+        self.has_received.set()
         if topic == CLIENT_COUNT:
             self.client_count = message
         self.counts[topic] = self.counts.get(topic, 0) + 1
@@ -98,8 +98,8 @@ class _Listener:
                 self.values[source.signal] = value
 
     def status_received(self, level: str, text: str) -> None:
-        self.spoke.set()
-        self.words.append(text if level == NOTE else f"The bridge reports {level}: {text}")
+        self.has_received.set()
+        self.statuses.append(text if level == NOTE else f"The bridge reports {level}: {text}")
 
     def junk_received(self, why: str) -> None:
         self.reception.junk(why)
@@ -109,14 +109,14 @@ class _Listener:
 
 
 async def _examine(address: Address, seconds: float) -> int:
-    ear = _Listener()
-    link = open_source(address, ear, now=time.monotonic)
+    listener = _Listener()
+    link = open_source(address, listener, now=time.monotonic)
     link.start()
     try:
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(ear.decided.wait(), CONNECT_WITHIN_S)
-        if not ear.opened.is_set():
-            problem = ear.problem
+            await asyncio.wait_for(listener.decided.wait(), CONNECT_WITHIN_S)
+        if not listener.opened.is_set():
+            problem = listener.problem
             print(
                 f"catgraph: {problem.title} {problem.hint}"
                 if problem
@@ -124,7 +124,7 @@ async def _examine(address: Address, seconds: float) -> int:
                 file=sys.stderr,
             )
             return 2
-        return await _report(address, link, ear, seconds)
+        return await _report(address, link, listener, seconds)
     except LinkDown:
         print("catgraph: the bridge closed the connection while it was being examined.", file=sys.stderr)
         return 2
@@ -139,31 +139,31 @@ def _cannot(problem: Problem | None) -> int:
     return 2
 
 
-async def _report(address: Address, link: LiveSource, ear: _Listener, seconds: float) -> int:
+async def _report(address: Address, link: LiveSource, listener: _Listener, seconds: float) -> int:
     diagnosis = Diagnosis()
-    asks = Questions(link, diagnosis, now=time.monotonic)
+    questions = Questions(link, diagnosis, now=time.monotonic)
     try:
-        return await _discover_and_report(address, link, ear, asks, diagnosis, seconds)
+        return await _discover_and_report(address, link, listener, questions, diagnosis, seconds)
     finally:
-        asks.stop()
+        questions.stop()
 
 
 async def _discover_and_report(
-    address: Address, link: LiveSource, ear: _Listener, asks: Questions, diagnosis: Diagnosis, seconds: float
+    address: Address, link: LiveSource, listener: _Listener, questions: Questions, diagnosis: Diagnosis, seconds: float
 ) -> int:
     server_software = link.server_software
-    asked_s = time.monotonic()
-    offer = await discovery.fetch_topics(asks)
-    alive = await discovery.fetch_alive(asks)
-    if asks.login is not None or (ear.problem is not None and ear.problem.code == LOGIN_WANTED):
-        return _cannot(asks.login or ear.problem)
+    began_s = time.monotonic()
+    offer = await discovery.fetch_topics(questions)
+    alive = await discovery.fetch_alive(questions)
+    if questions.login is not None or (listener.problem is not None and listener.problem.code == LOGIN_WANTED):
+        return _cannot(questions.login or listener.problem)
     if not alive:
-        while (wait_s := asked_s + SILENT_S + 0.2 - time.monotonic()) > 0 and not alive:
+        while (wait_s := began_s + SILENT_S + 0.2 - time.monotonic()) > 0 and not alive:
             await asyncio.sleep(min(wait_s, 0.5))  # ROS 2 finds rosapi a little later; an answer may be late
-            alive = await discovery.fetch_alive(asks)
-        offer = offer or (await discovery.fetch_topics(asks) if alive else None)
+            alive = await discovery.fetch_alive(questions)
+        offer = offer or (await discovery.fetch_topics(questions) if alive else None)
     behind = diagnosis.problem(time.monotonic(), flows=False)
-    if offer is None and not diagnosis.is_rosbridge and not ear.spoke.is_set():
+    if offer is None and not diagnosis.is_rosbridge and not listener.has_received.is_set():
         return _cannot(not_proved(address, server_software, link.junk_count))
     if behind is not None and behind not in (ROSAPI_MISSING, ROSAPI_ENDED) and offer is None:
         return _cannot(behind)
@@ -174,16 +174,16 @@ async def _discover_and_report(
         problem = behind or ROSAPI_MISSING
         print(f"{problem.title} {problem.hint}")
         return 1
-    choice, unpublished = await _map(asks, offer)
+    choice, unpublished = await _map(questions, offer)
     profile = profiles.choose(profiles.load(), offer.topics, offer.ros)
     ratio = Settings().limits(profile).steering.tyre_rad_per_unit
-    ear.basis = UnitBasis(profile=profile, chosen={}, tyre_rad_per_unit=ratio)
-    ear.by_topic = {}
+    listener.basis = UnitBasis(profile=profile, chosen={}, tyre_rad_per_unit=ratio)
+    listener.by_topic = {}
     for source in (*choice.sources.values(), *(one for found in choice.watched.values() for one in found)):
-        ear.by_topic[source.topic] = (*ear.by_topic.get(source.topic, ()), source)
-    follow(ear.evidence, offer.topics, {})
+        listener.by_topic[source.topic] = (*listener.by_topic.get(source.topic, ()), source)
+    follow(listener.evidence, offer.topics, {})
     for topic, kind in offer.topics.items():
-        mapped = [source for source in ear.by_topic.get(topic, ()) if source.decode is not None]
+        mapped = [source for source in listener.by_topic.get(topic, ()) if source.decode is not None]
         cbor = any(BY_SIGNAL[source.signal].compression == "cbor" for source in mapped)
         if mapped or topic == CLIENT_COUNT:
             link.subscribe(
@@ -191,14 +191,14 @@ async def _discover_and_report(
             )
     print(f"Listening for {seconds:g} s …", flush=True)
     await asyncio.sleep(seconds)
-    shown = choose(offer.topics, unpublished=unpublished, evidence=ear.evidence)
-    not_passed = await _not_passed(offer, choice.sources, ear, asks)
+    shown = choose(offer.topics, unpublished=unpublished, evidence=listener.evidence)
+    not_passed = await _not_passed(offer, choice.sources, listener, questions)
     if not_passed is not None:
         print(f"{not_passed.title} {not_passed.hint}")
-    return _print(address, offer, shown, ear, seconds)
+    return _print(address, offer, shown, listener, seconds)
 
 
-async def _map(asks: Questions, offer: discovery.Offer) -> tuple[Choice, set[str]]:
+async def _map(questions: Questions, offer: discovery.Offer) -> tuple[Choice, set[str]]:
     """The topic of each signal, of those that a node publishes; and the topics that none does."""
     published: set[str] = set()
     unpublished: set[str] = set()
@@ -210,26 +210,26 @@ async def _map(asks: Questions, offer: discovery.Offer) -> tuple[Choice, set[str
         if not unknown:
             return choice, unpublished
         for topic in sorted(unknown):
-            nodes = await discovery.fetch_publishers(asks, topic, and_bridge=True)
+            nodes = await discovery.fetch_publishers(questions, topic, and_bridge=True)
             (unpublished if nodes == () else published).add(topic)
 
 
 async def _not_passed(
-    offer: discovery.Offer, sources: Mapping[str, Source], ear: _Listener, asks: Questions
+    offer: discovery.Offer, sources: Mapping[str, Source], listener: _Listener, questions: Questions
 ) -> Problem | None:
     """Why topics of signals that have a publisher do not come through the bridge; None: they do, or it is not known."""
-    silent = [topic for topic in {source.topic for source in sources.values()} if not ear.counts.get(topic)]
-    published = [topic for topic in silent if await discovery.fetch_publishers(asks, topic)]
+    silent = [topic for topic in {source.topic for source in sources.values()} if not listener.counts.get(topic)]
+    published = [topic for topic in silent if await discovery.fetch_publishers(questions, topic)]
     passing = Passing()
     passing.follow(published, 0.0)
-    passing.counted(ear.client_count)
-    passing.bridges = frozenset(await discovery.fetch_publishers(asks, CLIENT_COUNT, and_bridge=True) or ())
+    passing.counted(listener.client_count)
+    passing.bridges = frozenset(await discovery.fetch_publishers(questions, CLIENT_COUNT, and_bridge=True) or ())
     for topic in published if passing.bridges else ():
-        passing.answered(topic, await discovery.fetch_subscribers(asks, topic), 0.0)
+        passing.answered(topic, await discovery.fetch_subscribers(questions, topic), 0.0)
     return passing.problem(BLOCKED_AFTER_S)
 
 
-def _print(address: Address, offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: float) -> int:
+def _print(address: Address, offer: discovery.Offer, choice: Choice, listener: _Listener, seconds: float) -> int:
     missing, sources = [], choice.sources
     print(f"\n{'signal':<14}{'topic':<46}{'type':<34}{'rate':>9}")
     for row in TOPICS:
@@ -243,15 +243,15 @@ def _print(address: Address, offer: discovery.Offer, choice: Choice, ear: _Liste
             print(f"{row.signal:<14}{'not published':<46}{row.expected_type + ' looked for':<34}")
             missing.append(row.signal)
             continue
-        count = ear.counts.get(source.topic, 0)
+        count = listener.counts.get(source.topic, 0)
         rate = f"{count / seconds:.1f} Hz" if count else "silent"
         print(f"{row.signal:<14}{source.topic:<46}{source.type or 'unknown':<34}{rate:>9}")
-        tally = ear.reception.by_signal.get(row.signal)
+        tally = listener.reception.by_signal.get(row.signal)
         if source.why:
             print(f"{'':<14}why: {source.why}")
         if source.note:
             print(f"{'':<14}{source.note}")
-        if (unit := _unit(ear, source)) is not None:
+        if (unit := _unit(listener, source)) is not None:
             print(f"{'':<14}{unit}")
         _print_candidates(choice, row.signal, source.topic)
         if tally is not None and tally.rejected:
@@ -266,10 +266,10 @@ def _print(address: Address, offer: discovery.Offer, choice: Choice, ear: _Liste
     print(f"\n{len(others)} other topics" + (":" if others else ""))
     for topic in others:
         print(f"  {topic:<44}{offer.topics[topic]}")
-    for words in ear.words[:10]:
-        print(words)
-    if ear.reception.frames.rejected:
-        print(f"{ear.reception.frames.rejected} frames could not be read: {ear.reception.frames.last_reason}")
+    for text in listener.statuses[:10]:
+        print(text)
+    if listener.reception.frames.rejected:
+        print(f"{listener.reception.frames.rejected} frames could not be read: {listener.reception.frames.last_reason}")
     for question in choice.questions:
         print(f"To choose, in Settings or on Signals: {question['words']}")
     needed = [signal for signal in missing if signal in REPORT_SIGNALS]
@@ -293,10 +293,10 @@ def _print_candidates(choice: Choice, signal: str, taken: str | None) -> None:
         print(f"{'':<14}and {len(others) - MOST_CANDIDATES} more")
 
 
-def _unit(ear: _Listener, source: Source) -> str | None:
+def _unit(listener: _Listener, source: Source) -> str | None:
     """In which unit a topic is published; None: nothing came, or there is no doubt of it, or it is unknown, which is
     the reason why its messages are not measured."""
-    decision = ear.reception.units.decision(source.signal, source.topic)
+    decision = listener.reception.units.decision(source.signal, source.topic)
     if decision is None or decision.unit is None:
         return None
     return f"published in {decision.unit.label}, {decision.why}"

@@ -287,7 +287,7 @@ def _live_with_the_server() -> None:
     signal.signal(signal.SIGTERM, _stop)  # unfinished files are deleted at the end
 
     def wait() -> None:
-        while os.read(0, 1):  # not through a buffer: its lock would be in the way when Python ends
+        while os.read(0, 1):  # not through a buffer: its lock would block the end of Python
             pass
         os.kill(os.getpid(), signal.SIGTERM)
 

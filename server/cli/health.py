@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: well, also where cars are not heard; 1: not well, no answer, or none of catgraph; 2: the authority cannot be
+    """0: well, also where cars send nothing; 1: not well, no answer, or none of catgraph; 2: the authority cannot be
     read."""
     try:
         body = _ask((args.url,) if args.url else _HERE, args.ca)

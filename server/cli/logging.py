@@ -18,8 +18,10 @@ LONGEST = 4000  # letters of one message
 
 
 class OneLine(logging.Formatter):
-    """Signs that end a line, turn the direction of writing or steer a terminal stand as \\x1b or \\u202e; where a fault
-    is logged with its trace, each line of it is set in, so that no line of it can pass for a line of the log."""
+    """Characters that end a line, turn the direction of writing or steer a terminal are written as \\x1b or \\u202e.
+
+    Where a fault is logged with its trace, each of its lines is indented, so that none can pass for a line of the log.
+    """
 
     def formatMessage(self, record: logging.LogRecord) -> str:
         return _seen(log_context.with_context(super().formatMessage(record)))

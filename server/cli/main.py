@@ -16,8 +16,8 @@ from server.version import catgraph_version
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Command:
-    """A sub-command; its module has `add_arguments(parser)` and `run(args) -> int` and is loaded only when it is
-    asked for."""
+    """A sub-command; its module has `add_arguments(parser)` and `run(args) -> int` and is imported only when it is
+    called."""
 
     module: str
     help: str
@@ -53,12 +53,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="catgraph", description="Operator control unit for a test vehicle.")
     parser.add_argument("--version", action="version", version=f"catgraph {catgraph_version()}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    asked = next((word for word in given if not word.startswith("-")), None)
+    called = next((argument for argument in given if not argument.startswith("-")), None)
     for name, command in COMMANDS.items():
         sub = subparsers.add_parser(
             name, help=command.help, description=f"{command.help[0].upper()}{command.help[1:]}."
         )
-        if name == asked:
+        if name == called:
             module = importlib.import_module(command.module)
             module.add_arguments(sub)
             sub.set_defaults(run=module.run)

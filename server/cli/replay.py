@@ -225,16 +225,16 @@ class _Replay:
         say("Waiting for a subscriber …")
         while True:
             self._subscribed.clear()
-            if not self._is_heard():
+            if not self._has_subscriber():
                 await self._subscribed.wait()
                 continue
             try:
                 await asyncio.wait_for(self._subscribed.wait(), SETTLED_S)
             except TimeoutError:
-                if self._is_heard():
+                if self._has_subscriber():
                     return
 
-    def _is_heard(self) -> bool:
+    def _has_subscriber(self) -> bool:
         topics = (self._bridge.graph.find(name) for name in self._names.values())
         return any(topic is not None and topic.subscribers for topic in topics)
 

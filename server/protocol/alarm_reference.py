@@ -89,9 +89,9 @@ def _question(check: AnyCheck) -> str:
     find: Any = check.find
     if isinstance(find, partial):
         find = find.func
-    said = " ".join((sys.modules[find.__module__].__doc__ or "").split())
-    ends = [at for at in (said.find("? "), said.find(". "), said.find(": ")) if at > 0]
-    return said[: min(ends) + 1].removesuffix(":") if ends else said
+    text = " ".join((sys.modules[find.__module__].__doc__ or "").split())
+    ends = [at for at in (text.find("? "), text.find(". "), text.find(": ")) if at > 0]
+    return text[: min(ends) + 1].removesuffix(":") if ends else text
 
 
 def _thresholds() -> Iterator[str]:

@@ -155,7 +155,7 @@ class EventDetails(TypedDict, total=False):
     of: int
     fixed: Annotated[int, doc("items that had failed first")]
     recurring: Annotated[list[RecurringItem], doc("of a signed departure check: its items that have an interval")]
-    hash: Annotated[str, doc("SHA-256 of the list and its results [hex]; with an item: of what it asks")]
+    hash: Annotated[str, doc("SHA-256 of the list and its results [hex]; with an item: of its question")]
     # Of the owner of acknowledged alarms.
     owner: Annotated[str, doc("under whose name alarms were acknowledged")]
     off_duty_ms: Annotated[int | None, doc("when their duty ended; null: they are on duty again")]
@@ -167,7 +167,7 @@ class EventDetails(TypedDict, total=False):
     phone: Annotated[str | None, doc("the phone that was chosen")]
     since_ms: Annotated[int, doc("when the pause or the planned stop began")]
     reason: Annotated[StopReason, doc("of a planned stop")]
-    resumes: Annotated[bool, doc("monitoring goes on after the server was started again: the drive is the same")]
+    resumes: Annotated[bool, doc("monitoring continues after a restart of the server: the drive is the same")]
     # Of a mark.
     mark: MarkId
     marked_ms: MarkedMs

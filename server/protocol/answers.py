@@ -141,7 +141,7 @@ class VerificationAnswer(TypedDict):
         doc("unfinished: it ends before its seal; no chain: recorded by an older version"),
     ]
     is_broken: Annotated[bool, doc("broken or unfinished, or a recording beside it names another hash")]
-    short: Annotated[str, doc("a few words, as *Intact · 3f9a12bc* or *Broken at record 57*")]
+    short: Annotated[str, doc("a short text, as *Intact · 3f9a12bc* or *Broken at record 57*")]
     sentence: str
     records: int
     head: Annotated[str | None, doc("SHA-256 of the last record [hex]; null: there is none, or it is broken")]
@@ -187,9 +187,9 @@ class Recording(TypedDict):
     alarms: Annotated[dict[Priority, int] | None, doc("raised in it; null: no alarms were recorded with it")]
     title: str
     note: str
-    weather: Annotated[str, doc('for the report of the drive; "": nobody said')]
+    weather: Annotated[str, doc('for the report of the drive; "": nobody entered it')]
     tags: list[str]
-    marks: Annotated[int, doc("how many; their words are found by a search")]
+    marks: Annotated[int, doc("how many; a search covers their texts")]
     late: NotRequired[
         Annotated[str, doc("another value: other marks or descriptions came after it was complete; left out: none did")]
     ]
@@ -217,7 +217,7 @@ class Recording(TypedDict):
     file: Annotated[str, doc("its name in the folder")]
     format: Annotated[str, doc("mcap · bag · db3 · zstd · folder")]
     several_files: Annotated[
-        str | None, doc("why no single file is a copy of it, as words behind “it is”; null: its file is all of it")
+        str | None, doc("why no single file is a copy of it, as text behind “it is”; null: its file is all of it")
     ]
     sha256: str | None
     head: Annotated[str | None, doc("SHA-256 of the last record of its hash chain [hex], not verified; null: none")]
@@ -226,11 +226,11 @@ class Recording(TypedDict):
     sketch: Annotated[SketchAnswer | None, doc("null: no position")]
     trashed_ms: int | None
     stored: NotRequired[Annotated[StoredCopy, doc("where the server has a store")]]
-    raised: NotRequired[Annotated[list[RaisedAlarm], doc("of a recording that is asked for alone; at most 200")]]
+    raised: NotRequired[Annotated[list[RaisedAlarm], doc("of a recording that is requested alone; at most 200")]]
     speed_mps: NotRequired[
         Annotated[
             list[float | None],
-            doc("of a recording that is asked for alone: the highest speed of at most 361 equal parts; empty: none"),
+            doc("of a recording that is requested alone: the highest speed of at most 361 equal parts; empty: none"),
         ]
     ]
 

@@ -28,7 +28,7 @@ class CarAlarm(TypedDict):
     active: bool
     raised_ms: int
     sound: Annotated[Sound, doc("none while it is silenced, or makes none because of a planned stop")]
-    text: NotRequired[Annotated[str, doc("value against limit, in words")]]
+    text: NotRequired[Annotated[str, doc("value against limit, as text")]]
 
 
 class Unowned(TypedDict):
@@ -75,7 +75,7 @@ class ItemHolder(TypedDict):
 
 
 class ItemOffer(TypedDict):
-    """Who is asked to take the item over; it stays where it is until they accept."""
+    """Who is requested to take the item over; it stays where it is until they accept."""
 
     by: str
     name: str
@@ -89,7 +89,7 @@ class AttentionItem(TypedDict):
     since_ms: Annotated[int, doc("the car needs a person without a break since then")]
     assigned: ItemHolder | None
     offered: ItemOffer | None
-    escalates_ms: Annotated[int | None, doc("when it goes on to the supervisor; null: no timer runs")]
+    escalates_ms: Annotated[int | None, doc("when it is escalated to the supervisor; null: no timer runs")]
     escalated_ms: Annotated[int | None, doc("when it went on to the supervisor")]
     supervisors: NotRequired[
         Annotated[list[str] | None, doc("who is on duty as such now, 3 at most; null: not known, or by an older agent")]
@@ -104,7 +104,7 @@ class PagePerson(TypedDict):
 
 
 class AskedControl(TypedDict):
-    """An operator who asks for control of the car, and whom nobody has answered yet."""
+    """An operator who requests control of the car and has no answer yet."""
 
     page: str
     name: str
@@ -130,14 +130,14 @@ class CarSummary(TypedDict):
     attention: NotRequired[Annotated[AttentionItem | None, doc("null: it needs nobody")]]
     place: NotRequired[Annotated[CarPlace | None, doc("null: no position was received")]]
     energy_percent: NotRequired[Annotated[float | None, doc("of battery or fuel")]]
-    requests: NotRequired[Annotated[list[AskedControl], doc("who asks for control, the oldest first, 3 at most")]]
+    requests: NotRequired[Annotated[list[AskedControl], doc("who requests control, the oldest first, 3 at most")]]
     people: NotRequired[Annotated[list[PagePerson], doc("to whom its item can be handed over, 20 at most")]]
     challenge: NotRequired[Annotated[str, doc("as `challenge` of a state")]]
     planned_stop: NotRequired[Annotated[StopReason | None, doc("why it stands on purpose; null: no planned stop")]]
 
 
 class OffOnPurpose(TypedDict):
-    """A person said that a car is off; it holds until the car's agent sends data again."""
+    """A person declared a car off; it holds until the car's agent sends data again."""
 
     by: str
     since_ms: int
@@ -148,7 +148,7 @@ class ListedCar(TypedDict):
     age_s: Annotated[float | None, doc("of the summary when this was sent; null: there was none in this run")]
     summary: Annotated[CarSummary | None, doc("null: its session has stopped, and nothing is known of the car now")]
     trouble: NotRequired[Annotated[str | None, doc("which part is silent, as a sentence; null: none")]]
-    off: NotRequired[Annotated[OffOnPurpose | None, doc("who said that a car that is silent is off; null: nobody")]]
+    off: NotRequired[Annotated[OffOnPurpose | None, doc("who declared a silent car off; null: nobody")]]
 
 
 class Cars(TypedDict):

@@ -11,17 +11,17 @@ from server.protocol.doc import doc
 PAGE = r"^[0-9a-z-]{4,40}$"
 Name = Annotated[str, Field(min_length=1, max_length=120)]
 Number = Annotated[int, Field(ge=0, le=2**53)]
-PageName = Annotated[str, Field(pattern=PAGE)]  # by which a page, and the phone it is on, knows itself
+PageName = Annotated[str, Field(pattern=PAGE)]  # the name that a page, and the phone it is on, gives itself
 # Any operator, or only the one who is in control. Slowing the car is to need no more than an operator, letting it go
 # control.
 Needs = Literal["operator", "control"]
 
 
 class BaseCommand(BaseModel):
-    """What every command has; a model says what differs."""
+    """What every command has; a model declares what differs."""
 
     model_config = ConfigDict(extra="ignore", strict=True, frozen=True)
-    needs: ClassVar[Needs] = "control"  # what is not said to need less
+    needs: ClassVar[Needs] = "control"  # what is not declared to need less
     http: ClassVar[str] = ""  # its summary over HTTP; "": of pages alone, or with a route of its own
     path: ClassVar[str] = ""  # of the request, whose body has the fields that are not in it; "": /api/KIND
     has_body: ClassVar[bool] = True  # False: a program gives none of the fields

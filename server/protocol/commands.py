@@ -1,6 +1,6 @@
 """What a page or a program may order: one model a command, refused with a sentence where it does not fit.
 
-Each model says who may, whether it is served over HTTP as well, and whether a page that replays may send it.
+Each model declares who may send it, whether it is served over HTTP as well, and whether a page in a replay may.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ class Set(BaseCommand):
         default_factory=dict,
         max_length=500,
         examples=[{"speed_limit.max_mps": 9.0}],
-        description="in SI; null goes back to the default",
+        description="in SI; null restores the default",
     )
     topics: dict[Name, str | None] = Field(
         default_factory=dict, max_length=50, description="signal → topic; null: as found"
@@ -189,10 +189,10 @@ class Ride(BaseCommand):
 
 
 class TakeControl(Prompt):
-    """Takes, gives or requests control; server/control/lease.py says who may do what."""
+    """Takes, gives or requests control; server/control/lease.py has the rules."""
 
     needs: ClassVar[Needs] = "operator"
-    passes_replay: ClassVar[bool] = True  # a page that is asked for control answers
+    passes_replay: ClassVar[bool] = True  # a page from which control is requested answers
     kind: Literal["control"]
     do: Literal["take", "take_over", "release", "request", "withdraw", "hand_over", "keep"]
     to: Annotated[PageName | None, doc("of hand_over: the page that gets it; of keep: whose request is refused")] = None
@@ -207,7 +207,7 @@ class TakeControl(Prompt):
 
 
 class PresentWord(BaseCommand):
-    """How a page stands, once a second and at each change: whether it is seen, and whether an alarm would be heard from
+    """The state of a page, once a second and at each change: whether it is seen, and whether an alarm would sound from
     it. Nothing answers it but its refusal."""
 
     needs: ClassVar[Needs] = "operator"
@@ -224,7 +224,7 @@ class PresentWord(BaseCommand):
     key: Annotated[Name | None, doc("id of the key by which the page signs its orders")] = None
     leaves: Annotated[bool, doc("it is closed, or another page takes its place")] = False
     announces: list[Name] = Field(
-        default_factory=list, max_length=100, description="the other cars whose next alarm would be heard from it"
+        default_factory=list, max_length=100, description="the other cars whose next alarm would sound from it"
     )
 
 
@@ -237,7 +237,7 @@ class AskOutcome(BaseCommand):
     is_signed: ClassVar[bool] = False
     kind: Literal["outcome"]
     of: Annotated[str, Field(max_length=80, description="the `id` of the command")]
-    ago_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False, description="since it was asked for, at most")]
+    ago_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False, description="since it was requested, at most")]
 
 
 LoggedCommand = (
@@ -312,7 +312,7 @@ def too_late(message: Mapping[str, Any], wall_ms: float) -> str | None:
     try:
         command = read(message)
     except NotUnderstood:
-        return None  # the session says so
+        return None  # the session reports it
     return command.too_late(wall_ms) if isinstance(command, Prompt) else None
 
 

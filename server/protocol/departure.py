@@ -59,8 +59,8 @@ class DepartureItem(TypedDict):
     every_km: Annotated[float | None, doc("due again after so far; null: at each departure, or by time")]
     result: DepartureResult
     value: Annotated[str, doc("what was seen")]
-    note: Annotated[str, doc("why it failed or is not applicable, in a person's words")]
-    by: Annotated[str | None, doc("whose word it is; null: it turned by itself, or is open")]
+    note: Annotated[str, doc("why it failed or is not applicable, as a person wrote it")]
+    by: Annotated[str | None, doc("who set it; null: it turned by itself, or is open")]
     at_ms: Annotated[int | None, doc("when it turned")]
     is_fixed: Annotated[bool, doc("it had failed in this check")]
     now: Annotated[float | None, doc("of an active item: the value now")]

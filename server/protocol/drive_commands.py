@@ -50,7 +50,7 @@ class PlaceMark(OfMark):
         ]
         | None
     ) = None
-    category: Annotated[str, Field(max_length=40, description='a word or two; "": none any more')] | None = None
+    category: Annotated[str, Field(max_length=40, description='a short name; "": none any more')] | None = None
     words: Annotated[str, Field(max_length=2000, description='what is to be seen there; "": none any more')] | None = (
         None
     )
@@ -70,18 +70,16 @@ MarkCommand = PlaceMark | RemoveMark
 
 
 class DescribeIntervention(OfCar):
-    """Says what made somebody intervene; sent again it replaces what was said before."""
+    """Describes why somebody intervened; sent again it replaces the description before."""
 
     needs: ClassVar[Needs] = "operator"
-    http: ClassVar[str] = "Say what made somebody intervene"
+    http: ClassVar[str] = "Describe why somebody intervened"
     path: ClassVar[str] = "/api/interventions/{intervention}/describe"
     kind: Literal["describe_intervention"]
     intervention: Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{1,40}$", description="its id, as the state names it")]
-    what: Annotated[
-        str, Field(max_length=MOST_LETTERS, description="in words; empty where the category says enough")
-    ] = ""
+    what: Annotated[str, Field(max_length=MOST_LETTERS, description="as text; empty where the category is enough")] = ""
     category: Annotated[str, Field(min_length=1, max_length=40)] | None = None
-    initiated_by: Annotated[By | None, doc("where the data say otherwise; null: as they say")] = None
+    initiated_by: Annotated[By | None, doc("where the data show another one; null: as they show")] = None
 
 
 class OfPlannedStop(OfCar):
@@ -179,7 +177,7 @@ class BeginDeparture(OfDeparture):
 
 
 class SetDepartureItem(OfDeparture):
-    """A person's word on one item; refused where it turns by itself, or the check is signed."""
+    """A person's result of one item; refused where it turns by itself, or the check is signed."""
 
     kind: Literal["set_departure_item"]
     item: ItemId
@@ -201,7 +199,7 @@ class ReopenDeparture(OfDeparture):
 
 
 class SetDepartureList(OfDeparture):
-    """Replaces the list of the car; an item that asks the same as before keeps its result."""
+    """Replaces the list of the car; an item with the same question as before keeps its result."""
 
     needs: ClassVar[Needs] = "control"
     kind: Literal["set_departure_list"]

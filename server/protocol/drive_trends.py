@@ -88,7 +88,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveFacts:
-    """What an answer says beside the trends. `now_s` and the marks are on the clock of the trends."""
+    """What an answer has besides the trends. `now_s` and the marks are on the clock of the trends."""
 
     now_s: float
     start_ms: int

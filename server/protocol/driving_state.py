@@ -62,11 +62,11 @@ class InterventionAnswer(TypedDict):
 
 
 class InterventionDescription(TypedDict):
-    """What somebody said of an intervention; the newest of each holds."""
+    """A description of an intervention; the newest of each holds."""
 
     intervention: Annotated[str, doc("its id")]
     described_ms: int
-    what: Annotated[str, doc('"": the category says enough')]
+    what: Annotated[str, doc('"": the category is enough')]
     category: str | None
     initiated_by: Annotated[By | None, doc("null: as the data say")]
     by: str | None

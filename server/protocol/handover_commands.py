@@ -20,7 +20,7 @@ class OfHandover(OfCar):
     """Part of a hand-over of control; only pages send it."""
 
     needs: ClassVar[Needs] = "operator"
-    passes_replay: ClassVar[bool] = True  # a page that is asked to take over answers
+    passes_replay: ClassVar[bool] = True  # a page that is requested to take over answers
 
 
 class OfferControl(OfHandover):
@@ -71,7 +71,7 @@ class OfItem(OfCar):
     """Assigns a person to a car that needs one. It arms nothing, and is no control of the car."""
 
     needs: ClassVar[Needs] = "operator"
-    passes_replay: ClassVar[bool] = True  # a page that is asked to take an item over answers
+    passes_replay: ClassVar[bool] = True  # a page that is requested to take an item over answers
     from_fleet: ClassVar[bool] = True
 
 
@@ -94,7 +94,7 @@ class ReleaseItem(OfItem):
 
 
 class OfferItem(OfItem):
-    """Asks another person to take the car's item over; it stays assigned as it is until they accept."""
+    """Offers the car's item to another person; it stays assigned as it is until they accept."""
 
     http: ClassVar[str] = "Ask another person to take the car's item over"
     path: ClassVar[str] = "/api/attention/offer"
@@ -103,7 +103,7 @@ class OfferItem(OfItem):
 
 
 class AnswerItem(OfItem):
-    """Accepts or declines an offered item; only by who was asked."""
+    """Accepts or declines an offered item; only by the person to whom it was offered."""
 
     http: ClassVar[str] = "Accept or decline the item that was offered"
     path: ClassVar[str] = "/api/attention/answer"

@@ -54,7 +54,7 @@ class LogbookWeek(TypedDict):
 
 
 class LogbookTotals(TypedDict):
-    """Over all drives that were asked for."""
+    """Over all drives that were requested."""
 
     drives: int
     distance_m: float
@@ -85,7 +85,7 @@ class LogbookDue(TypedDict):
 
 
 class LogbookCheck(TypedDict):
-    """The newest signed departure check of a car, whatever drives were asked for."""
+    """The newest signed departure check of a car, whatever drives were requested."""
 
     vehicle: str
     signed_ms: Annotated[int | None, doc("null: no drive has one")]
@@ -121,7 +121,7 @@ class CoursePoints(TypedDict):
     speed: Annotated[list[float | None], doc("m/s")]
     steering: Annotated[list[float | None], doc("%, negative = left")]
     follow: Annotated[list[float | None], doc("m/s, speed minus the commanded speed")]
-    gps: Annotated[list[float | None], doc("m, error of the position as the receiver says it, one sigma")]
+    gps: Annotated[list[float | None], doc("m, error of the position as the receiver states it, one sigma")]
     lat: list[float | None]
     lon: list[float | None]
 

@@ -12,7 +12,7 @@ from server.protocol.doc import doc
 MarkSource = Literal["page", "http", "car"]
 MarkId = Annotated[str, doc("the mark's id")]
 MarkedMs = Annotated[int, doc("the moment that was marked, by the server's clock")]
-MarkWords = Annotated[str, doc('what was said of the moment; "": nothing')]
+MarkWords = Annotated[str, doc('text on the moment; "": none')]
 HasVoice = Annotated[bool, doc("a voice note belongs to it")]
 HasPhoto = Annotated[bool, doc("a photo belongs to it")]
 MarkedBy = Annotated[MarkSource, doc("what marked: a page, a program, or the car's own button")]

@@ -31,7 +31,7 @@ class Identity(TypedDict):
 
 
 class ServerHello(TypedDict):
-    """What a server says first, without who asks."""
+    """The first message of a server, without the recipient."""
 
     kind: Literal["hello"]
     version: str
@@ -66,7 +66,7 @@ class Offer(TypedDict):
 
 
 class Resumed(TypedDict):
-    """How the log goes on for a page that read it in another run."""
+    """How the log continues for a page that read it in another run."""
 
     common: Annotated[
         int, doc("up to this number it is the log that the page has; what the page has beyond is not in it")
@@ -175,7 +175,7 @@ class ReplayIntervention(TypedDict):
     """An intervention in a recording."""
 
     at_s: float
-    kind_of: Annotated[str, doc("as of the event; of another version it may be another word")]
+    kind_of: Annotated[str, doc("as of the event; of another version it may be another value")]
     category: str | None
     what: Annotated[str, doc('its description, also one that came later; "" and no category: nobody described it')]
 
@@ -192,10 +192,10 @@ class Timeline(IndexedTimeline):
     """The time line of a recording."""
 
     kind: Literal["timeline"]
-    flags: Annotated[list[DriveMark], doc("moments that somebody marked, oldest first; at most 400, words shortened")]
+    flags: Annotated[list[DriveMark], doc("moments that somebody marked, oldest first; at most 400, texts shortened")]
     interventions: Annotated[list[ReplayIntervention], doc("oldest first, at most 400")]
     modes: Annotated[list[DrivenSpan], doc("who drove when, without a gap, at most 400; empty: not recorded")]
-    notes: Annotated[list[str], doc("what is to be said of the file")]
+    notes: Annotated[list[str], doc("remarks on the file")]
 
 
 class Beside(TypedDict):
@@ -204,7 +204,7 @@ class Beside(TypedDict):
     kind: Literal["beside"]
     replay: ReplayState
     state: RecordedState
-    notes: Annotated[list[str], doc("what is to be said of the file")]
+    notes: Annotated[list[str], doc("remarks on the file")]
 
 
 class BesideEnded(TypedDict):

@@ -68,7 +68,7 @@ class ControlState(TypedDict):
     renewed_s: NotRequired[Annotated[float | None, doc("since the lease was renewed")]]
     lapses_s: NotRequired[Annotated[float, doc("after so long without renewal it lapses")]]
     former: NotRequired[Annotated[FormerHolder | None, doc("whose lease lapsed, and who can reclaim it until then")]]
-    requests: NotRequired[Annotated[list[ControlRequest], doc("who asks for control, the oldest first")]]
+    requests: NotRequired[Annotated[list[ControlRequest], doc("who requests control, the oldest first")]]
     handover: NotRequired[Annotated[HandoverState | None, doc("null: control is not being handed over")]]
 
 
@@ -92,7 +92,7 @@ class PagePresence(TypedDict):
 
 
 class ReachState(TypedDict):
-    """How many operators would hear an alarm now."""
+    """On the pages of how many operators an alarm would sound now."""
 
     can: int
     of: int

@@ -1,4 +1,4 @@
-"""What catgraph cannot find out by itself and asks the operator in control: which topic, or which unit."""
+"""What catgraph cannot determine by itself, as questions to the operator in control: which topic, or which unit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Option(TypedDict):
 
 
 class Question(TypedDict):
-    """Asked until it is answered by the command `set`: `topics` of a source, `units` of a unit."""
+    """Open until it is answered by the command `set`: `topics` of a source, `units` of a unit."""
 
     signal: str
     kind: Literal["source", "unit"]
@@ -31,7 +31,7 @@ class TopicOffer(TypedDict):
     topic: str
     type: str
     frame: NotRequired[Annotated[str | None, doc("that its messages name; null: none, or not known")]]
-    why: NotRequired[Annotated[str, doc("evidence for and against it, in few words")]]
+    why: NotRequired[Annotated[str, doc("evidence for and against it, as a short text")]]
     ranges_m: NotRequired[
         Annotated[
             list[float | None],

@@ -18,22 +18,22 @@ class Rate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """The figures of one server. What a person's hand or a page's own course asks for stays ten times below them."""
+    """The figures of one server. What a person or a page by itself causes stays ten times below them."""
 
     body_bytes: int = 256 * 1024  # the largest there is, settings as TOML, has 64 kB
     body_s: float = 20.0  # from a request's head to the end of its body
     upload_bytes: int = 8 * 1024 * 1024  # of a voice note or a photo, which its route bounds further
     upload_s: float = 120.0
     head_bytes: int = 32 * 1024
-    head_s: float = 10.0  # from a connection's first byte to the end of a request's head; also the first word itself
+    head_s: float = 10.0  # from a connection's first byte to the end of a request's head; also for that first byte
     connections: int = 64  # from one address that is not this machine's own
     pages: int = 12  # sockets of one device
-    requests: Rate = Rate(per_s=100.0, at_once=600)  # of one device: a map that is dragged asks for dozens of tiles
+    requests: Rate = Rate(per_s=100.0, at_once=600)  # of one device: a map that is dragged requests dozens of tiles
     local_requests: Rate = Rate(per_s=2000.0, at_once=4000)  # of all on this machine, where nobody pairs
     commands: Rate = Rate(
         per_s=40.0, at_once=120
-    )  # of one page: a replay that is dragged through asks for dozens of moments
-    slow_down: Rate = Rate(per_s=5.0, at_once=20)  # of one page or device, apart from all else that it asks for
+    )  # of one page: a replay that is dragged through requests dozens of moments
+    slow_down: Rate = Rate(per_s=5.0, at_once=20)  # of one page or device, apart from all its other requests
     messages: Rate = Rate(per_s=300.0, at_once=900)  # of one page, its answers to frames included
 
 
@@ -61,7 +61,7 @@ class Allowance:
         return max(0.0, (1.0 - self._left) / self._rate.per_s)
 
     def is_whole(self, now_s: float) -> bool:
-        """As if nobody had ever asked: it need not be kept."""
+        """Whether none is in use: it need not be kept."""
         self._fill(now_s)
         return self._left >= self._rate.at_once
 

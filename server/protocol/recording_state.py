@@ -41,7 +41,7 @@ class RecordingState(MissingTopics):
     state: Annotated[
         RecorderState,
         doc(
-            "saving: being completed; held: link lost, it goes on if that returns in time; "
+            "saving: being completed; held: link lost, it continues if that returns in time; "
             "stopped: it was to record and cannot"
         ),
     ]

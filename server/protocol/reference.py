@@ -1,6 +1,6 @@
 """What is made from the declarations: docs/alarms.md, the tables of docs/protocol.md and the types of the page.
 
-`python -m server.protocol.reference` says which of them are out of date; with --write it writes them.
+`python -m server.protocol.reference` lists those that are out of date; with --write it writes them.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 Moment = Annotated[float, Field(allow_inf_nan=False, ge=-1e9, le=1e9)]
 
-Word = Annotated[str, Field(max_length=300)]
+ShortText = Annotated[str, Field(max_length=300)]
 
 
 class _Order(BaseModel):
@@ -24,8 +24,8 @@ class OpenReplay(_Order):
     do: Literal["open"]
     recording: Annotated[str, Field(min_length=1, max_length=120)]
     at_s: Moment = 0.0
-    topics: dict[Word, Word] = Field(default_factory=dict, max_length=50)
-    units: dict[Word, Word] = Field(default_factory=dict, max_length=50)
+    topics: dict[ShortText, ShortText] = Field(default_factory=dict, max_length=50)
+    units: dict[ShortText, ShortText] = Field(default_factory=dict, max_length=50)
 
 
 class OpenBeside(_Order):
@@ -60,7 +60,7 @@ class SeekReplay(_Led):
 
 
 class PlayReplay(_Led):
-    """Goes on; from the beginning where it stands at the end."""
+    """Resumes; from the beginning where it is at the end."""
 
     do: Literal["play"]
 

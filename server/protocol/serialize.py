@@ -123,8 +123,8 @@ def _scan_summary(scan: values.LaserScan) -> ScanValue:
 
 
 def _mounting(of: Mounting) -> str | None:
-    """What limits what the laser says of the road."""
-    return of.why_not or " · ".join(words for words in (of.reservation, of.gap_words) if words) or None
+    """The limits of the laser's view of the road."""
+    return of.why_not or " · ".join(text for text in (of.reservation, of.gap_words) if text) or None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -313,7 +313,7 @@ def event(
 ) -> NewEvent:
     """A transition as the log keeps it and the pages get it, at `at_ms`, which is `now_s`; the log adds its number.
 
-    With it alone a restart knows where the alarm stands (`server.vehicle.restore`).
+    It alone gives a restart the state of the alarm (`server.vehicle.restore`).
     """
     finding, spec = transition.finding, transition.spec
     until_s = transition.shelved_until_s

@@ -79,9 +79,7 @@ class ScanValue(TypedDict):
     mounting: NotRequired[
         Annotated[
             str | None,
-            doc(
-                "*laser assumed to look ahead*, *gap from the laser: no bumper set*: what limits its words on the road"
-            ),
+            doc("*laser assumed to look ahead*, *gap from the laser: no bumper set*: limits of its view of the road"),
         ]
     ]
 
@@ -109,7 +107,7 @@ class FuelValue(TypedDict):
 
 class ModeValue(TypedDict):
     mode: Annotated[Mode, doc("of a plain number always unknown: what it means is a setting")]
-    said: Annotated[str, doc("in the car's own words")]
+    said: Annotated[str, doc("as the car states it")]
 
 
 class NumberValue(TypedDict):

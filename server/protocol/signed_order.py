@@ -1,7 +1,7 @@
-"""A command that is signed by the device that gives it, for agents that do not believe a web node who asks.
+"""A command that is signed by the device that gives it, for agents that do not trust a web node on who sent it.
 
-The signature (ECDSA, P-256, SHA-256) is of `PREFIX` and the very text that is sent: nothing is written anew in between,
-and the agent carries out what the text says, whatever stands beside it.
+The signature (ECDSA, P-256, SHA-256) is of `PREFIX` and the very text that is sent: nothing is serialized again in
+between, and the agent carries out the text, whatever is beside it.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class SignedPerson(BaseModel):
 
 
 class SignedText(BaseModel):
-    """What the text of an envelope says, as JSON."""
+    """The content of an envelope's text, as JSON."""
 
     model_config = ConfigDict(strict=True, frozen=True)
     command: dict[str, Any]  # with its kind

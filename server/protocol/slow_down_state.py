@@ -66,7 +66,7 @@ class GuardState(TypedDict):
 
 
 class SlowDownSummary(TypedDict):
-    """What a session knows without its countdown and guard."""
+    """The state of a session without its countdown and guard."""
 
     state: Annotated[SlowDownPhase, doc("ordered: on its ramp; holding: zeros are held")]
     why: Annotated[str | None, doc("why it is not available, as a sentence")]

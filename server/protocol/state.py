@@ -87,7 +87,7 @@ class ConnectionProblem(TypedDict):
     code: str
     title: Annotated[str, doc("one sentence")]
     hint: Annotated[str, doc("what to do")]
-    mark: Annotated[str, doc("a word under the broken node of the chain")]
+    mark: Annotated[str, doc("a short text under the broken node of the chain")]
 
 
 class LinkState(TypedDict):
@@ -104,7 +104,7 @@ class LinkState(TypedDict):
     topics_subscribed: int
     topics_heard: int
     late_s: Annotated[float | None, doc("how old messages are when they come, at most; null: not known")]
-    reduced: Annotated[str | None, doc("what is not asked for in full because the link is slow, as a sentence")]
+    reduced: Annotated[str | None, doc("what is not requested in full because the link is slow, as a sentence")]
     unreadable_frames: Annotated[int, doc("what came and was no rosbridge operation")]
     unreadable_why: str | None
 
@@ -148,7 +148,7 @@ class ReplayState(ReplayPosition):
     id: Annotated[str, doc("of the recording")]
     vehicle: Annotated[str, doc("the car that was recorded")]
     title: Annotated[str, doc('given by a person; "": none')]
-    token: Annotated[str, doc("by which trends and track are asked for")]
+    token: Annotated[str, doc("for requests of trends and track")]
     hangs_s: Annotated[float | None, doc("its process has sent nothing for so long")]
 
 
@@ -194,7 +194,7 @@ class RecordedState(TypedDict):
     phones: Annotated[list[PhoneListed], doc("all that share a position, at most 12, the one compared first")]
     marks: Annotated[int, doc("how many marks this drive has, or a recording up to the moment shown")]
     questions: Annotated[
-        list[Question], doc("what the operator in control is asked of this car, the most urgent first")
+        list[Question], doc("open questions to the operator in control of this car, the most urgent first")
     ]
 
 

@@ -56,7 +56,7 @@ def _named(name: str, shape: Any, mode: Literal["serialization", "validation"]) 
 
 
 def filled(page: str) -> str:
-    """The page with each of its blocks made anew."""
+    """The page with each of its blocks generated again."""
     made: dict[str, Callable[[list[str]], Iterator[str]]] = {
         "types": _types,
         "signals": _signals,

@@ -59,7 +59,7 @@ class Address:
 
     @property
     def shown(self) -> str:
-        """`host:port`, as the operator knows it."""
+        """`host:port`, as the operator typed it."""
         return f"{_bracketed(self.host)}:{self.port}"
 
     @property
@@ -148,7 +148,7 @@ def _split(typed: str, usual_port: int) -> Address:
 
 def _url_parts(typed: str) -> SplitResult:
     rest = typed.partition("://")[2]
-    if _RUN_ON.match(rest):  # said here, because urlsplit lets it pass in Python 3.11 and refuses it later
+    if _RUN_ON.match(rest):  # checked here, because urlsplit accepts it in Python 3.11 and refuses it later
         raise _run_together()
     try:
         return urlsplit(typed)
@@ -186,7 +186,7 @@ def _host_of(host: str) -> str:
 
 def _run_together() -> BadAddress:
     return BadAddress(
-        "Host and port cannot be told apart.", "Type host:port; an IPv6 address in brackets, [fd00::1]:9090."
+        "Host and port cannot be separated.", "Type host:port; an IPv6 address in brackets, [fd00::1]:9090."
     )
 
 

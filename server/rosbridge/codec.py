@@ -128,7 +128,7 @@ def _without_gc(size: int) -> Iterator[None]:
 
 
 def _may_be_deep(payload: bytes) -> bool:
-    """A glance of a microsecond: most messages have fewer brackets than may stand in each other."""
+    """A check of a microsecond: most messages have fewer brackets than may be nested."""
     return payload.count(b"[") + payload.count(b"{") > MAX_DEPTH
 
 
@@ -206,7 +206,7 @@ def _bignum(value: Any, immutable: bool) -> int:
     return int.from_bytes(value)
 
 
-# rosbridge sends none of the kinds of values that cbor2 knows besides, and some could take long.
+# rosbridge sends none of the further kinds of values of cbor2, and some could take long.
 _NOT_SENT = dict.fromkeys(
     (0, 1, 3, 4, 5, 25, 28, 29, 30, 35, 36, 37, 52, 54, 100, 256, 258, 260, 261, 1004, 43000), _refuse
 ) | {2: _bignum}

@@ -1,4 +1,4 @@
-"""Why the car cannot be reached, in the operator's words: one sentence, one hint, one mark for the picture of the
+"""Why the car cannot be reached, for the operator: one sentence, one hint, one mark for the picture of the
 chain."""
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ def not_proved(address: Address, server_software: str, junk: int) -> Problem:
 def of_handshake(address: Address, reason: str, answer: bytes) -> Problem:
     """The problem of something that took the connection and is no WebSocket: why its handshake failed, and how its
     answer began."""
-    if answer.startswith(b"\x15\x03") or (not address.secure and b"HTTPS" in answer):  # a TLS alert; nginx in words
+    if answer.startswith(b"\x15\x03") or (not address.secure and b"HTTPS" in answer):  # a TLS alert; nginx's text
         return Problem(
             code="wants_tls",
             title=f"{address.shown} wants a secure connection.",
@@ -155,7 +155,7 @@ def of_handshake(address: Address, reason: str, answer: bytes) -> Problem:
         )
     status = re.search(r"upgrade failed \[(\d+)\]", reason)
     if status is not None and status[1] in ("401", "403", "407"):
-        return not_rosbridge(address, f"It asks for a login (HTTP {status[1]}).")
+        return not_rosbridge(address, f"It requires a login (HTTP {status[1]}).")
     if status is not None and status[1] == "503":
         return Problem(
             code="busy",
@@ -231,7 +231,7 @@ def blocked_topics(topics: Sequence[str], clients: int) -> Problem:
     return Problem(
         code="topics_blocked",
         title=f"No message arrives through the bridge from {_names(topics)}.",
-        hint=f"They have a publisher, and {others}: one that asked for them in raw form can block them. "
+        hint=f"They have a publisher, and {others}: one that subscribed to them in raw form can block them. "
         "End that client; the subscription is renewed by itself. Or the publisher is idle.",
         mark="blocked topics",
     )
@@ -247,7 +247,7 @@ def rosapi_failing(text: str) -> Problem:
     return Problem(
         code="rosapi_failing",
         title="The bridge answers every question to rosapi with an error.",
-        hint=f"It says: {_sentence(text)} Check that rosapi is installed where rosbridge runs, and restart both. "
+        hint=f"It reports: {_sentence(text)} Check that rosapi is installed where rosbridge runs, and restart both. "
         "Until then topics and types are not known, and only the usual names are tried.",
         mark="rosapi fails",
     )

@@ -1,7 +1,7 @@
 """What is wrong behind the open connection to a bridge: from how rosapi's answers end, and what comes besides.
 
 Pure: time is an argument, in seconds of the session's monotonic clock. Real bridges report their own failures nowhere
-but in the words of a failed service call, so those words are the evidence.
+but in the text of a failed service call, so that text is the evidence.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ FAILURES = 3  # in a row, for a reason that is not known: a passing one is over 
 
 Cause = Literal["missing", "no_master", "no_node", "killed"]
 
-# The words of a failed call, in the order in which they are looked for.
-WORDS: tuple[tuple[str, Cause], ...] = (
+# Parts of the text of a failed call, in the order in which they are searched.
+TEXTS: tuple[tuple[str, Cause], ...] = (
     ("context is invalid", "no_node"),  # ROS 2: the bridge's node was shut down, its process continues
     ("context is not valid", "no_node"),
     ("communicate with master", "no_master"),  # ROS 1: roscore does not answer
@@ -27,9 +27,9 @@ WORDS: tuple[tuple[str, Cause], ...] = (
 )
 
 
-def cause_of(words: str) -> Cause | None:
-    """What the words of a failed call to rosapi mean; None: nothing that is known."""
-    return next((cause for part, cause in WORDS if part in words), None)
+def cause_of(text: str) -> Cause | None:
+    """The cause that the text of a failed call to rosapi shows; None: an unknown one."""
+    return next((cause for part, cause in TEXTS if part in text), None)
 
 
 @dataclass(slots=True)
@@ -38,7 +38,7 @@ class Diagnosis:
 
     is_rosbridge: bool = False  # it answered a call, well or badly: nothing else does
     _answered_s: float | None = None  # the newest good answer of rosapi
-    _asked_s: float | None = None  # the oldest call since the newest answer of any kind
+    _sent_s: float | None = None  # the oldest call since the newest answer of any kind
     _cause: Cause | None = None  # of the newest failed answer; None: the newest answer was good
     _failures: int = 0  # failed answers in a row
     _text: str = ""  # of the newest failed answer
@@ -46,31 +46,31 @@ class Diagnosis:
     _master_is_back: bool = False  # and rosapi answered since
 
     def opened(self) -> None:
-        """Another connection: what was wrong behind the last one may be mended."""
-        self._asked_s, self._cause, self._failures = None, None, 0
+        """Another connection: what was wrong behind the last one may be repaired."""
+        self._sent_s, self._cause, self._failures = None, None, 0
         self._master_was_gone = self._master_is_back = False
 
     def answered(self, now_s: float) -> None:
         """rosapi answered a question."""
         self.is_rosbridge = True
-        self._answered_s, self._asked_s, self._cause, self._failures = now_s, None, None, 0
+        self._answered_s, self._sent_s, self._cause, self._failures = now_s, None, None, 0
 
-    def failed(self, words: str) -> None:
-        """The bridge answered a question with a failure, in these words."""
+    def failed(self, text: str) -> None:
+        """The bridge answered a question with a failure, with this text."""
         self.is_rosbridge = True
-        cause = cause_of(words)
-        if cause == "killed" and self._asked_s is not None:
+        cause = cause_of(text)
+        if cause == "killed" and self._sent_s is not None:
             return  # a ROS 1 bridge gives up after 5 s with the same error: rosapi hangs
-        self._asked_s = None
+        self._sent_s = None
         self._failures += 1
-        self._cause, self._text = cause, words
+        self._cause, self._text = cause, text
         if self._cause == "no_master":
             self._master_was_gone, self._master_is_back = True, False
 
-    def unanswered(self, asked_s: float) -> None:
+    def unanswered(self, sent_s: float) -> None:
         """A call at that time was not delayed by others and not answered in time."""
-        if self._asked_s is None:
-            self._asked_s = asked_s
+        if self._sent_s is None:
+            self._sent_s = sent_s
 
     def master_restarted(self) -> bool:
         """Once after roscore was gone: rosapi answers again, with another roscore."""
@@ -102,7 +102,7 @@ class Diagnosis:
             return connection_errors.ROSCORE_RESTARTED
         if self._failures >= FAILURES:
             return connection_errors.rosapi_failing(self._text)
-        if self._asked_s is not None and now_s - self._asked_s > SILENT_S:
+        if self._sent_s is not None and now_s - self._sent_s > SILENT_S:
             if flows:
                 return connection_errors.ROSAPI_SILENT
             return connection_errors.ROS_GONE if was_there else connection_errors.BRIDGE_DEAF

@@ -1,4 +1,4 @@
-"""Dials one rosbridge for ever: resolves, tries each address, shakes hands, waits, tries again.
+"""Dials one rosbridge for ever: resolves, tries each address, does the handshake, waits, tries again.
 
 It takes the place of roslibpy's factory, whose back-off grows to an hour, whose dialling has no time-out, takes the
 first address that accepts and cannot be abandoned.

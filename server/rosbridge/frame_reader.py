@@ -77,7 +77,7 @@ class Fragments:
         if number == 0 and self._is_skipped:
             found = TooLarge(topic=_topic(data), size=size)
         elif not self._is_skipped:
-            if self._size > self.most_bytes:  # it said that it would be shorter
+            if self._size > self.most_bytes:  # it was announced as shorter
                 found = TooLarge(topic=_topic(self._pieces[0] if self._pieces else data), size=self._size)
                 self._is_skipped = True
                 self._pieces.clear()
@@ -121,7 +121,7 @@ def _topic(data: bytes) -> str | None:
 class Publish(NamedTuple):
     topic: str
     message: Any
-    note: str | None  # what was mended to read it
+    note: str | None  # what was corrected to read it
 
 
 class Answer(NamedTuple):

@@ -36,7 +36,7 @@ ASSUMPTIONS = {
     "protocol": "onOpen calls factory.ready, onClose factory.connection_lost; onClose comes once, opened or not",
     "frames": "a message is onMessageBegin, of each frame onMessageFrameBegin, Data and End, then onMessageEnd",
     "state": "state is STATE_OPEN from the handshake to the first close frame; sendMessage raises in any other",
-    "unread": "while shaking hands, what was received stands in `data`",
+    "unread": "during the handshake, what was received is in `data`",
     "ros": "Ros.__init__ sets _id_counter, factory and is_connecting and then calls connect()",
 }
 
@@ -76,11 +76,11 @@ class RosLink:
         self._stopped = False
         self._outgoing = Outgoing()
         self._reader = FrameReader(self._takes_unparsed)
-        self._was_asked = False  # anything, on this connection
+        self._has_sent = False  # anything, on this connection
         self.junk_count = 0  # frames that were no operations, on this connection
         self.server_software = ""  # what the other side called itself in its newest handshake
 
-    # -- for the session ---------------------------------------------------------------------------------------------
+    # -- for the session -----------------------------------------------------------------------------------------------
 
     @property
     def is_open(self) -> bool:
@@ -149,7 +149,7 @@ class RosLink:
         except NotAllowed as why:
             self._safe.log_once(f"not sent: {why}")
             raise
-        self._was_asked = True
+        self._has_sent = True
         self._socket.sendMessage(frame, isBinary=False)
 
     async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any:
@@ -184,7 +184,7 @@ class RosLink:
     def dial_failed(self, error: Exception) -> None:
         self._notify(self._listener.dial_failed, _problem_of_dialling(error, self.address))
 
-    # -- from the protocol -------------------------------------------------------------------------------------------
+    # -- from the protocol ---------------------------------------------------------------------------------------------
 
     def received(self, socket: BridgeProtocol, size: int) -> None:
         if socket is self._socket:
@@ -199,7 +199,7 @@ class RosLink:
         self._socket = socket
         self._reader = FrameReader(self._takes_unparsed)
         self._outgoing.reset()
-        self._was_asked, self.junk_count = False, 0
+        self._has_sent, self.junk_count = False, 0
         self.server_software = str((getattr(socket, "http_headers", None) or {}).get("server", ""))[:60]
         socket.was_accepted = True
         self.heard_s = self._now()
@@ -228,7 +228,7 @@ class RosLink:
         self._socket = None
         self._rows.closed()
         self._calls.fail_all("the connection to the bridge was lost")
-        problem = _problem_of_end(socket, self.address, was_asked=self._was_asked)
+        problem = _problem_of_end(socket, self.address, has_sent=self._has_sent)
         self._notify(self._listener.link_closed, problem)
 
     def _junk(self, socket: BridgeProtocol, why: str) -> None:
@@ -277,12 +277,12 @@ def _problem_of_dialling(error: Exception, address: Address) -> Problem:
     return connection_errors.of_dial_error(error, address)
 
 
-def _problem_of_end(socket: BridgeProtocol, address: Address, *, was_asked: bool) -> Problem:
-    """Why an open connection ended; `was_asked`: something was sent on it."""
+def _problem_of_end(socket: BridgeProtocol, address: Address, *, has_sent: bool) -> Problem:
+    """Why an open connection ended; `has_sent`: something was sent on it."""
     if socket.was_silent:
         return connection_errors.bridge_silent(address)
     if socket.failedByMe:
         return connection_errors.closed_by_bridge(address, str(socket.wasNotCleanReason))
-    if socket.is_dismissed and not socket.has_spoken and was_asked:
+    if socket.is_dismissed and not socket.has_spoken and has_sent:
         return connection_errors.login_wanted(address)
     return connection_errors.closed_by_bridge(address, short_text(socket.remoteCloseReason, 200))

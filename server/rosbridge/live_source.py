@@ -20,11 +20,11 @@ class CallFailed(RuntimeError):
 
 
 class Refusal(CallFailed):
-    """The bridge answered a service call with a failure: in its own words, which only a rosbridge sends."""
+    """The bridge answered a service call with a failure, whose text only a rosbridge sends."""
 
 
 class NoWebSocket(ConnectionError):
-    """The connection was taken, and the handshake failed; `answer` is how the other side's words began."""
+    """The connection was taken, and the handshake failed; `answer` is the beginning of the other side's answer."""
 
     def __init__(self, reason: str, answer: bytes) -> None:
         super().__init__(reason)
@@ -50,14 +50,14 @@ class CommandChannel(Protocol):
         """Send a rosbridge operation (a command). Raises LinkDown, NotAllowed."""
 
     def ping(self) -> None:
-        """Ask for a sign of life, behind all that was sent before. Raises LinkDown."""
+        """Request a sign of life, behind all that was sent before. Raises LinkDown."""
 
     def abort(self) -> None:
         """Drop the connection at once, so that nothing buffered is delivered later."""
 
 
 class QuestionChannel(Protocol):
-    """The part of it that answers what a session asks of rosapi."""
+    """The part of it that answers a session's requests to rosapi."""
 
     @property
     def is_open(self) -> bool: ...
@@ -127,7 +127,7 @@ class LiveSource(CommandChannel, Protocol):
         """Ask for it no more."""
 
     def renew(self, topic: str) -> None:
-        """Renew the subscription of a topic without messages: it ends and begins anew; what comes between is lost."""
+        """Renew the subscription of a topic without messages: it ends and begins again; what comes between is lost."""
 
     def again(self, topic: str) -> bool:
         """Subscribe to a topic once more, without an end between: it is given what its publisher keeps. False: this

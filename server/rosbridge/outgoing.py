@@ -132,7 +132,7 @@ OPERATIONS: Mapping[str, tuple[Mapping[str, Check], Mapping[str, Check]]] = {
 
 
 class Outgoing:
-    """The gate of one connection: it knows what was advertised on it, and publishes nothing else."""
+    """The gate of one connection: it keeps what was advertised on it, and publishes nothing else."""
 
     def __init__(self) -> None:
         self._advertised: dict[str, str] = {}  # topic → type in the spelling of ROS 1

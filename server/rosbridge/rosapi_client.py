@@ -32,7 +32,7 @@ class Asks(Protocol):
 
 
 class _Silent:
-    """Listens to the connection for questions, on which nothing but answers comes."""
+    """The receiver of the connection for questions, on which only answers come."""
 
     def __init__(self) -> None:
         self.failed = False
@@ -84,7 +84,7 @@ class Questions:
             self._drop()
             raise LinkDown("not called: no connection to the car")
         link = await self._link()
-        asked_s, is_quick = self._now(), service in SIGNS_OF_LIFE and not self._asking
+        sent_s, is_quick = self._now(), service in SIGNS_OF_LIFE and not self._asking
         task = asyncio.ensure_future(link.call(service, arguments, timeout_s=LONGEST_S))
         self._asking += 1
         task.add_done_callback(self._answered)
@@ -98,7 +98,7 @@ class Questions:
             task.cancel()
             raise
         if not done:
-            self._overdue[task] = asked_s, is_quick
+            self._overdue[task] = sent_s, is_quick
             self._suspect(link)
             raise CallFailed(f"{service} did not answer within {timeout_s:g} s")
         try:
@@ -166,9 +166,9 @@ class Questions:
         """What is not answered is held against rosapi only where the bridge has read the question: it has answered
         the ping behind it."""
         if link is self._main or link.unanswered == 0:
-            for asked_s, is_quick in self._overdue.values():
+            for sent_s, is_quick in self._overdue.values():
                 if is_quick:
-                    self._diagnosis.unanswered(asked_s)
+                    self._diagnosis.unanswered(sent_s)
 
     def _drop(self) -> None:
         own, self._own = self._own, None

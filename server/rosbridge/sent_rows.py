@@ -67,7 +67,7 @@ class SentRows:
         self._is_open = is_open
         self._marks = marks
         self._paced = Paced(self._send_paced)
-        self._known: set[str] = set()  # topics that this connection's bridge was asked for
+        self._known: set[str] = set()  # topics that were requested from this connection's bridge
         self.table: dict[str, Subscription] = {}
 
     def opened(self) -> None:

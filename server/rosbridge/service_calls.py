@@ -24,7 +24,7 @@ class ServiceCalls:
 
     async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any:
         """The values a service answers. Raises LinkDown, also where the link breaks before the answer, or CallFailed
-        with the bridge's words."""
+        with the bridge's text."""
         if len(self._pending) >= MAX_PENDING_CALLS:
             raise CallFailed("too many calls are unanswered")
         identity = f"call:{service}:{next(self._ids)}"

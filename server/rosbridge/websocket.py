@@ -55,7 +55,7 @@ class BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
         self.gone = asyncio.Event()
         self.was_accepted = False  # by the link, when it opened
         self.was_silent = False
-        self.is_dismissed = False  # the bridge said goodbye without a code
+        self.is_dismissed = False  # the bridge closed the connection without a code
         self.has_spoken = False  # a message came
         self.message_data: list[bytes] = []
         self.message_head = self.message_tail = b""  # of one that is skipped

@@ -37,5 +37,5 @@ def short_text(value: Any, limit: int) -> str:
     return clean(value[:limit]) if isinstance(value, str) else "" if value is None else f"({type(value).__name__})"
 
 
-# Ends of lines, tabs and blanks of other widths part words; all else that is not seen parts nothing.
+# Line ends, tabs and blanks of other widths become a blank; other invisible characters are removed.
 _BLANK = {"Cc": " ", "Zs": " ", "Zl": " ", "Zp": " "}

@@ -40,7 +40,7 @@ def keeping(handler: Handler) -> Handler:
 @contextmanager
 def tracing(trace: object) -> Iterator[str]:
     """Lines that are logged within, and in tasks that are begun within, are about the command with this id, which is
-    the same on its whole way. Yields it: a new one where it is none."""
+    the same on its whole path. Yields it: a new one where it is none."""
     id = trace if isinstance(trace, str) and _IS_TRACE.fullmatch(trace) else secrets.token_hex(8)
     token = _TRACE.set(id)
     try:

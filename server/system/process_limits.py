@@ -13,7 +13,7 @@ from pathlib import Path
 PART = 0.8  # of what the machine has free
 TOO_LARGE = "a part of it, unpacked, is larger than this machine's memory."
 
-KEPT_FREE = 32  # for the log, a recording, an export: below this it is said
+KEPT_FREE = 32  # for the log, a recording, an export: below this it is reported
 
 
 @contextlib.contextmanager

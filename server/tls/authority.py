@@ -1,6 +1,6 @@
 """The authority of one server: made once, kept in the data folder, trusted by the phones of the crew.
 
-Key and certificate are one file, so that there is never one without the other. It is P-256, which every phone knows,
+Key and certificate are one file, so that there is never one without the other. It is P-256, which every phone supports,
 and may sign for private names only; see names.py.
 """
 
@@ -138,7 +138,7 @@ def _unusable(path: Path, why: str) -> TlsRefused:
     # Never replaced silently: every phone that trusts the old one would fail without a visible reason.
     return TlsRefused(
         f"The server's own authority in {path} is damaged: {why}. Put back a copy, or delete the file for a new one; "
-        "then every phone must be set up anew."
+        "then every phone must be set up again."
     )
 
 

@@ -75,7 +75,7 @@ class OwnCertificate:
         if now > self.authority.cert.not_valid_after_utc:
             raise TlsRefused(
                 f"The server's own authority in {folder} ended on {self.authority.cert.not_valid_after_utc:%Y-%m-%d}: "
-                "delete the folder for a new one, then set up every phone anew (or set this machine's clock)."
+                "delete the folder for a new one, then set up every phone again (or set this machine's clock)."
             )
         self._folder = folder
         self._names_now = names
@@ -150,11 +150,11 @@ class ProvidedCertificateRenewal:
             return self._once(f"the certificate {self._cert} expires on {self.given.cert.not_valid_after_utc:%Y-%m-%d}")
         return None
 
-    def _once(self, said: str) -> str | None:
-        if said == self._reported:
+    def _once(self, notice: str) -> str | None:
+        if notice == self._reported:
             return None
-        self._reported = said
-        return said
+        self._reported = notice
+        return notice
 
     def _stamps(self) -> tuple[tuple[int, int, int], ...] | None:
         """What changes when the files do, also when a link is led to others, as certbot does; None: not there now."""
@@ -176,9 +176,9 @@ async def keep(
     while True:
         await asyncio.sleep(every_s)
         try:
-            said = await asyncio.to_thread(certificate.refresh, now())
-            if said is not None:
-                log.warning("%s", said)
+            notice = await asyncio.to_thread(certificate.refresh, now())
+            if notice is not None:
+                log.warning("%s", notice)
                 on_renewed()
         except Exception as bug:
             if repr(bug) != last:

@@ -1,4 +1,4 @@
-"""What this machine is called by who wants its page: its addresses, its name in mDNS, localhost, given names.
+"""The names by which this machine's page is reached: its addresses, its name in mDNS, localhost, given names.
 
 Our own authority may sign for private names only: a stolen key of a trusted authority could impersonate any site. The
 name constraints of ours (RFC 5280 4.2.1.10) limit it to these names, and browsers enforce them.
@@ -54,11 +54,11 @@ def may_vouch_for_name(name: str) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Names:
-    """The names of one server, each once, in the order in which a person would want them."""
+    """The names of one server, each once, in the order in which they are offered to a person."""
 
     dns: tuple[str, ...]
     ips: tuple[IpAddress, ...]
-    left_out: tuple[str, ...] = ()  # has them, but our authority may not vouch for them
+    left_out: tuple[str, ...] = ()  # has them, but our authority may not certify them
 
     @property
     def reachable(self) -> tuple[IpAddress, ...]:
@@ -67,7 +67,7 @@ class Names:
 
 
 def names_of(addresses: Iterable[IpAddress], host: str, given: Iterable[str] = ()) -> Names:
-    """The names our authority can vouch for, of a machine called `host` with these addresses; `given` are names or
+    """The names our authority can certify, of a machine called `host` with these addresses; `given` are names or
     addresses that somebody else's router or name server leads here by."""
     dns = ["localhost"]
     ips: list[IpAddress] = []

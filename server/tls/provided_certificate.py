@@ -1,4 +1,4 @@
-"""A certificate that somebody gave us (`--tls CERT KEY`): looked at, and what is wrong with it said in words."""
+"""A certificate that is provided (`--tls CERT KEY`): its check, with a sentence for each fault."""
 
 from __future__ import annotations
 

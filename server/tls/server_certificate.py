@@ -62,7 +62,7 @@ def make(authority: Authority, names: Names, *, now: dt.datetime) -> ServerCerti
 
 
 def why_renew(leaf: ServerCertificate, authority: Authority, names: Names, *, now: dt.datetime) -> str | None:
-    """Why this certificate does not do any more, in words for the log; None: it does."""
+    """Why this certificate has to be renewed, as text for the log; None: it has not."""
     at = _clock(authority, now)
     try:
         leaf.cert.verify_directly_issued_by(authority.cert)

@@ -1,11 +1,11 @@
 """The plain HTTP page with instructions for trusting this server. It serves our authority's certificate only.
 
-An attacker on the network can change this page. It therefore has no secret, links only to itself, and asks the user to
-compare the fingerprint with the one on the server's terminal. An iPhone, an iPad and a Mac take the authority as a
-configuration profile.
+An attacker on the network can change this page. It therefore has no secret, links only to itself, and instructs the
+user to compare the fingerprint with the one on the server's terminal. An iPhone, an iPad and a Mac take the authority
+as a configuration profile.
 
-The page asks the server whether HTTPS works. It has another origin, which the server's routes refuse, so the answer is
-outside the application, because it has no data of the car. A browser that does not trust the certificate gets none.
+The page tests by a request whether HTTPS works. It has another origin, which the server's routes refuse. So the
+answer is outside the application: it has no data of the car. A browser that does not trust the certificate gets none.
 """
 
 from __future__ import annotations
@@ -191,10 +191,10 @@ def _host_of(request: Request) -> str | None:
 
 def _headers(secure: str = "") -> dict[str, str]:
     # A policy cannot contain an IPv6 address, so any https is allowed; the page requests one address only.
-    asks = "https:" if "[" in secure else secure or "'none'"
+    allowed = "https:" if "[" in secure else secure or "'none'"
     policy = (
         "default-src 'none'; style-src 'self'; script-src 'self'; font-src 'self'; img-src 'self' data:; "
-        f"connect-src {asks}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
+        f"connect-src {allowed}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
         "require-trusted-types-for 'script'; trusted-types 'none'"
     )
     return {

@@ -70,7 +70,7 @@ PLATFORMS = (
         steps=(
             Step(
                 title="Download the certificate",
-                text="Keep the file when the browser asks. It does not open by itself.",
+                text="Keep the file when the browser prompts. It does not open by itself.",
                 screen=_phone("Downloads", _row("catgraph-ca.crt", "chosen"), _row("Keep", "press")),
                 file="ca.crt",
             ),
@@ -94,7 +94,7 @@ PLATFORMS = (
             ),
             Step(
                 title="Choose the file",
-                text="catgraph-ca.crt, in Downloads. The phone says that a CA certificate is installed.",
+                text="catgraph-ca.crt, in Downloads. The phone reports that a CA certificate is installed.",
                 screen=_phone("Downloads", _row("catgraph-ca.crt", "press"), _row("photo.jpg")),
             ),
         ),
@@ -154,7 +154,7 @@ PLATFORMS = (
             ),
             Step(
                 title="Say Yes to the question",
-                text="Windows names the authority and asks. Finish, then close and open the browser.",
+                text="Windows names the authority and prompts. Finish, then close and open the browser.",
                 screen=_window("Security Warning", _row("catgraph …"), _row("Yes", "press"), _row("No")),
             ),
         ),
@@ -245,7 +245,7 @@ def platform_of(agent: str) -> str:
     if "iphone" in agent or "ipad" in agent:
         return "iphone"
     if not is_phone:
-        for word, id in (("windows", "windows"), ("mac os", "macos"), ("linux", "linux"), ("x11", "linux")):
-            if word in agent:
+        for name, id in (("windows", "windows"), ("mac os", "macos"), ("linux", "linux"), ("x11", "linux")):
+            if name in agent:
                 return id
     return "android"

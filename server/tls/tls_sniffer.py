@@ -21,7 +21,7 @@ from server.web.middleware import http_protocol
 log = logging.getLogger("catgraph.tls")
 
 _HANDSHAKE = 22
-UNDECIDED = 256  # connections that have said nothing yet or are in their handshake; the next one ends the eldest
+UNDECIDED = 256  # connections that have sent nothing yet or are in their handshake; the next one ends the eldest
 DECIDE_S = 10.0  # browsers open spare connections and send nothing on them
 
 Factory = Callable[[], asyncio.Protocol]

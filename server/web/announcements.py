@@ -31,20 +31,20 @@ class Announcements:
             return  # the page states it every second
         now = set(cars)
         before, self._announced = self._announced, now
-        words = {
+        statuses = {
             vehicle: {**status, "kind": "announces", "leaves": vehicle not in now, **sender} for vehicle in now | before
         }
-        if words:
-            self._forwarding = asyncio.create_task(self._forward_all(words), name="announce")
+        if statuses:
+            self._forwarding = asyncio.create_task(self._forward_all(statuses), name="announce")
 
-    async def _forward_all(self, words: Mapping[str, Mapping[str, Any]]) -> None:
-        async def forward_to(vehicle: str, word: Mapping[str, Any]) -> None:
+    async def _forward_all(self, statuses: Mapping[str, Mapping[str, Any]]) -> None:
+        async def forward_to(vehicle: str, status: Mapping[str, Any]) -> None:
             with contextlib.suppress(NotServed):
-                await self._bus.request(vehicle, word, deadline_s=FORWARD_WITHIN_S)
+                await self._bus.request(vehicle, status, deadline_s=FORWARD_WITHIN_S)
 
         async with asyncio.TaskGroup() as group:
-            for number, (vehicle, word) in enumerate(words.items(), 1):
-                group.create_task(forward_to(vehicle, word))
+            for number, (vehicle, status) in enumerate(statuses.items(), 1):
+                group.create_task(forward_to(vehicle, status))
                 if number % AT_ONCE == 0:
                     await asyncio.sleep(0)
 

@@ -34,7 +34,7 @@ class CarsBoard:
         now: Callable[[], float],
         wall_ms: Callable[[], int],
     ) -> None:
-        """`off`: who said that a car is off on purpose."""
+        """`off`: who declared a car off on purpose, and when."""
         self._bus = bus
         self._off = off
         self._now = now
@@ -137,7 +137,7 @@ class CarsBoard:
         `newest` answers nothing that is older than 2 s: what a stopped session stated is not shown as if it held.
         """
         frame, seen_s = self._bus.newest(ALL, name), self._seen_s.get(name)
-        off = {} if frame is not None or (said := self._off(name)) is None else {"off": said}
+        off = {} if frame is not None or (declared := self._off(name)) is None else {"off": declared}
         return {
             "name": name,
             "age_s": None if seen_s is None else round(max(0.0, self._now() - seen_s), 2),
@@ -152,7 +152,7 @@ def _alarms_of(summary: dict[str, Any]) -> object:
     worst, item = summary["worst"], summary.get("attention")
     key = worst and (worst["id"], worst["occurrence"], worst["state"], worst["active"])
     person = item and [one and one["page"] for one in (item["assigned"], item["offered"])]
-    asked = [one["page"] for one in summary.get("requests", ())]
+    requesters = [one["page"] for one in summary.get("requests", ())]
     return (
         key,
         summary["waiting"],
@@ -160,5 +160,5 @@ def _alarms_of(summary: dict[str, Any]) -> object:
         summary["phase"],
         person,
         item and item["escalated_ms"] is None,
-        asked,
+        requesters,
     )

@@ -24,7 +24,7 @@ FROM_PAGES_BITS = 12  # of the window for what a page sends: little
 SHORTEST = 128  # bytes; an offer or an answer gains nothing
 KIND = 14  # bytes with which messages of one kind begin: {"kind":"state
 ENDS = 200  # bytes at both ends, where the time is and so two messages differ: all of a state take 20 µs to hash
-EMPTY_BLOCK = b"\x00\x00\xff\xff"  # ends what zlib makes of a message, and is not sent (RFC 7692, 7.2.1)
+EMPTY_BLOCK = b"\x00\x00\xff\xff"  # the end of a message in zlib's output, which is not sent (RFC 7692, 7.2.1)
 
 
 class Message:

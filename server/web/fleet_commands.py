@@ -1,4 +1,4 @@
-"""Carries out what a page of all cars orders: each command goes to the session of the car that it names."""
+"""Carries out what a page of all cars orders: each command is sent to the session of the car that it names."""
 
 from __future__ import annotations
 
@@ -94,13 +94,13 @@ class FleetCommands:
         before its hello: it would be counted under another id."""
         if not self._sender.is_operator or not self._sender.has_begun:
             return
-        self._sender.hear(message)
+        self._sender.note_key(message)
         try:
-            word = commands.read(message)
+            command = commands.read(message)
         except commands.NotUnderstood as why:
             self._complain(str(why))
             return
-        status = word.model_dump(exclude=PAGE_ONLY)
+        status = command.model_dump(exclude=PAGE_ONLY)
         self._announcements.forward(status, self._sender.as_json(), () if status["leaves"] else self._bus.vehicles)
 
     async def leave(self) -> None:

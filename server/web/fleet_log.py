@@ -105,7 +105,7 @@ class FleetLog:
         self._add(vehicle, [event for event in reversed(found) if _number(event) <= last])
 
     def _on_events(self, vehicle: str) -> None:
-        """A car has new events, or was heard for the first time."""
+        """A car has new events, or sent something for the first time."""
         if vehicle not in self._read:
             self._start(vehicle)
         elif vehicle not in self._following:

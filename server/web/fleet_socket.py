@@ -205,10 +205,10 @@ class FleetPage:
                 return
             message = self._inbox.read(received.get("text"))
             if message is not None:
-                await self._obey(message)
+                await self._handle(message)
         await self._socket.close(code=1008, reason="too many invalid messages")
 
-    async def _obey(self, message: dict[str, Any]) -> None:
+    async def _handle(self, message: dict[str, Any]) -> None:
         match message.get("kind"):
             case "take":
                 self._writer.take()

@@ -1,4 +1,4 @@
-"""What the description of the HTTP interface says of answers: media types, and problems by their status.
+"""Responses in the description of the HTTP interface: media types, and problems by their status.
 
 A route names what it gives beyond its model: `raises(404, 409)`, `files("text/csv")`. What the access guard, the
 throttle and the validation give to any route is added here, once.
@@ -22,12 +22,12 @@ PROBLEMS: dict[int, str] = {  # status → when a route answers with it
     403: "It may not do this, or the request comes from another server's page",
     404: "There is no such thing on this server",
     408: "The body did not come to its end in time",
-    409: "Refused as things are now, as `detail` says",
+    409: "Refused in the present state; `detail` has the reason",
     413: "The body is too long",
     415: "The body is of a kind that is not taken",
     416: "The file has no such range",
     422: "A parameter or a field is wrong, as `errors` or `field` names it",
-    429: "Too many requests: the header Retry-After says when to come back",
+    429: "Too many requests: the header Retry-After has the time to wait",
     500: "An error of this server, which its log describes",
     502: "Another server failed: of mail, of the store, or the agent of a car",
     503: "The car, its agent or a disk does not answer",
@@ -35,7 +35,7 @@ PROBLEMS: dict[int, str] = {  # status → when a route answers with it
 }
 _OF_ANY = (400, 401, 403, 429, 500)
 _OF_BODIES = (408, 413)
-OF_KEPT = (404, 422, 502, 503)  # of what an agent keeps: a web node hands the request on
+OF_KEPT = (404, 422, 502, 503)  # of what an agent keeps: a web node passes the request on
 Responses = dict[int | str, dict[str, Any]]
 
 
@@ -48,7 +48,7 @@ class ProblemDocument(BaseModel):
     """An error (RFC 9457). Some have further members, as the state of an export that is not ready."""
 
     model_config = ConfigDict(extra="allow")
-    type: str = Field("about:blank", description="Always about:blank: `title` is the status in words")
+    type: str = Field("about:blank", description="Always about:blank: `title` is the status as text")
     title: str
     status: int
     detail: str = Field(description="One sentence for a person")

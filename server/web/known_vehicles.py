@@ -1,7 +1,7 @@
-"""Which vehicles a web node knows without their agents: those it has heard before, and those that are off on purpose.
+"""Vehicles that a web node lists without their agents: those known from before, and those that are off on purpose.
 
-One whose agent is gone after a restart is shown as lost, not left out. One of which a person said that it is off on
-purpose is not lost, until its agent is heard again.
+One whose agent is gone after a restart is shown as lost, not left out. One that a person declared off on
+purpose is not lost, until its agent sends data again.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ _OFF_FILE: TypeAdapter[dict[str, OffOnPurpose]] = TypeAdapter(dict[str, OffOnPur
 
 
 class KnownVehicles:
-    """Vehicles that a web node has heard.
+    """Vehicles whose agents have sent something to a web node.
 
     Their names, in a file of the data folder.
     """
 
     def __init__(self, folder: Path | None, storage: StorageThread, *, forget: Sequence[str] = ()) -> None:
-        """`folder` None: they last as long as this run. `forget`: those that are not listed any more, until heard."""
+        """`folder` None: they last as long as this run. `forget`: those that are not listed until they send data."""
         self._path = None if folder is None else folder / FILE
         self._storage = storage
         self.names = self._read() - set(forget)
 
     def note(self, name: str) -> None:
-        """It was heard; written without waiting for the disk."""
+        """It sent something; written without waiting for the disk."""
         if name in self.names or len(self.names) >= MOST or not is_name(name):
             return
         self.names.add(name)
@@ -59,12 +59,12 @@ class KnownVehicles:
         except FileNotFoundError:
             return set()
         except (OSError, ValueError, TypeError, AttributeError) as why:
-            log.warning("%s cannot be read; lost vehicles are not listed until they are heard: %s", self._path, why)
+            log.warning("%s cannot be read; lost vehicles are not listed until they send data: %s", self._path, why)
             return set()
 
 
 class OffVehicles:
-    """Cars of which a person said that they are off on purpose.
+    """Cars that a person declared off on purpose.
 
     By their names, in a file of the data folder.
     """
@@ -81,11 +81,11 @@ class OffVehicles:
         return frozenset(self._off)
 
     def of(self, name: str) -> OffOnPurpose | None:
-        """Who said so and when; None: nobody."""
+        """Who declared it off and when; None: nobody."""
         return self._off.get(name)
 
     def declare(self, name: str, by: str) -> None:
-        """A person says that it is off. Written without waiting for the disk."""
+        """A person declares it off. Written without waiting for the disk."""
         if name in self._off or len(self._off) >= MOST_OFF:
             return
         self._off[name] = {"by": by, "since_ms": self._wall_ms()}
@@ -93,13 +93,13 @@ class OffVehicles:
         self._write()
 
     def withdraw(self, name: str, by: str) -> None:
-        """A person says that it is not off."""
+        """A person declares that it is not off."""
         if self._off.pop(name, None) is not None:
             log.info("car_not_off vehicle=%s by=%s", name, by)
             self._write()
 
-    def heard(self, name: str) -> None:
-        """Its agent said something: it is on, whatever a person said before."""
+    def end_by_data(self, name: str) -> None:
+        """Its agent sent something: it is on, whatever a person declared before."""
         if self._off.pop(name, None) is not None:
             log.info("car_heard_again vehicle=%s", name)
             self._write()
@@ -109,7 +109,7 @@ class OffVehicles:
             self._storage.submit(partial(durable_file.write, self._path, orjson.dumps(self._off)))
 
     def _read(self) -> dict[str, OffOnPurpose]:
-        """Where the file cannot be read the cars are lost: that is shown, and said anew by a person."""
+        """Where the file cannot be read the cars are lost: that is shown, and a person declares them off again."""
         if self._path is None:
             return {}
         try:

@@ -37,8 +37,8 @@ async def passed_on(
         except NotServed as why:
             answer = messages.not_served(why, bus.trouble(vehicle) if fleet else None)
         if bus.grows:  # else the session has logged it
-            said = (vehicle, message.get("kind"), message.get("by"), answer.get("ok"), answer.get("reason", ""))
-            log.info("command_passed_on vehicle=%s kind=%s by=%s ok=%s reason=%s", *said)
+            logged = (vehicle, message.get("kind"), message.get("by"), answer.get("ok"), answer.get("reason", ""))
+            log.info("command_passed_on vehicle=%s kind=%s by=%s ok=%s reason=%s", *logged)
         return answer
 
 
@@ -105,7 +105,7 @@ class PageCommands:
         """Why a command does not reach the session; None: it does."""
         if not self._sender.is_operator:  # whatever it is: no command of the union needs less than an operator
             return NOT_A_VIEWERS
-        if not self._sender.has_begun:  # it would be filed under an id by which the page never asks for its outcome
+        if not self._sender.has_begun:  # it would be stored under an id that the page never queries
             return NO_HELLO
         command = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
         if command is None:  # commands of the server to a session are not allowed for a page
@@ -122,7 +122,7 @@ class PageCommands:
         it would be counted under another id."""
         if not self._sender.is_operator or not self._sender.has_begun:
             return
-        self._sender.hear(message)
+        self._sender.note_key(message)
         try:
             commands.read(message)  # also where the page's own car is not served, and nobody else reads it
         except commands.NotUnderstood as why:

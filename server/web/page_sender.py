@@ -1,4 +1,4 @@
-"""Who a page is: the device that was let in, and the name and the id that the page gives itself."""
+"""Who a page is: the admitted device, and the name and the id that the page gives itself."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from server.control import display_name
 from server.protocol import command_base, signed_order
 from server.protocol.people import Duty
 
-ENDING = ("accept_control", "outcome")  # the commands whose answer says that control was handed over
+ENDING = ("accept_control", "outcome")  # the commands whose answer states that control was handed over
 LONGEST_AGO_S = 3600.0
 
 
@@ -83,8 +83,8 @@ class PageSender:
             )
         return reply
 
-    def hear(self, message: Mapping[str, Any]) -> None:
-        """A status of the page: it names the key by which the page signs, where it does. The agent proves it."""
+    def note_key(self, message: Mapping[str, Any]) -> None:
+        """Take the key by which the page signs from its status, where it signs. The agent verifies it."""
         key = message.get("key")
         if self._signs and isinstance(key, str) and re.fullmatch(signed_order.KEY_ID, key):
             self._key = key

@@ -1,8 +1,8 @@
-"""What a web node makes of frames and events that came from an agent: no page gets what is not of this vehicle, or not
+"""How a web node reads frames and events of an agent: no page gets what is not of this vehicle, or not
 of the declared types.
 
-A word that is not declared, as a priority of a newer version, is taken, and a field that an older version does not
-have may be missing: the page knows what to make of them.
+A value that is not declared, as a priority of a newer version, is accepted, and a field that an older version does not
+have may be missing: the page handles both.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from server.protocol.state import LiveState
 
 Place = tuple[int | str, ...]  # in a body, as ("alarms", 0, "title")
 
-LONGEST_SUMMARY = 6000  # bytes; it goes to every page
+LONGEST_SUMMARY = 6000  # bytes; it is sent to every page
 _SUMMARY: TypeAdapter[CarSummary] = TypeAdapter(CarSummary)
 _STATE: TypeAdapter[LiveState] = TypeAdapter(LiveState)
 _EVENT: TypeAdapter[LogEvent] = TypeAdapter(LogEvent)
@@ -109,15 +109,15 @@ def _errors(adapter: TypeAdapter[Any], payload: str | bytes) -> list[tuple[Place
         adapter.validate_json(payload, strict=True)
     except ValidationError as error:
         found = error.errors(include_url=False, include_context=False)
-        words = {
+        texts = {
             one["loc"] for one in found if one["type"] in ("literal_error", "enum") and isinstance(one["input"], str)
         }
-        # Of a union with a word each member has an error of its own.
-        unions = {loc[:-1] for loc in words if str(loc[-1]).startswith("literal[")}
+        # Of a union with a literal each member has an error of its own.
+        unions = {loc[:-1] for loc in texts if str(loc[-1]).startswith("literal[")}
         return [
             (one["loc"], one["type"])
             for one in found
-            if one["loc"] not in words and not (isinstance(one["input"], str) and one["loc"][:-1] in unions)
+            if one["loc"] not in texts and not (isinstance(one["input"], str) and one["loc"][:-1] in unions)
         ]
     return []
 

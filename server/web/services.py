@@ -91,16 +91,16 @@ class Services:
     uploader: Uploader | None = None  # None: nothing of this server is uploaded
     stored: StoredRecordings | None = None  # None: without a store
     drive_reports: DriveReports | None = None  # None: nothing is mailed
-    agents: HttpNode | None = None  # at a web node: the way to what the agents keep
+    agents: HttpNode | None = None  # at a web node: the client for what the agents keep
     challenge: Callable[[], str] | None = None  # of an agent: what devices sign with their orders
 
     @property
     def vehicles(self) -> tuple[str, ...]:
-        """The names of all vehicles: of this process, or of agents that were heard."""
+        """The names of all vehicles: of this process, or of agents that have sent something."""
         return tuple(self.sessions) or self.bus.vehicles
 
     def may_be(self, name: str) -> bool:
-        """Whether a page of this vehicle can be served: at a web node also before its agent was heard."""
+        """Whether a page of this vehicle can be served: at a web node also before its agent has sent anything."""
         return name in self.vehicles or (self.bus.grows and is_name(name))
 
     def server_facts(self) -> ServerState:
@@ -138,8 +138,8 @@ class Services:
             self.marks.late(vehicle, moment_ms, intervention)
 
     def marks_changed(self, path: Path) -> None:
-        """Marks or words on interventions came beside a recording: it is listed with them, and they are uploaded where
-        there is a store. For a thread that may wait for the disk."""
+        """Marks or descriptions of interventions were stored beside a recording: the list shows them, and they are
+        uploaded where there is a store. For a thread that may wait for the disk."""
         if self.recordings is not None:
             self.recordings.reread_annotations(path)
         if self.uploader is not None:
@@ -149,8 +149,8 @@ class Services:
         """What is wrong with the server, a sentence each; those of a vehicle begin with its name."""
         found = [f"{name}: {what}" for name, session in self.sessions.items() for what in problems(session.vitals())]
         if self.link is not None:
-            said = (self.link.complaint, self.link.refused, self.link.unsent)
-            found += [one for one in said if one is not None]
+            complaints = (self.link.complaint, self.link.refused, self.link.unsent)
+            found += [one for one in complaints if one is not None]
         if self.people.complaint is not None:
             found.append(self.people.complaint)
         if self.recordings is not None:

@@ -11,7 +11,7 @@ class Tab:
     """One tab. Where `templates/_NAME.html` exists, it is the first content of its panel."""
 
     name: str  # in the address of the page, "#map", and of its panel
-    label: str  # in at most 8 letters: six tabs stand side by side on the narrowest phone
+    label: str  # in at most 8 letters: six tabs are side by side on the narrowest phone
     what: str  # its subject in a sentence: "The map could not be fetched"
     icon: str  # path of an SVG of 24 by 24, stroked
     wide: Literal["pane", "drawer", "page"] = (

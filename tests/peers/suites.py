@@ -49,8 +49,8 @@ API = (
         explained={
             r"InvalidSchema .*not of types \"boolean\", \"object\"": "the description has `prefixItems`, as OpenAPI "
             "3.1 does; schemathesis rewrites it to a list of `items`, which it then refuses",
-            r"^ST205 POST /api/(recordings/rescan|devices/invite):": "the last word may also be an id: other methods "
-            "of this address are answered by `/api/recordings/{id}` and `/api/devices/{id}`",
+            r"^ST205 POST /api/(recordings/rescan|devices/invite):": "the last segment may also be an id: other "
+            "methods of this address are answered by `/api/recordings/{id}` and `/api/devices/{id}`",
             r"^SerializationNotPossible .*(application/toml|audio/webm)": "schemathesis writes no TOML and no audio: "
             "settings as TOML and voices of marks are not sent by it",
         },

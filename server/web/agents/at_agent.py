@@ -17,7 +17,7 @@ from server.web.services import Services
 
 
 class AtAgent:
-    """An ASGI application with the routes in `kept`. `services` are asked for with the first request."""
+    """An ASGI application with the routes in `kept`. `services` is called with the first request."""
 
     def __init__(self, services: Callable[[], Services]) -> None:
         self._services = services
@@ -41,7 +41,8 @@ def _app(services: Services) -> FastAPI:
 
 
 def scope_of(begin: Begin) -> Scope:
-    """The request as an ASGI scope. Raises Refused where who sent it may not: not the node's word alone counts."""
+    """The request as an ASGI scope. Raises Refused where its sender may not send it:
+    the agent checks the role itself."""
     try:
         role = Role(begin.sender.role)
     except ValueError:

@@ -35,11 +35,11 @@ ANSWER_HEADERS = frozenset(
 
 def is_kept(scope: MutableMapping[str, Any], path: str) -> bool:
     """Whether an agent answers requests to this path."""
-    asked = {**scope, "path": path, "root_path": ""}
-    return any(route.matches(asked)[0] is not Match.NONE for router in ROUTERS for route in router.routes)
+    at_agent = {**scope, "path": path, "root_path": ""}
+    return any(route.matches(at_agent)[0] is not Match.NONE for router in ROUTERS for route in router.routes)
 
 
 def split(path: str) -> tuple[str, str | None, str]:
-    """What stands before the agent's own path, the vehicle whose agent is meant, and the agent's own path."""
+    """The part before the agent's own path, the vehicle whose agent is meant, and the agent's own path."""
     found = _AT_AGENT.fullmatch(path)
     return ("", None, path) if found is None else (found[1], found[2], found[3])

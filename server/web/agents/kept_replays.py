@@ -1,4 +1,4 @@
-"""At an agent: replays that pages of web nodes show. A node asks for the newest frames, one answer after the other."""
+"""At an agent: replays that pages of web nodes show. A node requests the newest frames, one answer at a time."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import orjson
 from fastapi import APIRouter, Body, HTTPException, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from server.protocol.replay_commands import Word
+from server.protocol.replay_commands import ShortText
 from server.replay.manager import NoReplay, ReplayClient, ReplayManager
 from server.web.agents.kept import REPLAYS
 
 router = APIRouter(prefix=REPLAYS)
 WAITS_S = 1.0  # for a newer frame
-UNASKED_S = 15.0  # a replay that no node asks for is closed
+UNASKED_S = 15.0  # a replay that no node requests is closed
 Number = Annotated[int, Query(ge=0, lt=1 << 53)]
 
 
@@ -28,8 +28,8 @@ class Opening(BaseModel):
     at_s: float | int | None = None
     settings: str = Field("", max_length=100_000)
     settings_version: int = 0
-    topics: dict[Word, Word] = Field(default_factory=dict, max_length=50)  # as of `OpenReplay`
-    units: dict[Word, Word] = Field(default_factory=dict, max_length=50)
+    topics: dict[ShortText, ShortText] = Field(default_factory=dict, max_length=50)  # as of `OpenReplay`
+    units: dict[ShortText, ShortText] = Field(default_factory=dict, max_length=50)
 
 
 class OpenKept(BaseModel):
@@ -39,7 +39,7 @@ class OpenKept(BaseModel):
 
 
 class Shown:
-    """One replay, closed where no node asks for it any more."""
+    """One replay, closed once no node requests it any more."""
 
     def __init__(self, manager: ReplayManager) -> None:
         self._manager = manager
@@ -52,8 +52,8 @@ class Shown:
         self._changed.set()
         self._changed = asyncio.Event()
 
-    def asked(self) -> ReplayClient:
-        """A node asks for it now."""
+    def touch(self) -> ReplayClient:
+        """Restart the timer that closes it: a node requests it now."""
         self.stop()
         self._due = asyncio.get_running_loop().call_later(UNASKED_S, self._give_up)
         assert self.client is not None
@@ -61,7 +61,7 @@ class Shown:
 
     async def newer(self, have: dict[str, int]) -> ReplayClient:
         """It, once a frame is newer than those, or has failed, or after a second."""
-        client = self.asked()
+        client = self.touch()
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(WAITS_S):
                 while client.failed is None and all(have[kind] >= n for kind, n in client.numbers.items()):
@@ -94,7 +94,7 @@ class KeptReplays:
             recording, opening, on_new=shown.on_new, instead=None if before is None else before.client
         )
         self._shown[client.token] = shown
-        shown.asked()
+        shown.touch()
         return client
 
     def of(self, token: str) -> Shown:
@@ -151,9 +151,9 @@ async def frames(request: Request, token: str, state: Number = 0, scan: Number =
 
 
 @router.post("/{token}/ask")
-async def asked(request: Request, token: str, order: Annotated[dict[str, Any], Body()]) -> dict[str, Any]:
+async def send_order(request: Request, token: str, order: Annotated[dict[str, Any], Body()]) -> dict[str, Any]:
     try:
-        return await _shown(request, token).asked().ask(order)
+        return await _shown(request, token).touch().ask(order)
     except NoReplay as why:
         raise HTTPException(409, str(why)) from None
 

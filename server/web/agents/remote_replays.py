@@ -37,7 +37,7 @@ class RemoteReplay(ReplayClient):
         self._theirs: str | None = None  # the agent's token of it
         self._have = {"state": 0, "scan": 0, "timeline": 0}  # by the agent's numbers
         self._following: asyncio.Task[None] | None = None
-        self._said: set[asyncio.Task[Any]] = set()
+        self._sending: set[asyncio.Task[Any]] = set()
 
     async def open(self, source: ReplaySource | None, opening: Mapping[str, Any]) -> None:
         """Has the agent open it and waits for its first state. Raises NoReplay."""
@@ -52,7 +52,7 @@ class RemoteReplay(ReplayClient):
 
     async def close(self) -> None:
         theirs, self._theirs = self._theirs, None
-        tasks = [*self._said, *([self._following] if self._following is not None else [])]
+        tasks = [*self._sending, *([self._following] if self._following is not None else [])]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -68,18 +68,18 @@ class RemoteReplay(ReplayClient):
         return await self._json("POST", f"/{self._theirs}/ask", order)
 
     def watch_scan(self, is_wanted: bool) -> None:
-        self._say_soon({"kind": "scan", "wanted": is_wanted})
+        self._send_soon({"kind": "scan", "wanted": is_wanted})
 
     def pass_gaps(self, is_wanted: bool) -> None:
-        self._say_soon({"kind": "pass_gaps", "wanted": is_wanted})
+        self._send_soon({"kind": "pass_gaps", "wanted": is_wanted})
 
-    def _say_soon(self, order: Mapping[str, Any]) -> None:
+    def _send_soon(self, order: Mapping[str, Any]) -> None:
         if self.failed is None:
-            task = asyncio.create_task(self._say(order))
-            self._said.add(task)
-            task.add_done_callback(self._said.discard)
+            task = asyncio.create_task(self._send(order))
+            self._sending.add(task)
+            task.add_done_callback(self._sending.discard)
 
-    async def _say(self, order: Mapping[str, Any]) -> None:
+    async def _send(self, order: Mapping[str, Any]) -> None:
         with contextlib.suppress(NoReplay):
             await self.ask(order)
 

@@ -1,4 +1,4 @@
-"""At a web node: hands requests for recordings, exports and mail to the agent that keeps them, and its answer back."""
+"""At a web node: passes requests for recordings, exports and mail to the agent that keeps them."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _meant(scope: Scope) -> str | None:
 
 
 def _refusal(name: str | None, vehicles: tuple[str, ...]) -> ASGIApp | None:
-    """Why no agent can be asked; None: one can."""
+    """Why no agent can take the request; None: one can."""
     if not vehicles:
         return problem(503, "No vehicle has connected to the broker yet.")
     if name is None and len(vehicles) > 1:

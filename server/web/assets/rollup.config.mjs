@@ -1,10 +1,10 @@
-// How the page's modules are joined; server/web/assets/bundle.py runs this and says what and where to.
+// How the page's modules are joined; server/web/assets/bundle.py runs this with the input and the output folder.
 //
-// What several parts share goes to what is loaded already when they are needed, so that a page begins with one script.
+// What several parts share is put into what is loaded already when they are needed, so that a page begins with one script.
 
 import { env } from 'node:process';
 
-/** Into `joined.json`: the script that begins the page, and what it asks for at once. */
+/** Into `joined.json`: the script that begins the page, and what it loads at once. */
 const list = {
   name: 'list',
   generateBundle(_, bundle) {

@@ -40,9 +40,9 @@ def _of_page(vendor: Path) -> list[Part]:
     for name, file, version, license, text in _OF_PAGE:
         head = (vendor / file).read_text("utf-8", "replace")[:1000]
         match = re.search(version, head)
-        words = (vendor / text).read_text("utf-8", "replace")
+        full_text = (vendor / text).read_text("utf-8", "replace")
         found.append(
-            Part(name=name, version=match[1] if match else "unknown", license=license, where="page", text=words)
+            Part(name=name, version=match[1] if match else "unknown", license=license, where="page", text=full_text)
         )
     return found
 
@@ -86,8 +86,8 @@ def _part(distribution: metadata.Distribution) -> Part:
 
 
 def _license(about: metadata.PackageMetadata) -> str:
-    said = next((about[name].strip() for name in ("License-Expression", "License") if name in about), "")
-    if said and len(said) <= _LONGEST and "\n" not in said:
-        return str(said)
+    stated = next((about[name].strip() for name in ("License-Expression", "License") if name in about), "")
+    if stated and len(stated) <= _LONGEST and "\n" not in stated:
+        return str(stated)
     kinds = [one.rsplit("::", 1)[1].strip() for one in about.get_all("Classifier", []) if one.startswith("License ::")]
     return ", ".join(kinds) or "see its text"

@@ -10,42 +10,42 @@ from collections import deque
 from collections.abc import Mapping
 from email.utils import parsedate_to_datetime
 
-UNSAID_S = 7 * 86_400.0  # without headers: the least that OpenStreetMap's tile policy requires
+DEFAULT_FRESH_S = 7 * 86_400.0  # without headers: the least that OpenStreetMap's tile policy requires
 LONGEST_S = 365 * 86_400.0
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 5.0, 300.0  # after a failure; each doubles the one before
-ASKED_PAUSE_S = (1.0, 86_400.0)  # what a Retry-After may ask for
+PAUSE_BOUNDS_S = (1.0, 86_400.0)  # the bounds of a Retry-After
 MOST, WITHIN_S = 1200, 600.0  # tiles: two a second on end is what driving with the map open needs at most
 
 
 def fresh_for_s(headers: Mapping[str, str], wall_s: float) -> float | None:
     """How long an answer holds from now [s]; None: it must not be kept."""
     fields = {name.lower(): value for name, value in headers.items()}
-    words: dict[str, str] = {}
+    directives: dict[str, str] = {}
     for part in fields.get("cache-control", "").lower().split(","):
         name, _, value = part.strip().partition("=")
-        words.setdefault(name, value.strip('" '))
-    if "no-store" in words:
+        directives.setdefault(name, value.strip('" '))
+    if "no-store" in directives:
         return None
-    if "no-cache" in words:
+    if "no-cache" in directives:
         return 0.0
     for name in ("s-maxage", "max-age"):  # several phones are served from what is kept
-        if name in words:
-            return _bounded((_number(words[name]) or 0.0) - (_number(fields.get("age", "")) or 0.0))
+        if name in directives:
+            return _bounded((_number(directives[name]) or 0.0) - (_number(fields.get("age", "")) or 0.0))
     if "expires" in fields:
         expires_s, date_s = _date_s(fields["expires"]), _date_s(fields.get("date", ""))
         return 0.0 if expires_s is None else _bounded(expires_s - (wall_s if date_s is None else date_s))
-    return UNSAID_S
+    return DEFAULT_FRESH_S
 
 
 def retry_after_s(value: str | None, wall_s: float) -> float | None:
     """The requested pause [s], bounded; None: none."""
     if not value:
         return None
-    asked_s = _number(value)
-    if asked_s is None:
+    pause_s = _number(value)
+    if pause_s is None:
         at_s = _date_s(value)
-        asked_s = None if at_s is None else at_s - wall_s
-    return None if asked_s is None else min(max(asked_s, ASKED_PAUSE_S[0]), ASKED_PAUSE_S[1])
+        pause_s = None if at_s is None else at_s - wall_s
+    return None if pause_s is None else min(max(pause_s, PAUSE_BOUNDS_S[0]), PAUSE_BOUNDS_S[1])
 
 
 class Pace:
@@ -55,13 +55,13 @@ class Pace:
         self.problem: str | None = None  # what went wrong last; None once it is over
         self._until_s = 0.0
         self._pause_s = FIRST_PAUSE_S
-        self._asked_s: deque[float] = deque(maxlen=MOST)
+        self._requested_s: deque[float] = deque(maxlen=MOST)
 
     def may_ask(self, now_s: float) -> bool:
         return now_s >= self._until_s and not self._is_spent(now_s)
 
-    def asked(self, now_s: float) -> None:
-        self._asked_s.append(now_s)
+    def note_request(self, now_s: float) -> None:
+        self._requested_s.append(now_s)
 
     def well(self) -> None:
         """It answered as it should."""
@@ -76,7 +76,7 @@ class Pace:
         if is_new:
             self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
 
-    def words(self, now_s: float) -> str | None:
+    def problem_now(self, now_s: float) -> str | None:
         """Why no request is allowed now, as one sentence for the operator."""
         if self.problem is not None:
             return self.problem
@@ -85,7 +85,7 @@ class Pace:
         return None
 
     def _is_spent(self, now_s: float) -> bool:
-        return len(self._asked_s) == MOST and now_s - self._asked_s[0] < WITHIN_S
+        return len(self._requested_s) == MOST and now_s - self._requested_s[0] < WITHIN_S
 
 
 def _bounded(seconds: float) -> float:

@@ -64,12 +64,12 @@ def _webp_pixels(data: bytes) -> tuple[int, int] | None:
 
 
 def plain_text(markup: str) -> str:
-    """The words of an attribution, which many files write as HTML: without tags, on one line, at most 200 letters."""
+    """The text of an attribution, which many files write as HTML: without tags, on one line, at most 200 letters."""
     reader = _Words()
     reader.feed(markup[:5000])
     reader.close()
-    words = " ".join("".join(reader.pieces).split())
-    return "".join(letter for letter in words if letter.isprintable())[:SHOWN_ATTRIBUTION]
+    text = " ".join("".join(reader.pieces).split())
+    return "".join(letter for letter in text if letter.isprintable())[:SHOWN_ATTRIBUTION]
 
 
 class _Words(HTMLParser):

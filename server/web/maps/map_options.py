@@ -63,7 +63,7 @@ def read(args: argparse.Namespace) -> MapUpstream | None:
 
 
 def checked(template: str, attribution: str, zoom: str, limit_mb: int) -> MapUpstream:
-    """Raises ValueError with one sentence, in which the address does not stand: it may hold a key."""
+    """Raises ValueError with one sentence, without the address, which may hold a key."""
     _check_template(template)
     if not attribution.strip():
         raise ValueError("--map-upstream needs --map-attribution, which is shown on the map.")
@@ -78,22 +78,24 @@ def checked(template: str, attribution: str, zoom: str, limit_mb: int) -> MapUps
 
 
 def _check_template(template: str) -> None:
-    said = "The address of --map-upstream"
+    subject = "The address of --map-upstream"
     if len(template) > _LONGEST or not template.isascii() or not template.isprintable() or " " in template:
-        raise ValueError(f"{said} is too long or has characters that are not allowed.")
+        raise ValueError(f"{subject} is too long or has characters that are not allowed.")
     try:
         parts = urlsplit(template)
         port_is_usable = parts.port is None or 0 < parts.port < 65536
     except ValueError:
-        raise ValueError(f"{said} is not valid.") from None
+        raise ValueError(f"{subject} is not valid.") from None
     if parts.scheme not in ("http", "https") or not parts.hostname or not port_is_usable:
-        raise ValueError(f"{said} must begin with https:// or http:// and a host.")
+        raise ValueError(f"{subject} must begin with https:// or http:// and a host.")
     if "@" in parts.netloc:
-        raise ValueError(f"{said} must not hold a name and password.")
+        raise ValueError(f"{subject} must not hold a name and password.")
     if _PLACES.search(parts.netloc) or "{s}" in template:
-        raise ValueError(f"{said} must name one host: without {{s}}.")
+        raise ValueError(f"{subject} must name one host: without {{s}}.")
     if parts.fragment:
-        raise ValueError(f"{said} must not hold a #.")
+        raise ValueError(f"{subject} must not hold a #.")
     places = sorted(_PLACES.findall(template))
     if places not in (["x", "y", "z"], ["-y", "x", "z"]):
-        raise ValueError(f"{said} must hold {{z}}, {{x}} and {{y}} (or {{-y}}) once each, and nothing else in braces.")
+        raise ValueError(
+            f"{subject} must hold {{z}}, {{x}} and {{y}} (or {{-y}}) once each, and nothing else in braces."
+        )

@@ -130,7 +130,7 @@ class MapFile:
         except (KeyError, ValueError):
             least, deepest = self._rows.execute("SELECT min(zoom_level), max(zoom_level) FROM tiles").fetchone()
         if not (isinstance(least, int) and isinstance(deepest, int) and 0 <= least <= deepest <= DEEPEST):
-            raise MapRefused(f"The map {self._path} says that its zoom levels go from {least} to {deepest}.")
+            raise MapRefused(f"The map {self._path} has invalid zoom levels: {least} to {deepest}.")
         return least, deepest
 
 
@@ -155,10 +155,10 @@ def _opened(path: Path) -> sqlite3.Connection:
     raise MapRefused(f"{path} is not an MBTiles file, or is damaged: {why}.")
 
 
-def _bounds(said: str | None) -> tuple[float, float, float, float]:
+def _bounds(stated: str | None) -> tuple[float, float, float, float]:
     """West, south, east, north of the file [deg]; the whole world if they are invalid."""
     try:
-        west, south, east, north = (float(part) for part in (said or "").split(","))
+        west, south, east, north = (float(part) for part in (stated or "").split(","))
     except ValueError:
         return -180.0, -90.0, 180.0, 90.0
     if not (-180 <= west < east <= 180 and -90 <= south < north <= 90 and math.isfinite(west + south + east + north)):

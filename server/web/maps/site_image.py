@@ -1,4 +1,4 @@
-"""A picture of the site, laid under the track by three of its corners: the picture, and a TOML file beside it.
+"""A picture of the site, placed under the track by three of its corners: the picture, and a TOML file beside it.
 
 `site.png` needs `site.png.toml`:
 

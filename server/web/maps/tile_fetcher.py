@@ -34,7 +34,7 @@ class SourceTrouble(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fetched:
-    """What the server of tiles said."""
+    """The answer of the tile server."""
 
     is_same: bool = False  # what is kept still holds
     data: bytes | None = None  # None and not the same: there is no tile
@@ -70,16 +70,16 @@ class TileSource:
         self, z: int, x: int, y: int, *, wall_s: float, etag: str | None = None, modified: str | None = None
     ) -> Fetched:
         """The tile of column x, row y from the north. Raises SourceTrouble."""
-        asked = {"Accept-Encoding": "identity"}
+        headers = {"Accept-Encoding": "identity"}
         if etag is not None:
-            asked["If-None-Match"] = etag
+            headers["If-None-Match"] = etag
         if modified is not None:
-            asked["If-Modified-Since"] = modified
+            headers["If-Modified-Since"] = modified
         try:
             answer = self._pool.request(
                 "GET",
                 self._path(z, x, y),
-                headers={**self._pool.headers, **asked},
+                headers={**self._pool.headers, **headers},
                 redirect=False,
                 preload_content=False,
                 decode_content=False,
@@ -92,7 +92,7 @@ class TileSource:
             raise SourceTrouble(f"The map's server {self.host} is not found: check the internet connection.") from None
         except SSLError:
             raise SourceTrouble(f"The certificate of the map's server {self.host} is not trusted.") from None
-        except (HTTPError, OSError):  # its words hold the address, and that may hold a key
+        except (HTTPError, OSError):  # its text holds the address, which may hold a key
             raise SourceTrouble(f"The map's server {self.host} does not answer.") from None
 
     def _path(self, z: int, x: int, y: int) -> str:

@@ -27,13 +27,13 @@ log = logging.getLogger("catgraph.map")
 
 WAITS_S = 12.0  # a page for a tile; then the place stays empty, and the tile is kept for the next time
 LONGEST_QUEUE = 96  # three screens of tiles: older requests are no longer in view
-ABSENT_S = 86_400.0  # at most so long is believed that a tile does not exist
+ABSENT_S = 86_400.0  # a tile counts as missing for at most so long
 _BOUNDS = (-180.0, -85.06, 180.0, 85.06)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tile:
-    """A picture on its way to a page; `fresh_s` is how long it may keep it."""
+    """A picture for a page; `fresh_s` is how long the page may keep it."""
 
     data: bytes
     kind: str
@@ -49,9 +49,9 @@ class _TileRequest:
 
 @dataclass(slots=True)
 class _Queue:
-    """What is wished for and not yet there; only the loop touches it."""
+    """Tiles that are requested and not yet there; only the loop touches it."""
 
-    wishes: dict[Place, _TileRequest] = field(default_factory=dict)
+    requests: dict[Place, _TileRequest] = field(default_factory=dict)
     waiting: list[_TileRequest] = field(default_factory=list)
     at_work: set[asyncio.Task[None]] = field(default_factory=set)
     dropped: int = 0
@@ -82,12 +82,12 @@ class Upstream:
         self._now, self._wall_s = now, wall_s
         self._pace = Pace()
         self._queue = _Queue()
-        self._hands = DaemonThreads(CONNECTIONS)
+        self._threads = DaemonThreads(CONNECTIONS)
         self._is_closed = False
 
     def close(self) -> None:
         self._is_closed = True
-        self._hands.close()
+        self._threads.close()
         self._source.close()
         self._cache.close()
 
@@ -95,7 +95,7 @@ class Upstream:
         """The layer's description for a page, without the address, which may contain a key."""
         return {
             "host": self._source.host,
-            "problem": self._pace.words(self._now()) or self._cache.problem,
+            "problem": self._pace.problem_now(self._now()) or self._cache.problem,
             "kept_bytes": self._cache.size_bytes,
             "limit_bytes": self._cache.limit_bytes,
             "evicted": self._cache.evicted,
@@ -110,10 +110,10 @@ class Upstream:
         loop = asyncio.get_running_loop()
         kept = await loop.run_in_executor(None, self._cache.get, place, self._wall_s())
         if kept is None or kept.until_s <= self._wall_s():
-            wish = self._wish(place, kept)
-            if kept is None and wish is not None:
+            tile_request = self._request(place, kept)
+            if kept is None and tile_request is not None:
                 try:
-                    kept = await asyncio.wait_for(asyncio.shield(wish.answer), WAITS_S)
+                    kept = await asyncio.wait_for(asyncio.shield(tile_request.answer), WAITS_S)
                 except TimeoutError:
                     return None
         if kept is None or kept.data is None:
@@ -123,31 +123,31 @@ class Upstream:
             return None
         return Tile(data=kept.data, kind=kind, fresh_s=max(0.0, kept.until_s - self._wall_s()))
 
-    def _wish(self, place: Place, kept: Kept | None) -> _TileRequest | None:
+    def _request(self, place: Place, kept: Kept | None) -> _TileRequest | None:
         """Queue a fetch; None if the tile server must not be contacted now."""
         queue = self._queue
-        if place in queue.wishes:
-            return queue.wishes[place]
+        if place in queue.requests:
+            return queue.requests[place]
         if not self._pace.may_ask(self._now()):
             return None
-        wish = _TileRequest(place, kept, asyncio.get_running_loop().create_future())
-        queue.wishes[place] = wish
-        queue.waiting.append(wish)
+        tile_request = _TileRequest(place, kept, asyncio.get_running_loop().create_future())
+        queue.requests[place] = tile_request
+        queue.waiting.append(tile_request)
         if len(queue.waiting) > LONGEST_QUEUE:
             queue.dropped += 1
             self._done(queue.waiting.pop(0), None)
         self._go_on()
-        return wish
+        return tile_request
 
     def _go_on(self) -> None:
         queue = self._queue
         while queue.waiting and len(queue.at_work) < CONNECTIONS:
-            wish = queue.waiting.pop()
+            tile_request = queue.waiting.pop()
             if self._is_closed or not self._pace.may_ask(self._now()):
-                self._done(wish, wish.kept)
+                self._done(tile_request, tile_request.kept)
                 continue
-            self._pace.asked(self._now())
-            work = asyncio.get_running_loop().create_task(self._fulfil(wish))
+            self._pace.note_request(self._now())
+            work = asyncio.get_running_loop().create_task(self._fulfil(tile_request))
             queue.at_work.add(work)
             work.add_done_callback(self._worked)
 
@@ -155,10 +155,10 @@ class Upstream:
         self._queue.at_work.discard(work)
         self._go_on()
 
-    async def _fulfil(self, wish: _TileRequest) -> None:
-        found = wish.kept
+    async def _fulfil(self, tile_request: _TileRequest) -> None:
+        found = tile_request.kept
         try:
-            found = await self._hands.do(lambda: self._fetch(wish.place, wish.kept))
+            found = await self._threads.do(lambda: self._fetch(tile_request.place, tile_request.kept))
             if self._pace.problem is not None:
                 log.info("%s answers again", self._source.host)
             self._pace.well()
@@ -167,18 +167,18 @@ class Upstream:
                 log.warning("%s Stored tiles are shown.", why)
             self._pace.failed(str(why), self._now(), why.pause_s)
         finally:
-            self._done(wish, found)
+            self._done(tile_request, found)
 
-    def _done(self, wish: _TileRequest, found: Kept | None) -> None:
-        self._queue.wishes.pop(wish.place, None)
-        if not wish.answer.done():
-            wish.answer.set_result(found)
+    def _done(self, tile_request: _TileRequest, found: Kept | None) -> None:
+        self._queue.requests.pop(tile_request.place, None)
+        if not tile_request.answer.done():
+            tile_request.answer.set_result(found)
 
     def _fetch(self, place: Place, kept: Kept | None) -> Kept:
         """In a thread. Raises SourceTrouble."""
         wall_s = self._wall_s()
         newest = self._cache.get(place, wall_s)
-        if newest is not None and newest.until_s > wall_s:  # fetched between the look into the cache and this wish
+        if newest is not None and newest.until_s > wall_s:  # fetched since the cache was read for this request
             return newest
         etag, modified = (kept.etag, kept.modified) if kept is not None and kept.data is not None else (None, None)
         got = self._source.fetch(*place, wall_s=wall_s, etag=etag, modified=modified)

@@ -34,7 +34,7 @@ class Problem(HTTPException):
 
 
 def problem(status: int, detail: str, **more: Any) -> JSONResponse:
-    """A problem document; `type` is about:blank, so `title` is the status in words."""
+    """A problem document; `type` is about:blank, so `title` is the status as text."""
     body = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": detail, **more}
     return _Document(body, status_code=status, media_type=PROBLEM_TYPE)
 

@@ -33,7 +33,7 @@ def options(limits: Limits) -> dict[str, Any]:
         "h11_max_incomplete_event_size": limits.head_bytes,
         "ws": PageSocket,
         "ws_max_size": 64 * 1024,  # what a page may send at once
-        "ws_ping_interval": 5.0,  # a phone that went out of range is let go
+        "ws_ping_interval": 5.0,  # a phone that is out of range is disconnected
         "ws_ping_timeout": 10.0,
         "proxy_headers": False,  # the peer is never taken from a header that anybody can write
         "server_header": False,

@@ -37,7 +37,7 @@ def file_answer(request: Request, path: Path, *, name: str, media_type: str) -> 
     except OSError as why:
         raise HTTPException(503, f"The file cannot be read: {why.strerror or why}.") from None
     try:
-        status, first, last, sent_headers = _asked(request, os.fstat(file.fileno()))
+        status, first, last, sent_headers = _requested_range(request, os.fstat(file.fileno()))
     except BaseException:
         file.close()
         raise
@@ -52,7 +52,7 @@ def file_answer(request: Request, path: Path, *, name: str, media_type: str) -> 
     )
 
 
-def _asked(request: Request, stat: os.stat_result) -> tuple[int, int, int, dict[str, str]]:
+def _requested_range(request: Request, stat: os.stat_result) -> tuple[int, int, int, dict[str, str]]:
     """Status, first byte, last byte and headers of the answer."""
     size = stat.st_size
     etag, changed = f'"{size:x}-{stat.st_mtime_ns:x}"', formatdate(stat.st_mtime, usegmt=True)
@@ -65,15 +65,15 @@ def _asked(request: Request, stat: os.stat_result) -> tuple[int, int, int, dict[
     }
     if _names(request.headers.get("if-none-match", ""), etag):
         return 304, 0, -1, sent_headers
-    wish = request.headers.get("range")
+    requested = request.headers.get("range")
     condition = request.headers.get("if-range")
-    if wish is None or is_head(request) or (condition is not None and condition not in (etag, changed)):
+    if requested is None or is_head(request) or (condition is not None and condition not in (etag, changed)):
         return 200, 0, size - 1, sent_headers
-    if _SEVERAL.match(wish):
+    if _SEVERAL.match(requested):
         raise HTTPException(
             416, "Several ranges at once are not supported: request one.", headers={"Content-Range": f"bytes */{size}"}
         )
-    part = _RANGE.fullmatch(wish.replace(" ", ""))
+    part = _RANGE.fullmatch(requested.replace(" ", ""))
     if part is None or part.group(1) == part.group(2) == "":
         return 200, 0, size - 1, sent_headers  # another unit, or no range at all: as if it were not there
     begin, end = part.groups()

@@ -39,7 +39,7 @@ class Throttle:
             wait_s = math.ceil(allowance.wait_s(now_s))
             answer = problem(429, f"Too many requests at once from this device: try again in {wait_s} s.")
             answer.headers["Retry-After"] = str(wait_s)
-            await answer(scope, receive, send)  # a WebSocket is refused with the same words
+            await answer(scope, receive, send)  # a WebSocket is refused with the same text
             return
         if scope["type"] == "http":
             most, within_s = self._room(scope)

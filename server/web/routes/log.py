@@ -27,7 +27,7 @@ _LOOKED_THROUGH = 2000  # events scanned per page of results: a rare search text
 
 Text = Annotated[str | None, Query(max_length=120)]
 Urgency = Annotated[Priority | None, Query(description="Only of alarms of this priority")]
-Words = Annotated[str | None, Query(max_length=120, description="In title, text, by whom or name of the alarm")]
+SearchText = Annotated[str | None, Query(max_length=120, description="In title, text, by whom or name of the alarm")]
 Milliseconds = Annotated[int | None, Query(ge=0, le=2**53)]
 
 
@@ -57,7 +57,7 @@ def wanted(
     alarm: Text = None,
     change: Text = None,
     priority: Urgency = None,
-    text: Words = None,
+    text: SearchText = None,
     since_ms: Milliseconds = None,
     until_ms: Milliseconds = None,
 ) -> Which:
@@ -164,7 +164,7 @@ async def _all(bus: PageBus, vehicle: str, which: Which) -> AsyncIterator[list[d
 
 
 def _named(app: Services, vehicle: str) -> dict[str, str]:
-    """What each exported event says of its car: its name where the server has several, so that files can be joined."""
+    """The car's name for each exported event, where the server has several cars: files can then be joined."""
     return {"vehicle": vehicle} if len(app.vehicles) > 1 else {}
 
 

@@ -54,7 +54,7 @@ class MailOrder(BaseModel):
 class RecipientOut(BaseModel):
     address: str
     state: Literal["waiting", "accepted", "refused"]
-    said: str = Field(description="The server's words")
+    said: str = Field(description="The server's reply")
 
 
 class PartOut(BaseModel):
@@ -68,7 +68,7 @@ class PartOut(BaseModel):
     attempts: int
     next_ms: int | None = Field(description="When it is tried again; null: it does not wait")
     done_ms: int | None
-    size_bytes: int = Field(description="As it goes over the wire")
+    size_bytes: int = Field(description="As sent")
     recipients: list[RecipientOut]
 
 
@@ -85,7 +85,7 @@ class MailOut(BaseModel):
     subject: str
     too_large: TooLarge
     state: State
-    said: str = Field(description="What the server said, or why it waits or failed; may be empty")
+    said: str = Field(description="The server's reply, or why it waits or failed; may be empty")
     is_ready: bool = Field(description="False: its mails are still being made")
     share: float | None = Field(description="How much is made, or sent of the mail on its way: 0 to 1; null: neither")
     way: Way | None = Field(description="attached, split or link; null: not made yet")
@@ -111,7 +111,7 @@ class MailSettingsIn(BaseModel):
     password: str | None = Field(
         None,
         max_length=500,
-        description="Never told again. Left out: as it is, but another host, port or user needs it anew. Empty: none",
+        description="Never returned. Left out: unchanged, but another host, port or user needs it again. Empty: none",
         json_schema_extra={"writeOnly": True, "format": "password"},
     )
     sender: str = Field("", max_length=320, examples=["car@example.org"])
@@ -162,10 +162,10 @@ class MailTestOut(BaseModel):
     """The server took it."""
 
     sentence: str
-    said: str = Field(description="The server's last words")
+    said: str = Field(description="The server's last reply")
     is_encrypted: bool
     largest_bytes: int | None = Field(
-        description="The largest mail the server takes, as it says; null: it does not say"
+        description="The largest mail that the server accepts, as it states; null: it does not state it"
     )
 
 

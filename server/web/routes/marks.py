@@ -130,7 +130,7 @@ def _in_recording(path: Path, mark: str, kind: Kind) -> tuple[MediaName, bytes] 
 
 
 def media_answer(file: MediaName, data: bytes) -> Response:
-    """Shown where it stands: a browser takes it for nothing but what its type says."""
+    """Shown inline: a browser treats it only as its declared type."""
     headers = {
         "Content-Disposition": f'inline; filename="{file.attachment}"',
         "Cache-Control": "private, no-cache",

@@ -36,8 +36,8 @@ async def metrics(request: Request) -> PlainTextResponse:
     if app.link is not None:
         connected = float(app.link.complaint is None)
         add("broker_connected", "gauge", "1 while the broker is connected.", [("", connected)])
-        heard = float(sum(app.bus.trouble(name) is None for name in app.vehicles))
-        add("vehicles_heard", "gauge", "Vehicles of which something comes.", [("", heard)])
+        served = float(sum(app.bus.trouble(name) is None for name in app.vehicles))
+        add("vehicles_heard", "gauge", "Vehicles that send something.", [("", served)])
     if app.recordings is not None:
         for name, help, rows in await asyncio.to_thread(_recorded, app.recordings):  # it reads a disk
             add(name, "gauge", help, rows)

@@ -1,4 +1,4 @@
-"""A person says of a car whose agent is silent that it is off on purpose, over HTTP; only at a web node."""
+"""Declare a car whose agent is silent off on purpose, over HTTP; only at a web node."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ router = APIRouter(tags=["vehicle"], responses=raises(404, 409))
 Name = Annotated[str, InPath(max_length=40, description="The car's name")]
 
 
-@router.put("/api/off/{vehicle}", summary="Say that a lost car is off on purpose, until data of it comes again")
+@router.put("/api/off/{vehicle}", summary="Declare a lost car off on purpose, until it sends data again")
 async def off(request: Request, vehicle: Name) -> Done:
-    """Refused while its agent is heard."""
+    """Refused while its agent sends data."""
     app = _node(request, vehicle)
     if app.bus.trouble(vehicle) is None:
         raise Problem(409, f"{vehicle} sends data: it is not off.")
@@ -28,7 +28,7 @@ async def off(request: Request, vehicle: Name) -> Done:
     return Done()
 
 
-@router.delete("/api/off/{vehicle}", summary="Say that a car is not off: it is lost while it sends nothing")
+@router.delete("/api/off/{vehicle}", summary="Declare that a car is not off: it is lost while it sends nothing")
 async def not_off(request: Request, vehicle: Name) -> Done:
     _node(request, vehicle).off.withdraw(vehicle, _by(request))
     return Done()

@@ -127,7 +127,7 @@ def _page_routes(files: PageFiles) -> APIRouter:
 
     @router.get("/fleet", response_class=HTMLResponse)
     def fleet(request: Request) -> Response:
-        """All cars for one person. Its socket is let in as that of one car is."""
+        """All cars for one person. Its socket is admitted as that of one car is."""
         one, built = services(request), find(static)
         one.build = build_of(built)
         access = "open" if one.access.is_open else "paired"

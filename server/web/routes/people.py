@@ -1,4 +1,4 @@
-"""The list of people over HTTP, and who is on duty at the device that asks."""
+"""The list of people over HTTP, and who is on duty at the requesting device."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def catalog(request: Request) -> Catalog:
     return found
 
 
-def _asked(what: Callable[[], T]) -> T:
+def _answered(what: Callable[[], T]) -> T:
     try:
         return what()
     except NotThere as why:
@@ -96,7 +96,7 @@ def listed(
     recordings = catalog(request)
     which = Which(vehicle=vehicle, tag=tag, text=text, since_ms=since_ms, until_ms=until_ms)
     recordings.look_again()
-    page = _asked(lambda: recordings.rows(which, cursor=cursor, limit=limit))
+    page = _answered(lambda: recordings.rows(which, cursor=cursor, limit=limit))
     uploader = services(request).uploader
     if uploader is not None:
         for row in page.rows:
@@ -156,7 +156,7 @@ def one(request: Request, id: Id) -> Response:
 def verify(request: Request, id: Id) -> VerificationAnswer:
     """Reads the whole file, which can take a minute; one recording at a time, otherwise 409."""
     recordings = catalog(request)
-    return _asked(lambda: recordings.verify(id))
+    return _answered(lambda: recordings.verify(id))
 
 
 @router.patch(
@@ -166,8 +166,8 @@ def verify(request: Request, id: Id) -> VerificationAnswer:
 )
 def annotate(request: Request, id: Id, body: Annotated[AnnotationsChange, Body()]) -> Response:
     recordings = catalog(request)
-    said = {"title": body.title, "note": body.note, "weather": body.weather}
-    return _json(request, _asked(lambda: recordings.annotate(id, tags=body.tags, **said)))
+    annotations = {"title": body.title, "note": body.note, "weather": body.weather}
+    return _json(request, _answered(lambda: recordings.annotate(id, tags=body.tags, **annotations)))
 
 
 @router.delete(
@@ -177,7 +177,7 @@ def annotate(request: Request, id: Id, body: Annotated[AnnotationsChange, Body()
 )
 def delete(request: Request, id: Id) -> Response:
     recordings = catalog(request)
-    return _json(request, _asked(lambda: recordings.delete(id)))
+    return _json(request, _answered(lambda: recordings.delete(id)))
 
 
 @router.get(
@@ -210,13 +210,13 @@ def track(request: Request, id: Id) -> Response:
         raise HTTPException(404, "There is no such recording.")
     drawn = sketch.from_json(row["sketch"])
     marks = 0 if drawn is None else len(drawn.marks)
-    words = (
+    caption = (
         "No usable position was recorded"
         if drawn is None
         else f"The track, with {marks} alarm{'s' * (marks != 1)} on it"
     )
     return Response(
-        sketch.svg(drawn, words), media_type="image/svg+xml", headers={"Cache-Control": "private, max-age=60"}
+        sketch.svg(drawn, caption), media_type="image/svg+xml", headers={"Cache-Control": "private, max-age=60"}
     )
 
 
@@ -233,23 +233,23 @@ def trash(
 ) -> Response:
     recordings = catalog(request)
     which = Which(is_trashed=True)
-    page = _asked(lambda: recordings.rows(which, cursor=cursor, limit=limit))
+    page = _answered(lambda: recordings.rows(which, cursor=cursor, limit=limit))
     return _json(request, {"recordings": page.rows, "next": page.next, "all": recordings.totals(which)})
 
 
 @router.post("/api/trash/{id}/restore", response_model=Recording, summary="Restore")
 def restore(request: Request, id: Id) -> Response:
     recordings = catalog(request)
-    return _json(request, _asked(lambda: recordings.restore(id)))
+    return _json(request, _answered(lambda: recordings.restore(id)))
 
 
 @router.delete("/api/trash/{id}", summary="Delete it for good")
 def destroy(request: Request, id: Id) -> Deleted:
     recordings = catalog(request)
-    return {"ok": True, **_asked(lambda: recordings.destroy(id))}
+    return {"ok": True, **_answered(lambda: recordings.destroy(id))}
 
 
 @router.delete("/api/trash", summary="Empty the trash: delete all of it for good")
 def empty(request: Request) -> Deleted:
     recordings = catalog(request)
-    return {"ok": True, **_asked(lambda: recordings.destroy(None))}
+    return {"ok": True, **_answered(lambda: recordings.destroy(None))}

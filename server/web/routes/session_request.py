@@ -29,13 +29,13 @@ log = logging.getLogger("catgraph.web")
 NAME_HEADER = "x-catgraph-name"  # what the caller wants to be called in the log
 TRACE_HEADER = "x-catgraph-trace"  # the id of the command in the logs; one is made where it is left out
 SIGNED_HEADER = "x-catgraph-signed"  # the command, signed by the program's own key: base64 of JSON
-PAGE_HEADER = "x-catgraph-page"  # of a page of this machine: which one, as its hello says
+PAGE_HEADER = "x-catgraph-page"  # of a page of this machine: which one, as its hello states
 FENCE_HEADER = "x-catgraph-fence"  # the number of the lease of control by which a page orders
 VehicleName = Annotated[str | None, Query(description="Which vehicle; the first where it is left out", max_length=40)]
 MeantVehicle = Annotated[
     str | None, Query(description="Which vehicle; required where there are several", max_length=40)
 ]
-OF_VEHICLE = raises(404, 409, 422, 503)  # of a route that asks a session, as `ask` raises them
+OF_VEHICLE = raises(404, 409, 422, 503)  # of a route that sends a request to a session, as `ask` raises them
 ReplayToken = Annotated[str | None, Query(description="Of a page's replay, as its state names it", max_length=40)]
 
 
@@ -59,7 +59,7 @@ def meant_vehicle(request: Request, name: str | None) -> str | None:
     """The vehicle that a command acts on: it must be named where there are several."""
     app = services(request)
     names = app.vehicles
-    if name is None and (len(names) > 1 or app.bus.grows):  # of a web node's cars only some may have been heard yet
+    if name is None and (len(names) > 1 or app.bus.grows):  # some cars of a web node may not have sent anything yet
         raise HTTPException(
             422, f"This server has several cars: name the one that is meant by ?vehicle= ({', '.join(names)})."
         )

@@ -37,8 +37,10 @@ COUNTED_WITHIN_S = 2.0  # a health check must work while the disk hangs
     summary="Is the server well?",
 )
 async def health(request: Request) -> Response:
-    """200 and "ok"; 200 and "cars lost" where the server is well and cars are not heard, because another server would
-    not hear them either; 503 and "impaired" with the problems. A caller who is not known gets status and version only.
+    """200 and "ok"; 200 and "cars lost" where the server is well and cars send nothing, because another server would
+    not receive anything either; 503 and "impaired" with the problems.
+
+    A caller who is not known gets status and version only.
     """
     app = services(request)
     found, lost = app.problems(), app.lost()

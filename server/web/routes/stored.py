@@ -1,4 +1,4 @@
-"""Copies of recordings in the store over HTTP: asked for, listed of all cars, and fetched through this server."""
+"""Copies of recordings in the store over HTTP: requested, listed of all cars, and fetched through this server."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class UploadRequest(BaseModel):
 _USUAL = UploadRequest()
 
 
-def _asked(what: Callable[[], T]) -> T:
+def _answered(what: Callable[[], T]) -> T:
     try:
         return what()
     except NotThere as why:
@@ -51,11 +51,11 @@ def _asked(what: Callable[[], T]) -> T:
 
 @copies.post("/api/recordings/{id}/store", status_code=202, summary="Upload the whole file into the store")
 def upload(request: Request, id: Id, body: Annotated[UploadRequest, Body()] = _USUAL) -> StoredCopy:
-    """Answers at once; how far it is stands in `stored` of the recording."""
+    """Answers at once; `stored` of the recording has the progress."""
     uploader = services(request).uploader
     if uploader is None:
         raise HTTPException(404, _no_store(request))
-    _asked(lambda: uploader.ask(id, deletes=body.delete))
+    _answered(lambda: uploader.ask(id, deletes=body.delete))
     return _copy(request, id)
 
 
@@ -66,7 +66,7 @@ def withdraw(request: Request, id: Id) -> StoredCopy:
     if uploader is None:
         raise HTTPException(404, _no_store(request))
     _copy(request, id)  # 404 where there is none
-    _asked(lambda: uploader.withdraw(id))
+    _answered(lambda: uploader.withdraw(id))
     return _copy(request, id)
 
 
@@ -80,7 +80,7 @@ def listed(
     stored = services(request).stored
     if stored is None:
         raise HTTPException(404, _no_store(request))
-    return _asked(lambda: stored.page(vehicle=vehicle, cursor=cursor, limit=limit))
+    return _answered(lambda: stored.page(vehicle=vehicle, cursor=cursor, limit=limit))
 
 
 @router.get(
@@ -109,7 +109,7 @@ def _answer(request: Request, find: Callable[[Any], Any]) -> Response:
     stored = services(request).stored
     if stored is None:
         raise HTTPException(404, _no_store(request))
-    file = _asked(lambda: find(stored))
+    file = _answered(lambda: find(stored))
     headers = {
         "Content-Length": str(file.size),
         "Content-Disposition": disposition(file.name),
@@ -117,7 +117,7 @@ def _answer(request: Request, find: Callable[[Any], Any]) -> Response:
     }
     if is_head(request):
         return Response(headers=headers, media_type=_KIND)
-    portions = _asked(lambda: stored.read(file))
+    portions = _answered(lambda: stored.read(file))
     return StreamingResponse(portions, headers=headers, media_type=_KIND)
 
 

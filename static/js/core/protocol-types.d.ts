@@ -44,7 +44,7 @@ export interface AlarmLoad {
 
 export type AlarmState = "NORMAL" | "UNACKED" | "ACKED" | "RTN_UNACKED" | "SHELVED" | "SUPPRESSED" | "OUT_OF_SERVICE";
 
-/** Accepts or declines an offered item; only by who was asked. */
+/** Accepts or declines an offered item; only by the person to whom it was offered. */
 export interface AnswerItemCommand {
   id?: string | null;
   /** the car that the page named to its operator; refused by any other */
@@ -73,11 +73,11 @@ export interface AskOutcomeCommand {
   kind: "outcome";
   /** the `id` of the command */
   of: string;
-  /** since it was asked for, at most */
+  /** since it was requested, at most */
   ago_s: number;
 }
 
-/** An operator who asks for control of the car, and whom nobody has answered yet. */
+/** An operator who requests control of the car and has no answer yet. */
 export interface AskedControl {
   page: string;
   name: string;
@@ -91,7 +91,7 @@ export interface AttentionItem {
   since_ms: number;
   assigned: ItemHolder | null;
   offered: ItemOffer | null;
-  /** when it goes on to the supervisor; null: no timer runs */
+  /** when it is escalated to the supervisor; null: no timer runs */
   escalates_ms: number | null;
   /** when it went on to the supervisor */
   escalated_ms: number | null;
@@ -131,7 +131,7 @@ export interface Beside {
   kind: "beside";
   replay: ReplayState;
   state: RecordedState;
-  /** what is to be said of the file */
+  /** remarks on the file */
   notes: Array<string>;
 }
 
@@ -155,7 +155,7 @@ export interface CarAlarm {
   raised_ms: number;
   /** none while it is silenced, or makes none because of a planned stop */
   sound: Sound;
-  /** value against limit, in words */
+  /** value against limit, as text */
   text?: string;
 }
 
@@ -212,7 +212,7 @@ export interface CarSummary {
   place?: CarPlace | null;
   /** of battery or fuel */
   energy_percent?: number | null;
-  /** who asks for control, the oldest first, 3 at most */
+  /** who requests control, the oldest first, 3 at most */
   requests?: Array<AskedControl>;
   /** to whom its item can be handed over, 20 at most */
   people?: Array<PagePerson>;
@@ -323,7 +323,7 @@ export interface ConnectionProblem {
   title: string;
   /** what to do */
   hint: string;
-  /** a word under the broken node of the chain */
+  /** a short text under the broken node of the chain */
   mark: string;
 }
 
@@ -349,7 +349,7 @@ export interface ControlState {
   lapses_s?: number;
   /** whose lease lapsed, and who can reclaim it until then */
   former?: FormerHolder | null;
-  /** who asks for control, the oldest first */
+  /** who requests control, the oldest first */
   requests?: Array<ControlRequest>;
   /** null: control is not being handed over */
   handover?: HandoverState | null;
@@ -407,7 +407,7 @@ export interface CoursePoints {
   steering: Array<number | null>;
   /** m/s, speed minus the commanded speed */
   follow: Array<number | null>;
-  /** m, error of the position as the receiver says it, one sigma */
+  /** m, error of the position as the receiver states it, one sigma */
   gps: Array<number | null>;
   lat: Array<number | null>;
   lon: Array<number | null>;
@@ -472,9 +472,9 @@ export interface DepartureItem {
   result: "open" | "done" | "failed" | "not_applicable";
   /** what was seen */
   value: string;
-  /** why it failed or is not applicable, in a person's words */
+  /** why it failed or is not applicable, as a person wrote it */
   note: string;
-  /** whose word it is; null: it turned by itself, or is open */
+  /** who set it; null: it turned by itself, or is open */
   by: string | null;
   /** when it turned */
   at_ms: number | null;
@@ -532,7 +532,7 @@ export interface DepartureState {
   at_ms: number | null;
 }
 
-/** Says what made somebody intervene; sent again it replaces what was said before. */
+/** Describes why somebody intervened; sent again it replaces the description before. */
 export interface DescribeInterventionCommand {
   id?: string | null;
   /** the car that the page named to its operator; refused by any other */
@@ -540,10 +540,10 @@ export interface DescribeInterventionCommand {
   kind: "describe_intervention";
   /** its id, as the state names it */
   intervention: string;
-  /** in words; empty where the category says enough */
+  /** as text; empty where the category is enough */
   what?: string;
   category?: string | null;
-  /** where the data say otherwise; null: as they say */
+  /** where the data show another one; null: as they show */
   initiated_by?: "driver" | "operator" | "system" | "unknown" | null;
 }
 
@@ -608,7 +608,7 @@ export interface DriveMark {
   /** the moment that was marked, by the server's clock */
   marked_ms: number;
   category: string | null;
-  /** what was said of the moment; "": nothing */
+  /** text on the moment; "": none */
   words: string;
   /** a voice note belongs to it */
   voice: boolean;
@@ -954,7 +954,7 @@ export interface ItemHolder {
   since_ms: number;
 }
 
-/** Who is asked to take the item over; it stays where it is until they accept. */
+/** Who is requested to take the item over; it stays where it is until they accept. */
 export interface ItemOffer {
   by: string;
   name: string;
@@ -986,7 +986,7 @@ export interface LinkState {
   topics_heard: number;
   /** how old messages are when they come, at most; null: not known */
   late_s: number | null;
-  /** what is not asked for in full because the link is slow, as a sentence */
+  /** what is not requested in full because the link is slow, as a sentence */
   reduced: string | null;
   /** what came and was no rosbridge operation */
   unreadable_frames: number;
@@ -1001,7 +1001,7 @@ export interface ListedCar {
   summary: CarSummary | null;
   /** which part is silent, as a sentence; null: none */
   trouble?: string | null;
-  /** who said that a car that is silent is off; null: nobody */
+  /** who declared a silent car off; null: nobody */
   off?: OffOnPurpose | null;
 }
 
@@ -1092,7 +1092,7 @@ export interface LogEvent {
   fixed?: number;
   /** of a signed departure check: its items that have an interval */
   recurring?: Array<RecurringItem>;
-  /** SHA-256 of the list and its results [hex]; with an item: of what it asks */
+  /** SHA-256 of the list and its results [hex]; with an item: of its question */
   hash?: string;
   /** under whose name alarms were acknowledged */
   owner?: string;
@@ -1111,14 +1111,14 @@ export interface LogEvent {
   since_ms?: number;
   /** of a planned stop */
   reason?: "parked" | "workshop" | "charging" | "set_up";
-  /** monitoring goes on after the server was started again: the drive is the same */
+  /** monitoring continues after a restart of the server: the drive is the same */
   resumes?: boolean;
   /** the mark's id */
   mark?: string;
   /** the moment that was marked, by the server's clock */
   marked_ms?: number;
   category?: string | null;
-  /** what was said of the moment; "": nothing */
+  /** text on the moment; "": none */
   words?: string;
   /** a voice note belongs to it */
   voice?: boolean;
@@ -1176,7 +1176,7 @@ export interface LogbookAnswer {
   unread: number;
 }
 
-/** The newest signed departure check of a car, whatever drives were asked for. */
+/** The newest signed departure check of a car, whatever drives were requested. */
 export interface LogbookCheck {
   vehicle: string;
   /** null: no drive has one */
@@ -1264,7 +1264,7 @@ export interface LogbookDue {
   is_overdue: boolean;
 }
 
-/** Over all drives that were asked for. */
+/** Over all drives that were requested. */
 export interface LogbookTotals {
   drives: number;
   distance_m: number;
@@ -1336,7 +1336,7 @@ export interface ModeTotal {
 export interface ModeValue {
   /** of a plain number always unknown: what it means is a setting */
   mode: "autonomous" | "manual" | "unknown";
-  /** in the car's own words */
+  /** as the car states it */
   said: string;
 }
 
@@ -1353,7 +1353,7 @@ export interface OdometryValue {
   speed_mps: number | null;
 }
 
-/** A person said that a car is off; it holds until the car's agent sends data again. */
+/** A person declared a car off; it holds until the car's agent sends data again. */
 export interface OffOnPurpose {
   by: string;
   since_ms: number;
@@ -1380,7 +1380,7 @@ export interface OfferControlCommand {
   to: string;
 }
 
-/** Asks another person to take the car's item over; it stays assigned as it is until they accept. */
+/** Offers the car's item to another person; it stays assigned as it is until they accept. */
 export interface OfferItemCommand {
   id?: string | null;
   /** the car that the page named to its operator; refused by any other */
@@ -1621,7 +1621,7 @@ export interface PlannedStopState {
   is_speed_known: boolean;
 }
 
-/** Goes on; from the beginning where it stands at the end. */
+/** Resumes; from the beginning where it is at the end. */
 export interface PlayReplay {
   kind: "replay";
   id?: string | null;
@@ -1651,7 +1651,7 @@ export interface PositionValue {
   covariance_m2: [number, number, number] | null;
 }
 
-/** How a page stands, once a second and at each change: whether it is seen, and whether an alarm would be heard from it. Nothing answers it but its refusal. */
+/** The state of a page, once a second and at each change: whether it is seen, and whether an alarm would sound from it. Nothing answers it but its refusal. */
 export interface PresentWordCommand {
   id?: string | null;
   kind: "present";
@@ -1669,7 +1669,7 @@ export interface PresentWordCommand {
   key?: string | null;
   /** it is closed, or another page takes its place */
   leaves?: boolean;
-  /** the other cars whose next alarm would be heard from it */
+  /** the other cars whose next alarm would sound from it */
   announces?: Array<string>;
 }
 
@@ -1701,7 +1701,7 @@ export interface Quantity {
   unit: string;
 }
 
-/** Asked until it is answered by the command `set`: `topics` of a source, `units` of a unit. */
+/** Open until it is answered by the command `set`: `topics` of a source, `units` of a unit. */
 export interface Question {
   signal: string;
   kind: "source" | "unit";
@@ -1721,7 +1721,7 @@ export interface RaisedAlarm {
   text: string;
 }
 
-/** How many operators would hear an alarm now. */
+/** On the pages of how many operators an alarm would sound now. */
 export interface ReachState {
   can: number;
   of: number;
@@ -1786,7 +1786,7 @@ export interface RecordedState {
   phones: Array<PhoneListed>;
   /** how many marks this drive has, or a recording up to the moment shown */
   marks: number;
-  /** what the operator in control is asked of this car, the most urgent first */
+  /** open questions to the operator in control of this car, the most urgent first */
   questions: Array<Question>;
 }
 
@@ -1808,10 +1808,10 @@ export interface Recording {
   alarms: Record<string, number> | null;
   title: string;
   note: string;
-  /** for the report of the drive; "": nobody said */
+  /** for the report of the drive; "": nobody entered it */
   weather: string;
   tags: Array<string>;
-  /** how many; their words are found by a search */
+  /** how many; a search covers their texts */
   marks: number;
   /** another value: other marks or descriptions came after it was complete; left out: none did */
   late?: string;
@@ -1842,7 +1842,7 @@ export interface Recording {
   file: string;
   /** mcap · bag · db3 · zstd · folder */
   format: string;
-  /** why no single file is a copy of it, as words behind “it is”; null: its file is all of it */
+  /** why no single file is a copy of it, as text behind “it is”; null: its file is all of it */
   several_files: string | null;
   sha256: string | null;
   /** SHA-256 of the last record of its hash chain [hex], not verified; null: none */
@@ -1855,9 +1855,9 @@ export interface Recording {
   trashed_ms: number | null;
   /** where the server has a store */
   stored?: StoredCopy;
-  /** of a recording that is asked for alone; at most 200 */
+  /** of a recording that is requested alone; at most 200 */
   raised?: Array<RaisedAlarm>;
-  /** of a recording that is asked for alone: the highest speed of at most 361 equal parts; empty: none */
+  /** of a recording that is requested alone: the highest speed of at most 361 equal parts; empty: none */
   speed_mps?: Array<number | null>;
 }
 
@@ -1890,7 +1890,7 @@ export interface RecordingState {
   not_received?: Array<string>;
   /** left after two messages of more than 16 MB; at most 20 */
   too_large?: Array<TooLarge>;
-  /** saving: being completed; held: link lost, it goes on if that returns in time; stopped: it was to record and cannot */
+  /** saving: being completed; held: link lost, it continues if that returns in time; stopped: it was to record and cannot */
   state: "off" | "recording" | "saving" | "held" | "stopped";
   for_s: number | null;
   /** of the file that is written, or the last of this session; part 2 is named …_p2 */
@@ -1928,7 +1928,7 @@ export interface RefusedAddress {
   title: string;
   /** what to do */
   hint: string;
-  /** a word under the broken node of the chain */
+  /** a short text under the broken node of the chain */
   mark: string;
   /** an address that would do */
   suggestion: string | null;
@@ -1984,7 +1984,7 @@ export interface ReplayEnded {
 /** An intervention in a recording. */
 export interface ReplayIntervention {
   at_s: number;
-  /** as of the event; of another version it may be another word */
+  /** as of the event; of another version it may be another value */
   kind_of: string;
   category: string | null;
   /** its description, also one that came later; "" and no category: nobody described it */
@@ -2020,7 +2020,7 @@ export interface ReplayState {
   vehicle: string;
   /** given by a person; "": none */
   title: string;
-  /** by which trends and track are asked for */
+  /** for requests of trends and track */
   token: string;
   /** its process has sent nothing for so long */
   hangs_s: number | null;
@@ -2064,7 +2064,7 @@ export interface ResumeCommand {
   kind: "resume";
 }
 
-/** How the log goes on for a page that read it in another run. */
+/** How the log continues for a page that read it in another run. */
 export interface Resumed {
   /** up to this number it is the log that the page has; what the page has beyond is not in it */
   common: number;
@@ -2110,7 +2110,7 @@ export interface ScanValue {
   laser_ahead_m?: number | null;
   /** of the centre line */
   laser_left_m?: number | null;
-  /** *laser assumed to look ahead*, *gap from the laser: no bumper set*: what limits its words on the road */
+  /** *laser assumed to look ahead*, *gap from the laser: no bumper set*: limits of its view of the road */
   mounting?: string | null;
 }
 
@@ -2177,7 +2177,7 @@ export interface SessionState {
 export interface SetCommand {
   id?: string | null;
   kind: "set";
-  /** in SI; null goes back to the default */
+  /** in SI; null restores the default */
   values?: Record<string, number | null>;
   /** signal → topic; null: as found */
   topics?: Record<string, string | null>;
@@ -2189,7 +2189,7 @@ export interface SetCommand {
   version?: number | null;
 }
 
-/** A person's word on one item; refused where it turns by itself, or the check is signed. */
+/** A person's result of one item; refused where it turns by itself, or the check is signed. */
 export interface SetDepartureItemCommand {
   id?: string | null;
   /** the car that the page named to its operator; refused by any other */
@@ -2202,7 +2202,7 @@ export interface SetDepartureItemCommand {
   note?: string;
 }
 
-/** Replaces the list of the car; an item that asks the same as before keeps its result. */
+/** Replaces the list of the car; an item with the same question as before keeps its result. */
 export interface SetDepartureListCommand {
   id?: string | null;
   /** the car that the page named to its operator; refused by any other */
@@ -2497,7 +2497,7 @@ export interface State {
   phones: Array<PhoneListed>;
   /** how many marks this drive has, or a recording up to the moment shown */
   marks: number;
-  /** what the operator in control is asked of this car, the most urgent first */
+  /** open questions to the operator in control of this car, the most urgent first */
   questions: Array<Question>;
   server: ServerState;
   /** the departure check; left out of a recording's state */
@@ -2614,7 +2614,7 @@ export interface TakeAlarmCommand {
   occurrence: number;
 }
 
-/** Takes, gives or requests control; server/control/lease.py says who may do what. */
+/** Takes, gives or requests control; server/control/lease.py has the rules. */
 export interface TakeControlCommand {
   id?: string | null;
   /** since the finger let go, when it was sent */
@@ -2672,13 +2672,13 @@ export interface Timeline {
   marks: Array<Mark>;
   marks_left_out: number;
   kind: "timeline";
-  /** moments that somebody marked, oldest first; at most 400, words shortened */
+  /** moments that somebody marked, oldest first; at most 400, texts shortened */
   flags: Array<DriveMark>;
   /** oldest first, at most 400 */
   interventions: Array<ReplayIntervention>;
   /** who drove when, without a gap, at most 400; empty: not recorded */
   modes: Array<DrivenSpan>;
-  /** what is to be said of the file */
+  /** remarks on the file */
   notes: Array<string>;
 }
 
@@ -2692,7 +2692,7 @@ export interface TopicOffer {
   type: string;
   /** that its messages name; null: none, or not known */
   frame?: string | null;
-  /** evidence for and against it, in few words */
+  /** evidence for and against it, as a short text */
   why?: string;
   /** of a laser that is compared: the nearest range in each of at most 72 parts of its newest scan */
   ranges_m?: Array<number | null>;
@@ -2787,7 +2787,7 @@ export interface VerificationAnswer {
   state: "intact" | "broken" | "unfinished" | "no chain" | "unreadable";
   /** broken or unfinished, or a recording beside it names another hash */
   is_broken: boolean;
-  /** a few words, as *Intact · 3f9a12bc* or *Broken at record 57* */
+  /** a short text, as *Intact · 3f9a12bc* or *Broken at record 57* */
   short: string;
   sentence: string;
   records: number;

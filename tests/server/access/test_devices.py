@@ -85,7 +85,7 @@ async def test_when_it_was_last_seen_is_written_once_a_minute(tmp_path: Path) ->
     assert Devices(tmp_path).all()[0].seen_ms == 60_000
 
 
-async def test_names_are_told_apart_and_the_list_is_bounded(tmp_path: Path) -> None:
+async def test_names_are_distinguished_and_the_list_is_bounded(tmp_path: Path) -> None:
     devices = Devices(None)
     names = [(await devices.add("Pixel 7", Role.VIEWER, now_ms=n))[0].name for n in range(MOST + 5)]
     assert names[:3] == ["Pixel 7", "Pixel 7 2", "Pixel 7 3"]

@@ -47,16 +47,16 @@ async def test_a_paired_device_signs_on_and_its_orders_bear_the_name(tmp_path: P
         assert listed["me"]["name"] == "A. K."
         assert (listed["me"]["title"], listed["me"]["device"]) == ("supervisor", "Pixel 7")
         assert [one["role"] for one in listed["roles"]] == ["operator", "safety_driver", "supervisor", "test_engineer"]
-        async with served.paired(Role.OPERATOR, "Desk") as desk:
-            refused = await desk.post("/api/duty", json={"person": ann})
+        async with served.paired(Role.OPERATOR, "Tablet") as tablet:
+            refused = await tablet.post("/api/duty", json={"person": ann})
             assert refused.status_code == 409
             assert refused.json()["detail"] == "A. K. is on duty at Pixel 7: move the duty to this device."
-            moved = await desk.post("/api/duty", json={"person": ann, "moves": True})
-            assert moved.json()["me"]["device"] == "Desk"
+            moved = await tablet.post("/api/duty", json={"person": ann, "moves": True})
+            assert moved.json()["me"]["device"] == "Tablet"
             assert (await phone.get("/api/people")).json()["me"] is None
-            assert (await desk.delete(f"/api/people/{ann}")).status_code == 409
-            assert (await desk.delete("/api/duty")).json()["me"] is None
-            assert (await desk.delete(f"/api/people/{ann}")).json()["people"] == []
+            assert (await tablet.delete(f"/api/people/{ann}")).status_code == 409
+            assert (await tablet.delete("/api/duty")).json()["me"] is None
+            assert (await tablet.delete(f"/api/people/{ann}")).json()["people"] == []
 
 
 async def test_who_may_not(tmp_path: Path) -> None:
@@ -78,7 +78,7 @@ async def test_who_may_not(tmp_path: Path) -> None:
         ({"name": "   "}, 409),
         ({"name": "x" * 31}, 409),
         ({"name": "x" * 500}, 422),
-        ({"name": "A. K. (Desk)"}, 409),
+        ({"name": "A. K. (Tablet)"}, 409),
         ({"name": "A", "role": "king"}, 422),
         ({"name": 7}, 422),
         ({"name": "A", "more": 1}, 422),
@@ -155,7 +155,7 @@ async def test_without_people_everything_is_as_before(tmp_path: Path) -> None:
     assert not (tmp_path / "people").exists()
 
 
-async def test_a_duty_ends_by_itself_and_all_pages_are_told(tmp_path: Path) -> None:
+async def test_a_duty_ends_by_itself_and_all_pages_are_notified(tmp_path: Path) -> None:
     clock = Clock()
     people = People(tmp_path, wall_ms=clock)
     person = await people.add("A. K.", "operator")
@@ -241,7 +241,7 @@ async def test_a_file_that_cannot_be_read_is_never_overwritten(tmp_path: Path, m
         ("outcome", "phone", 5.0, True),
         ("outcome", "phone", 15.0, False),  # they signed on again since then
         ("control", "phone", None, False),
-        ("accept_control", "desk", None, False),  # another tab of the device that takes over
+        ("accept_control", "tablet", None, False),  # another tab of the device that takes over
     ],
 )
 async def test_a_hand_over_ends_the_duty_at_the_other_device(
@@ -251,9 +251,9 @@ async def test_a_hand_over_ends_the_duty_at_the_other_device(
     people = People(None, wall_ms=clock)
     await people.sign_on(device, "Pixel 7", await people.add("A. K.", "operator"), None, moves=False)
     clock.ms += 10_000
-    desk = PageSender(Principal(id="desk", name="Desk", role=Role.OPERATOR), people)
+    tablet = PageSender(Principal(id="tablet", name="Tablet", role=Role.OPERATOR), people)
     over: dict[str, Any] = {"device": device, "to": "Ben"} | ({} if ago_s is None else {"ago_s": ago_s})
-    assert await desk.end_handed_over(kind, {"ok": True, "handed_over": over}) == {"ok": True}
+    assert await tablet.end_handed_over(kind, {"ok": True, "handed_over": over}) == {"ok": True}
     assert (people.board.on_duty(device) is None) is ends
 
 

@@ -48,7 +48,7 @@ def walk(routes: list[BaseRoute]) -> Iterator[BaseRoute]:
 
 
 def all_routes() -> list[tuple[str, str]]:
-    """Method and path of each; a path as it is asked for, its parameters filled in."""
+    """Method and path of each; a path as it is requested, its parameters filled in."""
     found: list[tuple[str, str]] = []
     for route in walk(create_app(config()).routes):
         match route:
@@ -64,7 +64,7 @@ def all_routes() -> list[tuple[str, str]]:
 ROUTES = all_routes()
 
 
-def asked(path: str) -> str:
+def requested(path: str) -> str:
     return re.sub(r"\{[^}]+\}", "1", path)
 
 
@@ -92,7 +92,7 @@ def test_each_route_needs_what_its_method_needs_or_is_named_here(method: str, pa
         expected = Needs.VIEWER
     else:
         expected = Needs.OPERATOR
-    assert needs_of(method, asked(path)) is expected
+    assert needs_of(method, requested(path)) is expected
 
 
 @pytest.mark.parametrize("path", ["/api/x", "/api/health/x", "/x", "/", "/static/x", "/api/pair/x"])
@@ -112,20 +112,20 @@ async def test_no_route_answers_who_is_not_known_and_none_obeys_a_viewer(tmp_pat
         http_client(base_url=served.base, headers={"Authorization": f"Bearer {VIEWER_KEY}"}) as program,
     ):
         for method, path in ROUTES:
-            needs = needs_of(method, asked(path))
+            needs = needs_of(method, requested(path))
             if needs is Needs.NOBODY:
                 continue
-            answer = await stranger.request(method, asked(path), json={})
+            answer = await stranger.request(method, requested(path), json={})
             assert answer.status_code == 401, (method, path)
             for client in (viewer, program):
                 if needs is Needs.OPERATOR:
-                    answer = await client.request(method, asked(path), json={})
+                    answer = await client.request(method, requested(path), json={})
                     assert (answer.status_code, answer.json()["code"]) == (403, "viewer"), (method, path)
                 else:
-                    assert (await client.request(method, asked(path))).status_code not in (401, 403), (method, path)
+                    assert (await client.request(method, requested(path))).status_code not in (401, 403), (method, path)
 
 
-# -- commands --------------------------------------------------------------------------------------------------------
+# -- commands ----------------------------------------------------------------------------------------------------------
 
 COMMANDS = get_args(commands.Command)
 

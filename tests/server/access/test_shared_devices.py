@@ -1,4 +1,4 @@
-"""Paired devices of several web nodes: what each tells, and what it makes of what the others told."""
+"""Paired devices of several web nodes: what each shares, and what it does with what the others shared."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ async def test_a_visit_at_one_node_keeps_the_device_known_at_the_other() -> None
     assert device.id in str(list(bucket))
 
 
-async def test_nothing_is_told_twice_and_the_old_is_swept(tmp_path: Path) -> None:
+async def test_nothing_is_shared_twice_and_the_old_is_removed(tmp_path: Path) -> None:
     bucket: dict[str, bytes] = {}
     node = Node(bucket, tmp_path)
     node.connect()

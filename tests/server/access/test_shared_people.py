@@ -50,13 +50,13 @@ async def test_who_signs_on_at_two_nodes_at_once_is_on_duty_at_the_later() -> No
     two.hear(one)
     one.ms, two.ms = 2000, 2001
     await one.people.sign_on("phone", "Pixel", ann, None, moves=False)
-    await two.people.sign_on("desk", "Desk", ann, None, moves=False)
+    await two.people.sign_on("tablet", "Tablet", ann, None, moves=False)
     due_one, due_two = one.shared.due(), two.shared.due()
     for node, due in ((one, due_two), (two, due_one)):
         for key, value in due.items():
             node.shared.take(key, value)
     for node in (one, two):
-        assert [entry.device for entry in node.people.board.duties()] == ["desk"]
+        assert [entry.device for entry in node.people.board.duties()] == ["tablet"]
 
 
 async def test_a_removed_person_is_not_brought_back() -> None:

@@ -61,10 +61,10 @@ class Agent:
 
     def signed(self, by: OrderSigner = ANN, name: str = "Ann", vehicle: str = "ocelot", **command: Any) -> Any:
         """As a node passes it on."""
-        said = {"kind": "pause", "fence": 3, **command}
+        command_text = {"kind": "pause", "fence": 3, **command}
         challenge = self.orders.challenge()
-        signed = by.sign(said, vehicle=vehicle, by=name, challenge=challenge, page=PAGE)
-        return {"kind": said["kind"], "id": "p1", "signed": signed, "who": by.id, "by": "lies", "page": "lies"}
+        signed = by.sign(command_text, vehicle=vehicle, by=name, challenge=challenge, page=PAGE)
+        return {"kind": command_text["kind"], "id": "p1", "signed": signed, "who": by.id, "by": "lies", "page": "lies"}
 
     async def refusal(self, message: Any) -> str:
         with pytest.raises(NotAdmitted) as why:
@@ -72,7 +72,7 @@ class Agent:
         return str(why.value)
 
 
-async def test_who_signed_it_gave_it_whatever_the_node_says() -> None:
+async def test_the_signer_gave_it_whatever_the_node_states() -> None:
     agent = Agent()
     found = await agent.orders.admit("ocelot", agent.signed())
     assert found == {
@@ -95,11 +95,11 @@ async def test_who_signed_it_gave_it_whatever_the_node_says() -> None:
 
 async def test_who_is_on_duty_is_who_was_signed_and_not_who_the_node_or_the_command_names() -> None:
     agent = Agent()
-    said = {"kind": "pause", "person": {"name": "C. D.", "role": "supervisor"}}
+    command_text = {"kind": "pause", "person": {"name": "C. D.", "role": "supervisor"}}
     named = {"name": "A. K.", "role": "operator"}
     message = agent.signed()
     challenge = agent.orders.challenge()
-    message["signed"] = ANN.sign(said, vehicle="ocelot", by="Ann", challenge=challenge, page=PAGE, person=named)
+    message["signed"] = ANN.sign(command_text, vehicle="ocelot", by="Ann", challenge=challenge, page=PAGE, person=named)
     stated = {
         "person": {"name": "M. R.", "role": "supervisor", "device": "d1"},
         "supervisors": ["J. D."],
@@ -108,7 +108,7 @@ async def test_who_is_on_duty_is_who_was_signed_and_not_who_the_node_or_the_comm
     found = await agent.orders.admit("ocelot", message | stated)
     assert found["person"] == {"name": "A. K.", "role": "operator", "device": "d1"}
     assert found["supervisors"] == ["J. D."]
-    assert found["duties"] == {"J. D.": None}, "as the node says; it gives nobody a right"
+    assert found["duties"] == {"J. D.": None}, "as the node states; it grants no right"
     message = agent.signed() | stated  # signed where nobody is on duty
     assert (await agent.orders.admit("ocelot", message))["person"] is None
 

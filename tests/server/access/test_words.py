@@ -1,4 +1,4 @@
-"""Invitations, guesses, tickets, cookies, keys and names, each by itself; time is an argument."""
+"""Invitations, attempts, tickets, cookies, keys and names, each by itself; time is an argument."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.server.access.pairs import access_of, config
 DAY_MS = 86_400_000
 
 
-# -- invitations -----------------------------------------------------------------------------------------------------
+# -- invitations -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("later_s", "is_in"), [(0.0, True), (LASTS_S - 0.001, True), (LASTS_S, False)])
@@ -62,50 +62,50 @@ async def test_the_terminal_shows_the_same_until_it_is_used_or_old() -> None:
     assert access.invitation().token != second.token
 
 
-# -- guesses ---------------------------------------------------------------------------------------------------------
+# -- attempts ----------------------------------------------------------------------------------------------------------
 
 
-def test_waits_grow_for_who_guesses_and_are_forgiven() -> None:
-    guesses = PinThrottle()
+def test_waits_grow_with_wrong_pins_and_expire() -> None:
+    throttle = PinThrottle()
     now_s, waits = 0.0, []
     for _ in range(12):
-        guesses.wrong("10.0.0.9", now_s=now_s)
-        waits.append(guesses.wait_s("10.0.0.9", now_s=now_s))
+        throttle.wrong("10.0.0.9", now_s=now_s)
+        waits.append(throttle.wait_s("10.0.0.9", now_s=now_s))
         now_s += waits[-1]
     assert waits[:FEW] == [0.0, 0.0, 2.0]
     assert waits[FEW:8] == [4.0, 8.0, 16.0, 32.0, 64.0]
     assert max(waits) == 300.0
-    assert guesses.wait_s("10.0.0.8", now_s=now_s - waits[-1]) <= 30.0
-    guesses.wrong("10.0.0.9", now_s=now_s + 901.0)
-    assert guesses.wait_s("10.0.0.9", now_s=now_s + 901.0) == 0.0
+    assert throttle.wait_s("10.0.0.8", now_s=now_s - waits[-1]) <= 30.0
+    throttle.wrong("10.0.0.9", now_s=now_s + 901.0)
+    assert throttle.wait_s("10.0.0.9", now_s=now_s + 901.0) == 0.0
 
 
 def test_many_peers_together_wait_as_one_and_get_thirty_tries_a_pin() -> None:
-    guesses, now_s, tries = PinThrottle(), 0.0, 0
+    throttle, now_s, tries = PinThrottle(), 0.0, 0
     while now_s < LASTS_S:
         peer = f"2001:db8:{tries:x}::"
-        wait_s = guesses.wait_s(peer, now_s=now_s)
+        wait_s = throttle.wait_s(peer, now_s=now_s)
         if wait_s > 0:
             now_s += wait_s
             continue
-        guesses.wrong(peer, now_s=now_s)
+        throttle.wrong(peer, now_s=now_s)
         tries += 1
     assert MANY < tries <= 36
 
 
 def test_a_right_pin_forgives_its_peer_only() -> None:
-    guesses = PinThrottle()
+    throttle = PinThrottle()
     for _ in range(MANY + 2):
-        guesses.wrong("10.0.0.9", now_s=0.0)
-    guesses.right("10.0.0.9")
-    assert guesses.wait_s("10.0.0.9", now_s=0.0) == guesses.wait_s("10.0.0.8", now_s=0.0) == 8.0
+        throttle.wrong("10.0.0.9", now_s=0.0)
+    throttle.right("10.0.0.9")
+    assert throttle.wait_s("10.0.0.9", now_s=0.0) == throttle.wait_s("10.0.0.8", now_s=0.0) == 8.0
 
 
 def test_peers_are_forgotten_before_they_are_too_many() -> None:
-    guesses = PinThrottle()
+    throttle = PinThrottle()
     for n in range(1500):
-        guesses.wrong(str(n), now_s=0.0)
-    assert len(guesses._peers) == 1000
+        throttle.wrong(str(n), now_s=0.0)
+    assert len(throttle._peers) == 1000
 
 
 @pytest.mark.parametrize(
@@ -118,13 +118,13 @@ def test_peers_are_forgotten_before_they_are_too_many() -> None:
         ("fe80::1%eth0", "fe80::2%eth1", True),
     ],
 )
-def test_a_network_of_ipv6_guesses_as_one(one: str, other: str, is_same: bool) -> None:
+def test_a_network_of_ipv6_counts_as_one_peer(one: str, other: str, is_same: bool) -> None:
     from server.access.access import _peer
 
     assert (_peer(one) == _peer(other)) is is_same
 
 
-# -- tickets ---------------------------------------------------------------------------------------------------------
+# -- tickets -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("later_s", "is_in"), [(4.999, True), (5.0, False), (60.0, False)])
@@ -187,7 +187,7 @@ def test_a_ticket_is_used_up_by_whoever_shows_it() -> None:
     assert len(tickets._open) == 2000
 
 
-# -- cookies ---------------------------------------------------------------------------------------------------------
+# -- cookies -----------------------------------------------------------------------------------------------------------
 
 
 def test_a_cookie_is_read_for_ninety_days_and_renewed_after_one() -> None:
@@ -214,7 +214,7 @@ def test_under_tls_the_cookie_is_bound_to_this_host() -> None:
     assert "Domain" not in given
 
 
-# -- invitations of another process ----------------------------------------------------------------------------------
+# -- invitations of another process ------------------------------------------------------------------------------------
 
 
 def test_an_invitation_laid_into_the_folder_is_taken_once_and_grows_old(tmp_path: Path) -> None:
@@ -244,14 +244,14 @@ def test_a_server_that_ended_is_not_found(tmp_path: Path) -> None:
     assert pending_invitations.running(tmp_path) is None
 
 
-# -- keys ------------------------------------------------------------------------------------------------------------
+# -- keys --------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     "keys",
     [{Role.OPERATOR: "short"}, {Role.OPERATOR: "ä" * 30}, {Role.OPERATOR: "x " * 20}, {Role.OPERATOR: "x" * 600}],
 )
-def test_a_weak_key_is_refused_and_not_told(keys: dict[Role, str]) -> None:
+def test_a_weak_key_is_refused_and_not_printed(keys: dict[Role, str]) -> None:
     with pytest.raises(BadKey) as why:
         keys_of(keys)
     assert keys[Role.OPERATOR] not in str(why.value)
@@ -278,7 +278,7 @@ def test_keys_come_from_the_environment_or_from_files_for_one_user(tmp_path: Pat
     assert keys_from({}).who("Bearer ") is None
 
 
-# -- names -----------------------------------------------------------------------------------------------------------
+# -- names -------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -293,7 +293,7 @@ def test_what_is_this_machine_alone(host: str, is_own: bool) -> None:
     assert Config(host=host).is_open is is_own
 
 
-def test_a_new_address_of_the_machine_is_found_and_asked_for_seldom() -> None:
+def test_a_new_address_of_the_machine_is_found_and_queried_seldom() -> None:
     now_s, addresses, looked = 0.0, {"192.168.4.1"}, 0
 
     def look_up() -> frozenset[str]:

@@ -1,4 +1,4 @@
-"""What the terminal says when a server starts."""
+"""The text in the terminal when a server starts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from server.tls.setup import SetupAddresses
 from server.vehicle.vehicle import Vehicle
 
 FINGERPRINT = ":".join(f"{n:02X}" for n in range(32))
-PAIRING = Pairing(token="a-token-that-nobody-guesses", pin="012345", minutes=10)
+PAIRING = Pairing(token="a-token-that-is-random", pin="012345", minutes=10)
 FIELD = Announcement(
     config=Config(host="0.0.0.0", vehicles=(Vehicle(name="car", address="ws://10.0.0.1:9090"),)),
     url="https://192.168.4.1:8000/",
@@ -26,8 +26,8 @@ FIELD = Announcement(
 )
 
 
-def text(said: Announcement, *, draws: bool = False) -> str:
-    return "\n".join(lines(said, draws=draws))
+def text(announcement: Announcement, *, draws: bool = False) -> str:
+    return "\n".join(lines(announcement, draws=draws))
 
 
 def test_the_first_line_is_for_scripts() -> None:
@@ -35,20 +35,20 @@ def test_the_first_line_is_for_scripts() -> None:
 
 
 def test_a_person_gets_addresses_fingerprint_codes_and_pin() -> None:
-    said = text(FIELD, draws=True)
+    printed = text(FIELD, draws=True)
     for part in ("http://192.168.4.1:8001/", "https://pit.local:8000/", "catgraph pit 1A2B", "PIN 012345", "10 min"):
-        assert part in said
-    assert all(line in said for line in fingerprint_lines(FINGERPRINT))
-    assert sum("▀" in line or "▄" in line for line in said.splitlines()) > 20  # two codes
-    assert "203.0.113.5" in said
+        assert part in printed
+    assert all(line in printed for line in fingerprint_lines(FINGERPRINT))
+    assert sum("▀" in line or "▄" in line for line in printed.splitlines()) > 20  # two codes
+    assert "203.0.113.5" in printed
 
 
 def test_a_log_gets_neither_pin_nor_token_nor_codes() -> None:
-    said = text(FIELD)
-    assert "012345" not in said
-    assert "a-token" not in said
-    assert "▀" not in said
-    assert "catgraph pair" in said
+    printed = text(FIELD)
+    assert "012345" not in printed
+    assert "a-token" not in printed
+    assert "▀" not in printed
+    assert "catgraph pair" in printed
 
 
 @pytest.mark.parametrize("text", ["http://192.168.4.1:8001/", f"https://192.168.4.1:8000/#pair={PAIRING.token}"])
@@ -68,23 +68,25 @@ def test_the_token_itself_stands_only_in_the_code() -> None:
     assert PAIRING.token not in text(FIELD, draws=True)
 
 
-def test_without_https_it_says_what_the_phone_will_lack() -> None:
-    said = text(Announcement(config=Config(host="0.0.0.0", tls=Tls(mode="off")), url="http://192.168.4.1:8000/"))
+def test_without_https_it_lists_what_the_phone_will_lack() -> None:
+    printed = text(Announcement(config=Config(host="0.0.0.0", tls=Tls(mode="off")), url="http://192.168.4.1:8000/"))
     for part in ("no position", "screen awake", "installs nothing", "shares files", "copies text", "eavesdrop"):
-        assert part in said
+        assert part in printed
 
 
 def test_on_this_machine_alone_there_is_nothing_to_lack_and_nobody_to_pair() -> None:
-    said = text(Announcement(config=Config(), url="http://127.0.0.1:8000/", pairing=PAIRING), draws=True)
-    assert "Only this machine can open it" in said
-    assert "Without HTTPS" not in said
-    assert "PIN" not in said
+    printed = text(Announcement(config=Config(), url="http://127.0.0.1:8000/", pairing=PAIRING), draws=True)
+    assert "Only this machine can open it" in printed
+    assert "Without HTTPS" not in printed
+    assert "PIN" not in printed
 
 
-def test_what_is_wrong_with_a_given_certificate_is_said() -> None:
+def test_a_fault_of_a_provided_certificate_is_reported() -> None:
     tls = Tls(mode="files", cert=Path("c"), key=Path("k"))
-    said = Announcement(config=Config(host="0.0.0.0", tls=tls), url="https://x/", warning="it expires on 2027-05-30")
-    assert "Warning: it expires on 2027-05-30." in text(said)
+    announcement = Announcement(
+        config=Config(host="0.0.0.0", tls=tls), url="https://x/", warning="it expires on 2027-05-30"
+    )
+    assert "Warning: it expires on 2027-05-30." in text(announcement)
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,9 @@ def test_the_client_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPat
         store.read_options(parsed("--store", "s3://b-1"), LOGIN)
 
 
-def test_a_server_without_a_login_says_so(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_without_a_login_reports_it(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in LOGIN:
         monkeypatch.delenv(name, raising=False)
     assert main(["serve", "--store", "s3://b-1", "--store-key", "/nowhere.toml"]) == 2

@@ -28,12 +28,12 @@ def read(*typed: str) -> Tls | None:
         (("--tls", "auto", "--setup-port", "0"), Tls(mode="auto", setup_port=0)),
     ],
 )
-def test_what_can_be_asked_for(typed: tuple[str, ...], tls: Tls | None) -> None:
+def test_possible_options(typed: tuple[str, ...], tls: Tls | None) -> None:
     assert read(*typed) == tls
 
 
 @pytest.mark.parametrize("typed", [("on",), ("c.pem",), ("c.pem", "k.pem", "x"), ("auto", "off", "x")])
-def test_what_cannot_is_said(typed: tuple[str, ...]) -> None:
+def test_impossible_options_are_refused_with_a_reason(typed: tuple[str, ...]) -> None:
     with pytest.raises(ValueError, match="takes auto, off, or two files"):
         read("--tls", *typed)
 

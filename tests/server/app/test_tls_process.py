@@ -95,12 +95,12 @@ async def test_a_device_that_does_not_is_turned_away(served: Field) -> None:
 
 
 async def test_the_plain_page_may_try_whether_https_succeeds_and_learns_no_more(served: Field) -> None:
-    asked = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}
+    headers = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}
     async with served.client() as client:
-        answer = await client.get("/trusted", headers=asked)
+        answer = await client.get("/trusted", headers=headers)
         assert (answer.status_code, answer.content) == (204, b"")
         assert answer.headers["cross-origin-resource-policy"] == "cross-origin"
-        assert (await client.get("/api/health", headers=asked)).status_code == 403
+        assert (await client.get("/api/health", headers=headers)).status_code == 403
         assert (await client.post("/trusted")).status_code in (403, 404, 405)
         assert (await client.get("/trusted/x")).status_code == 404
 
@@ -269,19 +269,19 @@ async def test_a_given_certificate_is_served_and_plain_http_is_led_to_it(tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("config", "words"),
+    ("config", "text"),
     [
         (Config(host="0.0.0.0"), "needs a data folder"),
         (Config(tls=Tls(mode="files", cert=Path("/nowhere/c.pem"), key=Path("/nowhere/k.pem"))), "cannot be read"),
         (Config(tls=Tls(mode="files", cert=Path("/nowhere/c.pem"))), "needs its key"),
     ],
 )
-def test_what_cannot_be_secured_is_said(config: Config, words: str) -> None:
-    with pytest.raises(TlsRefused, match=words):
+def test_what_cannot_be_secured_is_reported(config: Config, text: str) -> None:
+    with pytest.raises(TlsRefused, match=text):
         secure(config)
 
 
-def test_plain_http_is_asked_for_by_nothing_on_loopback_and_by_off_elsewhere(tmp_path: Path) -> None:
+def test_plain_http_is_the_default_on_loopback_and_by_off_elsewhere(tmp_path: Path) -> None:
     assert secure(Config(data=tmp_path)) is None
     assert secure(Config(data=tmp_path, host="0.0.0.0", tls=Tls(mode="off"))) is None
     assert secure(Config(data=tmp_path, host="0.0.0.0", limits=Limits())) is not None

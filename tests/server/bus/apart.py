@@ -30,7 +30,7 @@ class Apart:
         return ("ip", "netns", "exec", self.name)
 
     async def swallow(self, for_s: float) -> None:
-        """Nothing gets through, either way, and nobody is told."""
+        """Nothing gets through in either direction, and no side is notified."""
         for where in ((), self.within):
             _run(*where, "tc", "qdisc", "add", "dev", self.name, "root", "blackhole")
         try:

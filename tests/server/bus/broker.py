@@ -50,7 +50,7 @@ class Broker:
     """One nats-server on a port of its own, which it keeps when it starts again."""
 
     def __init__(self, *, include: Path | None = None, store: Path | None = None, host: str = "127.0.0.1") -> None:
-        """`include`: a configuration that it includes, and reads again when it is told to.
+        """`include`: a configuration that it includes, and reads again on a signal.
 
         `store`: the folder of JetStream; None: without it.
         """
@@ -119,7 +119,7 @@ async def running_broker(
 
 
 async def _quiet(_: Exception) -> None:
-    """What a client says of a broker that a test has killed."""
+    """The errors of a client whose broker a test has killed."""
 
 
 @contextlib.asynccontextmanager

@@ -38,7 +38,7 @@ class Buses:
         self.commands: list[Any] = []
 
     async def answer(self, command: Any) -> dict[str, Any]:
-        """The session of each vehicle: it notes the command as an event, and waits where it is told to."""
+        """The session of each vehicle: it notes the command as an event, and waits where the command has a wait."""
         self.commands.append(command)
         await asyncio.sleep(command.get("takes_s", 0.0))
         if text := command.get("notes"):
@@ -98,7 +98,7 @@ async def node(address: str, clock: Clock, *, read: Read = as_it_is, **more: Any
 
 @contextlib.asynccontextmanager
 async def nats_buses(agent_at: str, node_at: str) -> AsyncIterator[Buses]:
-    """The node is there first, as it hears an agent that starts."""
+    """The node is there first, to receive the messages of an agent that starts."""
     async with local_buses() as both, node(node_at, both.clock) as page:
         async with offering(both.session, agent_at, "run-1", both.clock):
             await until(lambda: set(page.vehicles) == set(VEHICLES))

@@ -44,7 +44,7 @@ class Part:
 
 @contextlib.asynccontextmanager
 async def parts(folder: Path, *, guarded: Path | None = None) -> AsyncIterator[tuple[Broker, dict[str, Part]]]:
-    """`guarded`: the car has a guard, and this file says what became of it."""
+    """`guarded`: the car has a guard, and this file has what became of it."""
     car_of = (str(guarded),) if guarded else simulate()
     module = "tests.server.bus.guarded_car" if guarded else "server"
     users: list[tuple[str, broker_users.Kind]] = [("ocelot", "agent"), *((node, "web") for node in NODES)]

@@ -26,8 +26,8 @@ async def drive(file: TextIO) -> None:
     service = CarService(scenarios=silent, has_stopper=False)  # only through the guard is it driven
     guard = Guard()
 
-    def note(**said: Any) -> None:
-        file.write(json.dumps({"at_ms": time.time() * 1000, **said}) + "\n")
+    def note(**fields: Any) -> None:
+        file.write(json.dumps({"at_ms": time.time() * 1000, **fields}) + "\n")
         file.flush()
 
     def hear(topic: str, _: str, message: Mapping[str, Any]) -> None:

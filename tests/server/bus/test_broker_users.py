@@ -157,7 +157,7 @@ async def test_a_withdrawn_key_is_sent_away_and_a_returned_one_serves_again(tmp_
         async with linked(node, broker, room_key), linked(agent, broker, key) as link:
             assert link.complaint is not None
             await until(lambda: node.vehicles and node.trouble("ocelot") is None)
-            await asks(lambda: node)
+            await requests(lambda: node)
             assert link.complaint is None
 
             withdrawn = broker_users.read(tmp_path)
@@ -173,10 +173,10 @@ async def test_a_withdrawn_key_is_sent_away_and_a_returned_one_serves_again(tmp_
             broker_users.write(tmp_path, withdrawn)
             broker.reload()
             await until(lambda: link.complaint is None and node.trouble("ocelot") is None)
-            await asks(lambda: node)
+            await requests(lambda: node)
 
 
-async def asks(node: Callable[[], NatsBus]) -> None:
+async def requests(node: Callable[[], NatsBus]) -> None:
     async with asyncio.timeout(10):
         while True:
             with contextlib.suppress(NotServed):
@@ -203,13 +203,13 @@ async def test_a_link_outlives_its_broker(tmp_path: Path) -> None:
                 await broker.start()
                 await until(lambda: node.trouble("ocelot") is None)
                 assert node.trouble("margay") == "The agent of margay has sent nothing since the server started."
-                await asks(lambda: node)
+                await requests(lambda: node)
                 await broker.kill()
                 await until(lambda: node.trouble("ocelot"))
 
 
-async def test_what_the_broker_refuses_is_said_while_the_connection_stands(tmp_path: Path) -> None:
-    """An agent with the key of another car: it is connected, and its own car is never heard."""
+async def test_what_the_broker_refuses_is_reported_while_connected(tmp_path: Path) -> None:
+    """An agent with the key of another car: it is connected, and nothing of its own car arrives."""
     async with fleet(tmp_path) as (broker, seeds), local_buses() as both:
         agent = NatsAgent(both.session, run="run-1", now=both.clock)  # of ocelot and margay
         async with linked(agent, broker, key_file(tmp_path, "ocelot", seeds["ocelot"])) as link:
@@ -226,7 +226,7 @@ async def test_what_the_broker_refuses_is_said_while_the_connection_stands(tmp_p
 
 
 async def test_a_car_that_a_wildcard_silently_leaves_out_is_shown_as_missing(tmp_path: Path) -> None:
-    """A node may hear all cars but one: its subscription is accepted, and nothing ever says that one is left out."""
+    """A node may receive all cars but one: its subscription is accepted, and no error shows that one is left out."""
     async with fleet(tmp_path) as (broker, seeds), local_buses() as both:
         conf = tmp_path / broker_users.CONF
         allowed = '["veh.*.events","veh.*.here","_INBOX.>"]'
@@ -246,7 +246,7 @@ async def test_a_car_that_a_wildcard_silently_leaves_out_is_shown_as_missing(tmp
             await until(lambda: node.trouble("ocelot") is None)
             assert node.trouble("margay") == "The agent of margay has sent nothing since the server started."
             assert set(node.vehicles) == {"ocelot", "margay"}
-            assert (link.complaint, link.refused) == (None, None), "the broker says nothing of it"
+            assert (link.complaint, link.refused) == (None, None), "the broker does not report it"
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # as above
@@ -263,7 +263,7 @@ async def test_over_tls_the_broker_proves_who_it_is(tmp_path: Path) -> None:
         for given, is_well in (
             (BrokerAddress(address=address, key=key, authority=authority), True),
             (BrokerAddress(address=address, key=key), False),
-            (BrokerAddress(address=broker.address, key=key), False),  # nor is a wish for less followed
+            (BrokerAddress(address=broker.address, key=key), False),  # nor is a request for less followed
         ):
             assert ("certificate" in await outcome(given)) is not is_well
 

@@ -41,7 +41,7 @@ async def test_a_page_of_a_node_catches_up(events: int, within_s: float, late_s:
             ages_s: list[float] = []
             async with running(*agent_at):
                 begun_s = time.monotonic()
-                # It is sent away once, when the node hears that the agent has begun anew, and dials again.
+                # It is disconnected once, when the node learns that the agent has started anew, and dials again.
                 while have + len(numbers) <= last or not ages_s:
                     async with viewer(node.address, vehicle="ocelot", have_event=have + len(numbers)) as page:
                         missing = last - have - len(numbers)

@@ -81,7 +81,7 @@ async def test_a_frame_that_was_not_replaced_is_outdated(opened: Opened) -> None
         await until(lambda: both.page.newest("ocelot", "state"))
         both.clock.ahead_s += FRAME_LIVES_S + 0.1
         assert both.page.newest("ocelot", "state") is None
-        await asyncio.sleep(0.05)  # a bus that asks again is not given the same once more as new
+        await asyncio.sleep(0.05)  # a bus that requests again does not get the same once more as new
         assert both.page.newest("ocelot", "state") is None
 
 

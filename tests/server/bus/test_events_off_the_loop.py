@@ -51,7 +51,7 @@ class Disk:
 
     async def settled(self) -> None:
         await self.thread.run(lambda: None)
-        await asyncio.sleep(0)  # what the thread asked the loop to call
+        await asyncio.sleep(0)  # what the thread scheduled on the loop
         await asyncio.sleep(0)
 
     def stored(self) -> int:

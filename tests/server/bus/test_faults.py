@@ -52,12 +52,12 @@ async def person(node: Part, name: str, history: History) -> None:
         status = None
         with contextlib.suppress(httpx.HTTPError):
             async with httpx.AsyncClient(base_url=node.process.address, timeout=6.0) as client:
-                asked: dict[str, Any] = {"params": {"vehicle": "ocelot"}, "headers": {"x-catgraph-name": order}}
+                options: dict[str, Any] = {"params": {"vehicle": "ocelot"}, "headers": {"x-catgraph-name": order}}
                 if name == "Ann":
                     values = {"speed_limit.max_mps": 20 + n % 1000 / 100}
-                    answer = await client.patch("/api/settings", json={"values": values}, **asked)
+                    answer = await client.patch("/api/settings", json={"values": values}, **options)
                 else:
-                    answer = await client.post("/api/pause" if n % 2 == 0 else "/api/resume", **asked)
+                    answer = await client.post("/api/pause" if n % 2 == 0 else "/api/resume", **options)
                 status = answer.status_code
         history.orders.append(Order(name=order, sent_ms=sent_ms, status=status))
         await asyncio.sleep(EVERY_S)
@@ -123,7 +123,7 @@ async def test_nothing_is_lost_doubled_late_or_old(rounds: int, tmp_path: Path) 
 
 
 def _by(event: dict[str, Any]) -> str:
-    """Who ordered it: these programs sign nothing, and the agent says so."""
+    """Who ordered it: these programs sign nothing, and the agent reports it."""
     return str(event["by"]).removesuffix(" (not signed)")
 
 

@@ -111,8 +111,8 @@ def test_what_memory_cannot_hold_any_more_is_counted_as_lost(tmp_path: Path) -> 
     journal.close()
 
 
-def test_a_full_database_goes_on_in_memory_and_says_so(tmp_path: Path) -> None:
-    """SQLite's own limit of pages says what a full disk says."""
+def test_a_full_database_continues_in_memory_and_reports_it(tmp_path: Path) -> None:
+    """SQLite's own limit of pages raises the error of a full disk."""
     journal = Journal(tmp_path / "events.sqlite")
     assert journal._database is not None
     (pages,) = journal._database.execute("PRAGMA page_count").fetchone()
@@ -158,17 +158,17 @@ def test_kill_9_in_the_middle_of_an_append_loses_nothing_that_was_kept(tmp_path:
             stdout=subprocess.PIPE, text=True, cwd=ROOT,
         )  # fmt: skip
         assert process.stdout is not None
-        said = [int(process.stdout.readline()) for _ in range(3)]
+        printed = [int(process.stdout.readline()) for _ in range(3)]
         time.sleep(chance.uniform(0.0, 0.12))
         process.send_signal(signal.SIGKILL)
         rest = process.stdout.read().split("\n")
         process.wait()
         process.stdout.close()
-        said += [int(line) for line in rest[:-1] if line.strip()]  # the last may be cut off
+        printed += [int(line) for line in rest[:-1] if line.strip()]  # the last may be cut off
         journal = Journal(path)
         assert journal.complaint is None
         assert journal.trouble is None
-        assert journal.last("car") >= said[-1]
+        assert journal.last("car") >= printed[-1]
         found = journal.after("car", total, 10**6)
         assert numbers(found) == list(range(total + 1, journal.last("car") + 1))
         assert all(one["text"] == "x" * (one["at_ms"] * 37 % 400) for one in found)
@@ -271,7 +271,7 @@ def test_a_file_that_may_only_be_read_goes_on_with_its_numbers(tmp_path: Path) -
     journal.close()
 
 
-def test_two_servers_on_one_log_are_told_and_nothing_is_overwritten(tmp_path: Path) -> None:
+def test_two_servers_on_one_log_are_reported_and_nothing_is_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "events.sqlite"
     one, other = Journal(path), Journal(path)
     one.append("car", [event(1, text="of one")])
@@ -287,14 +287,14 @@ def test_one_alarm_is_found_by_an_index() -> None:
     """A log of years is not read through for where an alarm is active."""
     journal = Journal(None)
     assert journal._database is not None
-    asked: list[str] = []
-    journal._database.set_trace_callback(asked.append)
+    queries: list[str] = []
+    journal._database.set_trace_callback(queries.append)
     journal.find("car", alarm="hot", before=9)
     journal.find("car", alarm="")
     journal.alarms("car")
     journal._database.set_trace_callback(None)
-    assert len(asked) == 3
-    for query in asked:
+    assert len(queries) == 3
+    for query in queries:
         plan = journal._database.execute(f"EXPLAIN QUERY PLAN {query}").fetchall()
         assert "event_of_alarm (vehicle=? AND alarm" in plan[0][3]
         assert len(plan) == 1, "it sorts"

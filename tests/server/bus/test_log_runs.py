@@ -34,10 +34,10 @@ class Page:
         assert node is not None
         self._process = subprocess.Popen([node, str(PAGE)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
-    def ask(self, **asked: Any) -> dict[str, Any]:
+    def ask(self, **request: Any) -> dict[str, Any]:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._process.stdin.write(f"{json.dumps(asked)}\n")
+        self._process.stdin.write(f"{json.dumps(request)}\n")
         self._process.stdin.flush()
         answer: dict[str, Any] = json.loads(self._process.stdout.readline())
         return answer
@@ -88,7 +88,7 @@ class World:
         self.moments = itertools.count(1)
         self.born = self.left = 0  # moments: the page's first greeting, and when it was last connected
         self.is_connected = False
-        self.told: list[str] = []
+        self.announced: list[str] = []
         self.named: dict[tuple[str, int], str] = {}  # which event a number of a run was
 
     def step(self, kind: str, amount: int) -> None:
@@ -121,13 +121,13 @@ class World:
     def connect(self) -> None:
         self.leave()
         runs, last = LogRuns(self.log.runs[:-1], self.log.runs[-1]), len(self.log.texts)
-        said = self.page.ask(hello={"boot": self.log.run, "last_event": last, "resumes": True})
+        hello = self.page.ask(hello={"boot": self.log.run, "last_event": last, "resumes": True})
         self.is_connected = True
         self.born = self.born or next(self.moments)
-        if said["boot"] == self.log.run:
-            self.take(self.log.events(said["have_event"]))
+        if hello["boot"] == self.log.run:
+            self.take(self.log.events(hello["have_event"]))
         else:
-            found = runs.resume("car", said["boot"], said["have_event"], last)
+            found = runs.resume("car", hello["boot"], hello["have_event"], last)
             self.take(self.log.events(found.after), {"common": found.common, "new_after": found.new_after})
         self.check()
 
@@ -135,18 +135,18 @@ class World:
         for event in events:
             assert self.named.setdefault((self.log.run, event["n"]), event["text"]) == event["text"]
         answer = self.page.ask(events=events, **({"resumed": resumed} if resumed else {}))
-        self.told += answer["fresh"]
+        self.announced += answer["fresh"]
         self.rows = answer["rows"]
 
     def check(self) -> None:
         log = self.log.texts
-        assert len(set(self.told)) == len(self.told), "none is announced again"
+        assert len(set(self.announced)) == len(self.announced), "none is announced again"
         assert self.rows == log[len(log) - len(self.rows) :], "the page has the log as it is, without a hole"
         since = [text for text in log if int(text) > self.born]
         assert set(since[-SENT_ANEW:]) <= set(self.rows)
         began = self.log.runs[-1].before["car"]
         new = {text for text in since if int(text) > self.left} | set(log[began:]) & set(since)
-        assert new <= set(self.told), "what happened while it was away is announced"
+        assert new <= set(self.announced), "what happened while it was away is announced"
 
 
 STEPS = st.tuples(

@@ -1,4 +1,4 @@
-"""A program with a web node's credentials that lies about who asks: what the agent of a car makes of it."""
+"""A program with a web node's credentials that lies about who sent a command: what the agent does with it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PAGE = "0123abcd"
 
 
 class LyingNode:
-    """Says what it likes, as the broker lets it."""
+    """Sends anything, as far as the broker allows it."""
 
     def __init__(self, client: Client) -> None:
         self._client = client

@@ -28,7 +28,7 @@ LATE_S = 1.2
 
 @contextlib.asynccontextmanager
 async def over_radio() -> AsyncIterator[tuple[Broker, Radio, Buses]]:
-    """The node hears the broker through a radio that can be cut."""
+    """The node is connected to the broker through a radio that can be cut."""
     async with running_broker() as broker:
         radio = Radio(broker.port)
         async with radio.on_air() as air, nats_buses(broker.address, air.replace("http", "nats")) as both:
@@ -104,9 +104,9 @@ async def test_a_command_whose_time_ran_out_while_its_signature_was_judged_is_no
 
     async with local_buses() as both:
         agent = NatsAgent(both.session, run="run-1", now=both.clock, admit=slow)
-        asked = wire.Ask(do="command", command={"what": 1}, not_after_s=both.clock() + 3, run="run-1")
+        ask = wire.Ask(do="command", command={"what": 1}, not_after_s=both.clock() + 3, run="run-1")
         with pytest.raises(NotServed, match="the command reached ocelot too late and was not carried out") as why:
-            await agent._command("ocelot", asked)
+            await agent._command("ocelot", ask)
         assert (why.value.outcome, both.commands) == ("not_delivered", [])
 
 
@@ -199,7 +199,7 @@ async def test_a_flood_of_pulls_is_bounded() -> None:
             assert (await both.page.request("ocelot", {"what": 1}, deadline_s=10.0))["got"] == 1
 
 
-async def test_a_page_that_knew_one_car_hears_of_the_next() -> None:
+async def test_a_page_with_one_car_gets_the_next() -> None:
     clock, kinds = Clock(), list[str]()
     summary = '{"worst": null, "waiting": 0, "phase": "monitoring"}'
 
@@ -219,7 +219,7 @@ async def test_a_page_that_knew_one_car_hears_of_the_next() -> None:
             await agents.enter_async_context(offering(bus, broker.address, f"run of {vehicle}", clock))
             await until(lambda vehicle=vehicle: vehicle in page.vehicles)
             if vehicle == "ocelot":
-                assert (await page.request(vehicle, {}))["ok"], "what was pulled would have been asked for before"
+                assert (await page.request(vehicle, {}))["ok"], "what was pulled would have been requested before"
                 assert not bus.watched(ALL), "one car is no list, and its summary is of no use"
         for vehicle, bus in buses.items():
             await until(lambda bus=bus: bus.watched(ALL))
@@ -237,7 +237,7 @@ async def test_which_part_was_lost_is_known_for_each_command() -> None:
         both.session.request = slow  # type: ignore[method-assign,assignment]
         with pytest.raises(NotServed) as why:
             await both.page.request("ocelot", {"what": 1})
-        assert why.value.outcome == "unknown", "as the agent says of its own session"
+        assert why.value.outcome == "unknown", "as the agent states of its own session"
         await broker.kill()
         await until(lambda: both.page.trouble("ocelot"))
         both.clock.ahead_s = -1.0
@@ -263,13 +263,13 @@ async def test_an_agent_with_another_log_is_followed_in_it() -> None:
                 await until(lambda run=run: page.run("ocelot") == run)
                 bus.append("ocelot", [event(f"{run} {n}", change="attention") for n in range(count)])
                 await until(lambda count=count: page.last_event("ocelot") == count)
-                await until(lambda run=run, count=count: told(log)[-1:] == [f"{run} {count - 1}"])
+                await until(lambda run=run, count=count: logged(log)[-1:] == [f"{run} {count - 1}"])
                 if run == "run-2":
                     assert await page.resume("ocelot", "run-1", 3) == Resumed(common=0, after=0, new_after=0)
                     found = await page.events_after("ocelot", 0)
                     assert [one["text"] for one in found] == [f"run-2 {n}" for n in range(5)]
-        assert told(log) == [*(f"run-1 {n}" for n in range(3)), *(f"run-2 {n}" for n in range(5))]
+        assert logged(log) == [*(f"run-1 {n}" for n in range(3)), *(f"run-2 {n}" for n in range(5))]
 
 
-def told(log: FleetLog) -> list[str]:
+def logged(log: FleetLog) -> list[str]:
     return [one["text"] for one in log.after(0)[1]]

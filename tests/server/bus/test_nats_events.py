@@ -14,7 +14,7 @@ def events(*numbers: int) -> list[dict[str, Any]]:
     return [{"n": n} for n in numbers]
 
 
-def test_an_older_word_of_the_same_run_takes_nothing_back() -> None:
+def test_an_older_message_of_the_same_run_takes_nothing_back() -> None:
     cache = EventCache()
     cache.begin("a", 9)
     assert cache.take(events(10, 11))
@@ -24,7 +24,7 @@ def test_an_older_word_of_the_same_run_takes_nothing_back() -> None:
 
 @pytest.mark.parametrize("last", [3, 51, 60])
 def test_nothing_of_another_run_is_taken_for_this_one(last: int) -> None:
-    """Its log may be another one, restored and grown since; who reads on asks where."""
+    """Its log may be another one, restored and grown since; a reader requests where to go on."""
     cache = EventCache()
     cache.begin("a", 50)
     cache.take(events(51))
@@ -43,7 +43,7 @@ def test_a_frame_of_no_sensible_age_is_refused(more: str) -> None:
         wire.decode_frame(b'{"run": "a", "number": 1, "now_s": 1.0, %s}\nx' % more.encode())
 
 
-def test_more_events_than_were_asked_for_are_refused() -> None:
+def test_more_events_than_were_requested_are_refused() -> None:
     body = wire.encode(wire.Events.model_construct(run="a", events=events(*range(wire.PORTION + 1))))
     with pytest.raises(wire.Malformed):
         wire.decode(wire.Events, body)

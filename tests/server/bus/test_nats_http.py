@@ -1,4 +1,4 @@
-"""Requests for what an agent keeps, over a real broker: whole, in order, once, and given up with who asked."""
+"""Requests for what an agent keeps, over a real broker: whole, in order, once, and given up with the client."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ def part(at: int, size: int) -> bytes:
 
 
 class Kept:
-    """An application as an agent has one: it notes what it was asked, and answers by the path."""
+    """An application as an agent has one: it notes the requests, and answers by the path."""
 
     def __init__(self) -> None:
-        self.asked: list[tuple[str, bytes]] = []
+        self.requests: list[tuple[str, bytes]] = []
         self.made = 0  # bytes that were taken from it
         self.ended = 0
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         body = (await receive())["body"]
-        self.asked.append((f"{scope['method']} {scope['path']}", body))
+        self.requests.append((f"{scope['method']} {scope['path']}", body))
         try:
             await send({"type": "http.response.start", "status": 200, "headers": [(b"x", b"y")]})
             size = int(scope["path"].rpartition("/")[2] or 0)
@@ -60,7 +60,7 @@ def scope_of(begin: http.Begin) -> dict[str, Any]:
     return {"type": "http", "method": begin.method, "path": begin.path}
 
 
-def asked(path: str, method: str = "GET", role: str = "operator") -> http.Begin:
+def begin_of(path: str, method: str = "GET", role: str = "operator") -> http.Begin:
     return http.Begin(id=new_id(), method=method, path=path, sender=http.Sender(id="a", role=role))
 
 
@@ -90,21 +90,21 @@ async def test_bodies_of_any_size_come_whole_and_in_order() -> None:
     app = Kept()
     async with both(app) as (node, _, _):
         for size in (0, 1, http.CHUNK, http.CHUNK + 1, LARGE):
-            got = await read(node, asked(f"/file/{size}"))
+            got = await read(node, begin_of(f"/file/{size}"))
             assert len(got) == size
             assert got == b"".join(part(at, size) for at in range(0, size, 100_000))
         sent = bytes(range(256)) * 800  # more than one message takes
-        assert await read(node, asked("/file/", "POST"), sent) == hashlib.sha256(sent).digest()
-        assert app.asked[-1] == ("POST /file/", sent)
+        assert await read(node, begin_of("/file/", "POST"), sent) == hashlib.sha256(sent).digest()
+        assert app.requests[-1] == ("POST /file/", sent)
         with pytest.raises(NotServed):
-            await read(node, asked("/file/", "POST"), bytes(http.MOST_PARTS * http.CHUNK + 1))
+            await read(node, begin_of("/file/", "POST"), bytes(http.MOST_PARTS * http.CHUNK + 1))
 
 
 @pytest.mark.field
-async def test_what_nobody_reads_is_not_made_and_ends_with_who_asked() -> None:
+async def test_what_nobody_reads_is_not_made_and_ends_with_the_client() -> None:
     app = Kept()
     async with both(app) as (node, agent, _):
-        async with node.call("ocelot", asked(f"/file/{100 * http.CHUNK}")) as answer:
+        async with node.call("ocelot", begin_of(f"/file/{100 * http.CHUNK}")) as answer:
             chunks = aiter(answer.chunks)
             await anext(chunks)
             await asyncio.sleep(0.3)
@@ -112,7 +112,7 @@ async def test_what_nobody_reads_is_not_made_and_ends_with_who_asked() -> None:
             await chunks.aclose()  # type: ignore[attr-defined]
         await until(lambda: app.ended == 1)
         assert not agent._answering
-        async with node.call("ocelot", asked(f"/waits/{2 * http.CHUNK}")) as answer:
+        async with node.call("ocelot", begin_of(f"/waits/{2 * http.CHUNK}")) as answer:
             chunks = aiter(answer.chunks)
             await anext(chunks)
             with pytest.raises(TimeoutError):
@@ -126,7 +126,7 @@ async def test_lost_messages_are_sent_again_and_a_request_is_carried_out_once() 
         request, lost = here.request, 0
 
         async def lossy(subject: str, payload: bytes, timeout: float) -> Any:
-            """Every third answer is lost: the agent got the message, and the node hears nothing."""
+            """Every third answer is lost: the agent got the message, and the node gets nothing."""
             nonlocal lost
             answer = await request(subject, payload, timeout=timeout)
             lost += 1
@@ -135,9 +135,9 @@ async def test_lost_messages_are_sent_again_and_a_request_is_carried_out_once() 
             return answer
 
         here.request = lossy  # type: ignore[method-assign, assignment]
-        got = await read(node, asked(f"/file/{8 * http.CHUNK}", "POST"), bytes(3 * http.CHUNK))
+        got = await read(node, begin_of(f"/file/{8 * http.CHUNK}", "POST"), bytes(3 * http.CHUNK))
         assert len(got) == 8 * http.CHUNK + 32
-        assert len(app.asked) == 1
+        assert len(app.requests) == 1
         assert lost > 8
         assert agent.refused == 0
 
@@ -146,21 +146,21 @@ async def test_a_failed_answer_a_role_that_may_not_and_too_much_at_once_are_told
     app = Kept()
     async with both(app) as (node, agent, _):
         with pytest.raises(BrokeOff):
-            await read(node, asked(f"/fails/{3 * http.CHUNK}"))
+            await read(node, begin_of(f"/fails/{3 * http.CHUNK}"))
         with pytest.raises(http.Refused, match="A viewer cannot"):
-            await read(node, asked("/file/1", role="viewer"))
+            await read(node, begin_of("/file/1", role="viewer"))
         async with contextlib.AsyncExitStack() as stack:
             for _ in range(12):
-                await stack.enter_async_context(node.call("ocelot", asked(f"/waits/{2 * http.CHUNK}")))
+                await stack.enter_async_context(node.call("ocelot", begin_of(f"/waits/{2 * http.CHUNK}")))
             with pytest.raises(http.Refused, match="too many requests"):
-                await read(node, asked("/file/1"))
+                await read(node, begin_of("/file/1"))
         await until(lambda: not agent._answering)
-        assert await read(node, asked("/file/1")) != b""
+        assert await read(node, begin_of("/file/1")) != b""
 
 
 async def test_a_flood_of_messages_is_bounded_and_what_is_given_up_still_ends() -> None:
     async with both(Kept()) as (node, agent, client):
-        begin = asked(f"/waits/{2 * http.CHUNK}")
+        begin = begin_of(f"/waits/{2 * http.CHUNK}")
         async with node.call("ocelot", begin):
             pull = http.pack(http.Pull(id=begin.id, n=99, have=0))
             for _ in range(MOST_TASKS + 100):
@@ -175,7 +175,7 @@ async def test_a_flood_of_messages_is_bounded_and_what_is_given_up_still_ends() 
 async def test_an_agent_that_goes_away_ends_what_it_answers() -> None:
     app = Kept()
     async with both(app) as (node, agent, _):
-        async with node.call("ocelot", asked(f"/file/{100 * http.CHUNK}")) as answer:
+        async with node.call("ocelot", begin_of(f"/file/{100 * http.CHUNK}")) as answer:
             chunks = aiter(answer.chunks)
             await anext(chunks)
             await agent.stop()
@@ -183,4 +183,4 @@ async def test_an_agent_that_goes_away_ends_what_it_answers() -> None:
                 async for _ in chunks:
                     pass
         with pytest.raises(NotServed, match="takes no such requests"):
-            await read(node, asked("/file/1"))
+            await read(node, begin_of("/file/1"))

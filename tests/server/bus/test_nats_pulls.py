@@ -1,4 +1,4 @@
-"""How often an agent is asked for frames."""
+"""How often a node requests frames of an agent."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from tests.server.bus.buses import until
 
 
 async def test_an_agent_that_answers_at_once_does_not_keep_the_node_busy() -> None:
-    asked = 0
+    requests = 0
 
     async def request(subject: str, body: bytes, timeout: float) -> Any:
-        nonlocal asked
-        asked += 1
+        nonlocal requests
+        requests += 1
         await asyncio.sleep(0)
-        head = wire.FrameHead(run="a", number=asked if asked % 2 else 0, now_s=1.0)
+        head = wire.FrameHead(run="a", number=requests if requests % 2 else 0, now_s=1.0)
         return SimpleNamespace(data=wire.encode_frame(head, "x"))
 
     now = asyncio.get_running_loop().time
@@ -30,8 +30,8 @@ async def test_an_agent_that_answers_at_once_does_not_keep_the_node_busy() -> No
     pulls = Pulls(questions, lambda *_: None, lambda *_: None, now=now)
     pulls.look("ocelot", "state", True)
     began_s = now()
-    await until(lambda: asked > 2 * MOST + 5)
+    await until(lambda: requests > 2 * MOST + 5)
     took_s = now() - began_s
-    assert asked <= MOST * (took_s + 1) + 5
-    assert took_s >= 1.9, "the third hundred is not asked before the third second"
+    assert requests <= MOST * (took_s + 1) + 5
+    assert took_s >= 1.9, "the third hundred is not requested before the third second"
     await pulls.stop()

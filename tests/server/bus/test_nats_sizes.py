@@ -108,8 +108,8 @@ async def test_a_frame_that_is_too_large_is_left_out_and_the_next_one_comes(capl
         both.page.watch("ocelot", lambda _: None)
         both.session.put("ocelot", "state", orjson.dumps({"x": LARGE}).decode())
         await until(lambda: "too_large_for_the_broker what=state frame vehicle=ocelot bytes=11" in caplog.text)
-        said = "The state frame of ocelot has 1100 kB, and the broker takes 900 kB: it is not sent to web nodes."
-        await until(lambda: both.page.trouble("ocelot") == said)
+        reason = "The state frame of ocelot has 1100 kB, and the broker takes 900 kB: it is not sent to web nodes."
+        await until(lambda: both.page.trouble("ocelot") == reason)
         both.session.put("ocelot", "state", "small")
         assert (await until(lambda: both.page.newest("ocelot", "state"))).payload == "small"
         assert both.page.trouble("ocelot") is None
@@ -126,9 +126,9 @@ async def test_a_broker_that_takes_less_gets_less_and_no_connection_ends(tmp_pat
             assert agent.unsent is None
             page.watch("ocelot", lambda _: None)
             both.session.put("ocelot", "state", "x" * SMALL)
-            said = "The state frame of ocelot has 200 kB, and the broker takes 199 kB: it is not sent to web nodes."
-            await until(lambda: page.trouble("ocelot") == said)
-            assert agent.unsent == said
+            reason = "The state frame of ocelot has 200 kB, and the broker takes 199 kB: it is not sent to web nodes."
+            await until(lambda: page.trouble("ocelot") == reason)
+            assert agent.unsent == reason
             both.session.put("ocelot", "state", "small")
             await until(lambda: page.newest("ocelot", "state"))
             assert page.trouble("ocelot") is None

@@ -1,4 +1,4 @@
-"""Orders that were held up on their way through the broker: none acts late, and each sender is told."""
+"""Orders that were held up on their way through the broker: none acts late, and each sender gets the reason."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def nats(address: str) -> str:
 
 
 async def given(both: Buses, number: int) -> NotServed | Mapping[str, Any]:
-    """What its sender is told."""
+    """The sender's answer."""
     try:
         return await both.page.request("ocelot", {"what": number}, deadline_s=30.0, comes_within_s=WITHIN_S)
     except NotServed as why:
@@ -90,14 +90,14 @@ async def given(both: Buses, number: int) -> NotServed | Mapping[str, Any]:
 
 
 async def served(both: Buses) -> None:
-    """The agent is heard, and takes an order."""
+    """The agent is connected, and takes an order."""
     async with asyncio.timeout(SOON_S):
         while await given(both, -1) != {"ok": True, "got": -1}:
             await asyncio.sleep(0.05)
 
 
 @pytest.mark.parametrize("place", PLACES)
-async def test_an_order_that_was_held_up_is_not_carried_out_and_its_sender_is_told(place: Place) -> None:
+async def test_an_order_that_was_held_up_is_not_carried_out_and_its_sender_is_notified(place: Place) -> None:
     await hold_up(place, (0.51, 10.0))
 
 
@@ -120,8 +120,8 @@ async def hold_up(place: Place, holds_s: Sequence[float]) -> None:
             await until(held.is_there)
             both.clock.ahead_s += hold_s
             held.let_go()
-            told = await asyncio.gather(*under_way)
-            for one in told:
+            answers = await asyncio.gather(*under_way)
+            for one in answers:
                 assert isinstance(one, NotServed), one
                 assert str(one) == "the command reached ocelot too late and was not carried out"
                 assert (one.outcome, one.cut) == ("not_delivered", None), "its agent answers"

@@ -119,7 +119,7 @@ def _control_of(state: dict[str, Any]) -> tuple[Made, str | None, int | None]:
 
 
 class Car:
-    """What its file says."""
+    """The content of its file."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -129,13 +129,13 @@ class Car:
 
     def speed_mps(self) -> float:
         tail = self._path.read_bytes()[-4000:].splitlines()
-        return next(float(said["speed_mps"]) for said in map(_read, reversed(tail)) if "speed_mps" in said)
+        return next(float(row["speed_mps"]) for row in map(_read, reversed(tail)) if "speed_mps" in row)
 
 
 def _read(line: bytes) -> dict[str, Any]:
     with contextlib.suppress(ValueError):
-        said = json.loads(line)
-        return said if isinstance(said, dict) else {}
+        row = json.loads(line)
+        return row if isinstance(row, dict) else {}
     return {}
 
 

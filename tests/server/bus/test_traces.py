@@ -37,7 +37,7 @@ class Logged:
         assert err is not None
         while "http" not in (line := (await out.readline()).decode()):
             assert line
-        self.address = next(word for word in line.split() if word.startswith("http")).rstrip("/")
+        self.address = next(part for part in line.split() if part.startswith("http")).rstrip("/")
         self._reading = asyncio.gather(self._read(err), self._drain(out))
         return self
 

@@ -17,15 +17,15 @@ from tests.tree import PROJECT
 
 
 @pytest.mark.parametrize(
-    ("host", "program", "said"),
+    ("host", "program", "printed"),
     [
         ("127.0.0.1", ".venv/bin/catgraph", "start `.venv/bin/catgraph demo --host 0.0.0.0`"),
         ("127.0.0.1", "/x/server/__main__.py", " -m server demo --host 0.0.0.0`"),
         ("0.0.0.0", "catgraph", "pair it as described above"),
     ],
 )
-def test_a_phone_gets_in_by_what_is_printed(host: str, program: str, said: str) -> None:
-    assert said in next_steps(host, program)[-1]
+def test_a_phone_gets_in_by_what_is_printed(host: str, program: str, printed: str) -> None:
+    assert printed in next_steps(host, program)[-1]
 
 
 def parsed(*given: str) -> argparse.Namespace:

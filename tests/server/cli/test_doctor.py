@@ -52,18 +52,18 @@ async def test_what_cannot_be_examined_is_one_sentence_and_exit_2() -> None:
 
     async with await asyncio.start_server(http, "127.0.0.1", 0) as page:
         port = page.sockets[0].getsockname()[1]
-        for address, word in (
+        for address, reason in (
             (f"127.0.0.1:{port}", "not a rosbridge"),
             ("127.0.0.1:1", "nothing listens"),
             ("http://127.0.0.1:11311", "ROS master"),
         ):
             code, out, err = await doctor(address)
             assert (code, out) == (2, "")
-            assert word in err
+            assert reason in err
             assert len(err.splitlines()) == 1
 
 
-async def test_a_car_with_a_foxglove_server_is_told_too() -> None:
+async def test_a_car_with_a_foxglove_server_is_listed_too() -> None:
     with peer() as car:
         car.offer("/odom", "nav_msgs/msg/Odometry", "cdr")
         car.offer("/fix", "foxglove.LocationFix", "json")

@@ -39,8 +39,8 @@ def test_every_format_lands_beside_you_under_the_recording_s_name(
     assert main(["export", str(drive), "--format", format]) == 0
     out = tmp_path / f"{ID}.{FORMATS[format].extension}"
     assert out.stat().st_size > 500
-    said = capsys.readouterr()
-    assert said.out.startswith(f"{out.name} (")
+    printed = capsys.readouterr()
+    assert printed.out.startswith(f"{out.name} (")
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["in", out.name])
     assert main(["export", str(drive), "--format", format]) == 2
     assert capsys.readouterr().err == f"catgraph export: {out.name} exists already: choose another file with --out.\n"
@@ -51,8 +51,8 @@ def test_a_ros_2_bag_is_made_of_a_drive_from_ros_2_and_of_no_other(
     drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["export", str(drive), "--format", "ros2"]) == 2
-    said = capsys.readouterr().err
-    assert said == ("catgraph export: This drive was recorded from ROS 1: export a ROS 1 bag.\n")
+    printed = capsys.readouterr().err
+    assert printed == ("catgraph export: This drive was recorded from ROS 1: export a ROS 1 bag.\n")
     bag = write_ros2(tmp_path / "drive", Drive(messages=[(0.0, "/n", "std_msgs/msg/Int32", {"data": 7})]))
     assert main(["export", str(bag), "--format", "ros2"]) == 0
     assert zipfile.ZipFile(tmp_path / "drive.ros2.zip").namelist() == ["drive/drive.mcap", "drive/metadata.yaml"]
@@ -85,7 +85,7 @@ def test_a_clip_is_a_recording(drive: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "reason"),
     [
         (["--format", "mcap"], "--format mcap cuts out the time around a moment: name it with --at."),
         (["--format", "bag", "--at", "nobody"], "--at nobody: that is no moment, and no alarm of that name"),
@@ -102,12 +102,12 @@ def test_a_clip_is_a_recording(drive: Path, tmp_path: Path) -> None:
         (["--format", "bag", "--out", f"in/{ID}.mcap"], "is the recording itself"),
     ],
 )
-def test_what_cannot_be_done_is_said(
-    drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
+def test_what_cannot_be_done_is_reported(
+    drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], reason: str
 ) -> None:
     before = drive.read_bytes()
     assert main(["export", str(drive), *arguments]) == 2
-    assert said in capsys.readouterr().err
+    assert reason in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["in"]
     assert drive.read_bytes() == before
 
@@ -122,7 +122,9 @@ def test_no_recording_and_no_position(tmp_path: Path, capsys: pytest.CaptureFixt
     )
 
 
-def test_what_is_damaged_is_left_out_and_said(drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_damaged_is_left_out_and_reported(
+    drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     spoilt = bytearray(drive.read_bytes())
     with drive.open("rb") as file:
         summary = make_reader(file).get_summary()

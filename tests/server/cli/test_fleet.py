@@ -12,17 +12,17 @@ from server.cli.main import main
 from tests.server.bus.broker import nats_server
 
 
-def fleet(folder: Path, *words: str) -> int:
-    return main(["fleet", "--folder", str(folder), *words])
+def fleet(folder: Path, *arguments: str) -> int:
+    return main(["fleet", "--folder", str(folder), *arguments])
 
 
 def test_add_prints_the_two_lines_and_keeps_no_secret(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert fleet(tmp_path, "add", "ocelot", "--broker", "tls://broker.example:4222") == 0
-    said = capsys.readouterr().out
-    seed = re.search(r"umask 077; echo (SU[A-Z2-7]{56}) > ocelot.key", said)
-    assert seed, said
-    assert "catgraph agent --broker tls://broker.example:4222 --key ocelot.key --vehicle ocelot=ws://" in said
-    assert "reload" in said
+    printed = capsys.readouterr().out
+    seed = re.search(r"umask 077; echo (SU[A-Z2-7]{56}) > ocelot.key", printed)
+    assert seed, printed
+    assert "catgraph agent --broker tls://broker.example:4222 --key ocelot.key --vehicle ocelot=ws://" in printed
+    assert "reload" in printed
     assert fleet(tmp_path, "add", "room", "--web") == 0
     assert "catgraph web --broker" in capsys.readouterr().out
     assert fleet(tmp_path, "list") == 0
@@ -36,8 +36,8 @@ def test_add_prints_the_two_lines_and_keeps_no_secret(tmp_path: Path, capsys: py
 
 
 def test_what_is_refused_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for words in (("add", "a b"), ("remove", "nobody"), ("add", "x.y", "--web")):
-        assert fleet(tmp_path, *words) == 2
+    for arguments in (("add", "a b"), ("remove", "nobody"), ("add", "x.y", "--web")):
+        assert fleet(tmp_path, *arguments) == 2
         assert re.fullmatch(r"catgraph: .*\.\n", capsys.readouterr().err)
     taken = tmp_path / "file"
     taken.write_text("")
@@ -46,7 +46,7 @@ def test_what_is_refused_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureF
 
 
 @pytest.mark.parametrize(
-    ("words", "why"),
+    ("arguments", "why"),
     [
         (["agent", "--broker", "http://x"], "no address of a broker"),
         (["agent", "--broker", "nats://x:port"], "no address of a broker"),
@@ -57,12 +57,12 @@ def test_what_is_refused_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureF
     ],
 )
 def test_agent_and_web_refuse_with_a_sentence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], why: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], why: str
 ) -> None:
-    assert main([*words, "--port", "0", "--data", str(tmp_path / "data")]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("catgraph: ")
-    assert why in said
+    assert main([*arguments, "--port", "0", "--data", str(tmp_path / "data")]) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith("catgraph: ")
+    assert why in printed
 
 
 def test_the_folder_may_be_read_by_the_broker(tmp_path: Path) -> None:

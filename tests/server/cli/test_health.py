@@ -21,13 +21,13 @@ from tests.server.conftest import serving
 BODY = b'{"status":"ok","version":"9.9.9","vehicles":{"car":"idle"}}'
 
 
-async def asked(*arguments: str) -> int:
+async def exit_code(*arguments: str) -> int:
     return await asyncio.to_thread(main, ["health", *arguments])
 
 
 async def test_a_server_without_https(capsys: pytest.CaptureFixture[str]) -> None:
     async with serving(Config()) as base:
-        assert await asked(base) == 0
+        assert await exit_code(base) == 0
     assert "ok" in capsys.readouterr().out
 
 
@@ -64,15 +64,15 @@ async def answering(tmp_path: Path) -> AsyncIterator[Answering]:
 async def test_on_this_machine_no_authority_need_be_known(
     answering: Answering, host: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert await asked(f"https://{host}:{answering.port}/") == 0
+    assert await exit_code(f"https://{host}:{answering.port}/") == 0
     assert "catgraph 9.9.9: ok" in capsys.readouterr().out
 
 
 async def test_who_names_an_authority_gets_it_looked_at(answering: Answering, tmp_path: Path) -> None:
     address = f"https://localhost:{answering.port}"
-    assert await asked(address, "--ca", str(answering.ca)) == 0
+    assert await exit_code(address, "--ca", str(answering.ca)) == 0
     (tmp_path / "other").mkdir()
-    assert await asked(address, "--ca", str(Answering(tmp_path / "other").ca)) == 1
+    assert await exit_code(address, "--ca", str(Answering(tmp_path / "other").ca)) == 1
 
 
 def test_elsewhere_the_authority_must_be_known() -> None:
@@ -84,30 +84,30 @@ def test_elsewhere_the_authority_must_be_known() -> None:
 @pytest.mark.parametrize("body", [b"", b"<html>", b"[1]", b'{"status":"starting"}'])
 async def test_another_answer_is_not_well(answering: Answering, body: bytes) -> None:
     answering.body = body
-    assert await asked(f"https://localhost:{answering.port}") == 1
+    assert await exit_code(f"https://localhost:{answering.port}") == 1
 
 
 async def test_an_authority_that_cannot_be_read_is_named(
     answering: Answering, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert await asked(f"https://localhost:{answering.port}", "--ca", "/nowhere/ca.crt") == 2
+    assert await exit_code(f"https://localhost:{answering.port}", "--ca", "/nowhere/ca.crt") == 2
     assert "/nowhere/ca.crt cannot be read" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("scheme", ["https", "http"])
-async def test_without_an_address_it_asks_this_machine_both_ways(
+async def test_without_an_address_it_requests_this_machine_both_ways(
     answering: Answering, monkeypatch: pytest.MonkeyPatch, scheme: str
 ) -> None:
     async with serving(Config()) as base:
         port = {"https": answering.port, "http": int(base.rpartition(":")[2])}[scheme]
         monkeypatch.setattr(health, "_HERE", tuple(f"{one}://127.0.0.1:{port}" for one in ("https", "http")))
-        assert await asked() == 0
+        assert await exit_code() == 0
 
 
-async def test_nobody_there_is_told_for_both(
+async def test_no_answer_is_reported_for_both(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     port = free_port()
     monkeypatch.setattr(health, "_HERE", tuple(f"{one}://127.0.0.1:{port}" for one in ("https", "http")))
-    assert await asked() == 1
+    assert await exit_code() == 1
     assert capsys.readouterr().err.count("does not answer") == 2

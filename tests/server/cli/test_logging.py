@@ -1,4 +1,4 @@
-"""One event is one line, whoever wrote the words in it."""
+"""One event is one line, whoever wrote the text in it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def written(message: str, *arguments: object, fault: BaseException | None = None
 
 
 @pytest.mark.parametrize(
-    ("said", "stands"),
+    ("text", "stands"),
     [
         ("/scan", "/scan"),
         ("Büro – 5 m², ü", "Büro – 5 m², ü"),
@@ -38,8 +38,8 @@ def written(message: str, *arguments: object, fault: BaseException | None = None
         ("x" * (LONGEST + 5), "x" * (LONGEST - len("ERROR catgraph.x: ")) + f"… ({LONGEST + 23} letters)"),
     ],
 )
-def test_a_message_is_one_line(said: str, stands: str) -> None:
-    assert written("%s", said) == f"ERROR catgraph.x: {stands}"
+def test_a_message_is_one_line(text: str, stands: str) -> None:
+    assert written("%s", text) == f"ERROR catgraph.x: {stands}"
 
 
 def test_no_line_of_a_trace_passes_for_a_line_of_the_log() -> None:

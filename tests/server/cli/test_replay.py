@@ -40,7 +40,7 @@ class Replay:
         self.lines: list[str] = []
 
     async def port(self) -> int:
-        """Reads what it prints until it says where it listens."""
+        """Reads what it prints until its address is in it."""
         assert self.process.stdout is not None
         while True:
             line = (await asyncio.wait_for(self.process.stdout.readline(), 20)).decode()
@@ -77,12 +77,12 @@ async def ending(*arguments: str | Path) -> tuple[int, str, str]:
 
 
 async def hear_all(probe: Probe) -> list[dict[str, Any]]:
-    """All messages until the bridge says goodbye."""
-    heard = []
+    """All messages until the bridge closes the connection."""
+    messages = []
     with contextlib.suppress(ConnectionClosed):
         while True:
-            heard.append(await probe.hear(10))
-    return heard
+            messages.append(await probe.hear(10))
+    return messages
 
 
 def as_sent(message: Any) -> Any:
@@ -115,11 +115,11 @@ async def replay_whole(file: Path, count: int) -> None:
             }
             for topic, type in types.items():
                 await probe.send(op="subscribe", topic=topic, type=type, queue_length=0)
-            heard = await hear_all(probe)
+            messages = await hear_all(probe)
         code, out, err = await replay.end()
     assert (code, err) == (0, "")
-    assert [(message["topic"], message["msg"]) for message in heard] == expected
-    assert len(heard) == count
+    assert [(message["topic"], message["msg"]) for message in messages] == expected
+    assert len(messages) == count
     shown = f"{count:,}".replace(",", " ")
     assert f"Played {shown} messages" in out
     assert f"{shown} sent to clients, 0 dropped" in out
@@ -158,7 +158,7 @@ async def test_spacing_is_that_of_the_drive(recordings: Path) -> None:
 
 @pytest.fixture
 def drive(tmp_path: Path) -> Path:
-    """A ROS 1 bag of half a second: /n counts to 50, /text says something once."""
+    """A ROS 1 bag of half a second: /n counts to 50, /text publishes once."""
     messages = [(n * 0.01, "/n", "std_msgs/msg/Int32", {"data": n}) for n in range(50)]
     return write_ros1(
         tmp_path / "short.bag", Drive(messages=[*messages, (0.2, "/text", "std_msgs/msg/String", {"data": "hi"})])
@@ -170,11 +170,11 @@ async def test_topics_can_be_renamed(drive: Path) -> None:
         async with probing(await replay.port()) as probe:
             await probe.subscribe("/count")
             await probe.subscribe("/said")
-            heard = await hear_all(probe)
+            messages = await hear_all(probe)
         code, out, _ = await replay.end()
     assert code == 0
-    assert {message["topic"] for message in heard} == {"/count", "/said"}
-    assert len(heard) == 51
+    assert {message["topic"] for message in messages} == {"/count", "/said"}
+    assert len(messages) == 51
     assert "/count (was /n)" in out
 
 
@@ -257,7 +257,7 @@ def write_foreign(folder: Path) -> dict[str, Sequence[str | Path]]:
 
 
 def complaint(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
-    """What it says, in this process, when it ends with exit code 2."""
+    """What it prints, in this process, when it ends with exit code 2."""
     parser = argparse.ArgumentParser()
     add_arguments(parser)
     try:
@@ -270,8 +270,8 @@ def complaint(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str
 
 def test_what_is_no_recording_gets_one_sentence_and_exit_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for why, names in write_foreign(tmp_path).items():
-        said = complaint(capsys, *(tmp_path / name for name in names))
-        assert re.fullmatch(rf"catgraph replay: \S+ [^\n]*{why}[^\n]*\n", said), said
+        printed = complaint(capsys, *(tmp_path / name for name in names))
+        assert re.fullmatch(rf"catgraph replay: \S+ [^\n]*{why}[^\n]*\n", printed), printed
 
 
 @pytest.mark.parametrize(
@@ -288,7 +288,7 @@ def test_what_is_no_recording_gets_one_sentence_and_exit_2(tmp_path: Path, capsy
         (["--host", "203.0.113.9"], "203.0.113.9 is not an address of this machine"),
     ],
 )
-def test_what_makes_no_sense_is_said_with_exit_2(
+def test_what_makes_no_sense_is_reported_with_exit_2(
     drive: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], why: str
 ) -> None:
     assert why in complaint(capsys, drive, *arguments)
@@ -322,7 +322,7 @@ async def test_damage_in_the_middle_is_said_after_what_was_good(tmp_path: Path) 
     assert json.loads(re.sub(" ", "", re.search(r"Played ([\d ]+) messages", out)[1])) > 100  # type: ignore[index]
 
 
-def test_what_is_damaged_is_said_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_damaged_is_reported_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = split(tmp_path, "mcap")
     (folder / "drive_1.mcap").unlink()
     with open_recording([folder]) as recording:

@@ -78,7 +78,7 @@ def simulator(*options: str) -> Iterator[Simulator]:
 
 
 def refused(*options: str) -> str:
-    """What the command says when it does not start."""
+    """What the command prints when it does not start."""
     ended = subprocess.run([*COMMAND, *options], cwd=PROJECT, capture_output=True, text=True, timeout=60, check=False)
     assert ended.returncode == 2
     assert ended.stdout == ""
@@ -96,8 +96,8 @@ def test_interrupted_it_ends_quietly_with_130() -> None:
 def test_a_taken_port_is_one_sentence_and_exit_2() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        said = refused("--port", str(port))
-    assert said == f"catgraph: Port {port} on 127.0.0.1 is already in use by another program.\n"
+        printed = refused("--port", str(port))
+    assert printed == f"catgraph: Port {port} on 127.0.0.1 is already in use by another program.\n"
 
 
 @pytest.mark.parametrize(
@@ -112,16 +112,16 @@ def test_a_taken_port_is_one_sentence_and_exit_2() -> None:
     ids=lambda value: str(value)[:30],
 )
 def test_what_cannot_be_is_one_sentence_and_exit_2(options: tuple[str, ...], part: str) -> None:
-    said = refused("--port", "0", *options)
-    assert said.startswith("catgraph: ")
-    assert part in said
-    assert said.count("\n") == 1
+    printed = refused("--port", "0", *options)
+    assert printed.startswith("catgraph: ")
+    assert part in printed
+    assert printed.count("\n") == 1
 
 
 def test_the_help_lists_every_scenario() -> None:
-    said = subprocess.run([*COMMAND, "--help"], cwd=PROJECT, capture_output=True, text=True, timeout=60, check=True)
+    ran = subprocess.run([*COMMAND, "--help"], cwd=PROJECT, capture_output=True, text=True, timeout=60, check=True)
     for name in ("speeding", "bridge-killed", "--scan-beams", "--scenario"):
-        assert name in said.stdout
+        assert name in ran.stdout
 
 
 def test_without_any_input_it_drives_on() -> None:

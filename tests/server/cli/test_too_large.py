@@ -19,7 +19,7 @@ def too_large(*_: object, **__: object) -> NoReturn:
 
 
 @pytest.mark.parametrize(("command", "more"), [(replay, ["--port", "0"]), (export, ["--format", "csv"])])
-def test_each_command_says_so_in_one_sentence(
+def test_each_command_reports_it_in_one_sentence(
     command: ModuleType, more: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip

@@ -36,7 +36,7 @@ def test_a_canned_state_is_one_of_the_protocol(name: str) -> None:
     [
         ("missing", lambda alarm: alarm.pop("verdict"), ValidationError),
         ("of another type", lambda alarm: alarm.update(for_s="2.3"), ValidationError),
-        ("no such word", lambda alarm: alarm.update(priority="urgent"), ValidationError),
+        ("no such value", lambda alarm: alarm.update(priority="urgent"), ValidationError),
         ("unknown", lambda alarm: alarm.update(colour="red"), AssertionError),
         ("unknown within", lambda alarm: alarm["measured"].update(digits=1), AssertionError),
     ],

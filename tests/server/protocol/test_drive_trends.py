@@ -55,7 +55,7 @@ def eight_hours() -> DriveTrends:
 def test_any_part_of_eight_hours_comes_within_0_3_s_and_60_kB(
     eight_hours: DriveTrends, part: tuple[float, float]
 ) -> None:
-    wanted = Wanted(signals=FOUR, from_s=part[0], to_s=part[1], buckets=500)  # as the page asks
+    wanted = Wanted(signals=FOUR, from_s=part[0], to_s=part[1], buckets=500)  # as the page requests
     began_s = time.process_time()
     found = orjson.dumps(answer(eight_hours, wanted, facts(EIGHT_HOURS_S, marks=1000)))
     took_s = time.process_time() - began_s

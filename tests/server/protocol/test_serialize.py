@@ -1,4 +1,4 @@
-"""What a page is told of an alarm."""
+"""What a page gets of an alarm."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from server.protocol import serialize
 from tests.monitor.test_alarm import SPEC
 
 
-def test_an_alarm_that_stands_and_is_not_checked_says_so() -> None:
+def test_an_active_alarm_that_is_not_checked_states_it() -> None:
     """A lost link neither clears an alarm nor lets it speak in the present."""
     check = replace(SPEC, on_delay_s=0.0, off_delay_s=1.0)
     one = Alarm(id="speed", spec=check)

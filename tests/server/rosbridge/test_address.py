@@ -98,8 +98,8 @@ REFUSED = {
     "no host but a path": ("ws:///x", "address", "names no host", None),
     "brackets around a name": ("[car]", "address", "not a host name", None),
     "open bracket": ("[fd00::1", "address", "not a host name", None),
-    "IPv6 with the port run on": ("[fd00::1]9090", "address", "told apart", None),
-    "two ports": ("car:9090:9091", "address", "told apart", None),
+    "IPv6 with the port run on": ("[fd00::1]9090", "address", "separated", None),
+    "two ports": ("car:9090:9091", "address", "separated", None),
     "port 0": ("car:0", "address", "Port 0", None),
     "port 65536": ("car:65536", "address", "port is not a number", None),
     "port abc": ("car:abc", "address", "port is not a number", None),
@@ -131,9 +131,9 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("typed", "code", "words", "suggestion"), REFUSED.values(), ids=REFUSED)
-def test_is_refused(typed: str, code: str, words: str, suggestion: str | None) -> None:
-    with pytest.raises(BadAddress, match=words) as refusal:
+@pytest.mark.parametrize(("typed", "code", "text", "suggestion"), REFUSED.values(), ids=REFUSED)
+def test_is_refused(typed: str, code: str, text: str, suggestion: str | None) -> None:
+    with pytest.raises(BadAddress, match=text) as refusal:
         parse(typed)
     assert refusal.value.code == code
     assert refusal.value.suggestion == suggestion

@@ -1,4 +1,4 @@
-"""What comes over the wire is a rosbridge operation, or is refused in few words; nothing else."""
+"""What comes over the wire is a rosbridge operation, or is refused with a short reason; nothing else."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_the_lax_reader_agrees_with_the_strict_one_on_whole_numbers() -> None:
 BAD = {
     "nothing": (b"", "text that is not JSON"),
     "noise": (b"\x00\x01\xff\xfe", "text that is not JSON"),
-    "words": (b"hello", "text that is not JSON"),
+    "no JSON": (b"hello", "text that is not JSON"),
     "cut off": (b'{"op":"publish","msg":{', "text that is not JSON"),
     "two objects": (b"{}{}", "text that is not JSON"),
     "not UTF-8": (b'{"a":"\xff"}', "text that is not JSON"),

@@ -44,7 +44,7 @@ DIAL = {
     "host down": (system_error(errno.EHOSTDOWN), "unreachable", "There is no route"),
     "firewall here": (system_error(errno.EPERM), "forbidden_here", "not allowed to dial"),
     "something else": (system_error(errno.EMFILE), "failed", "cannot be reached"),
-    "something without words": (OSError(), "failed", "cannot be reached"),
+    "something without text": (OSError(), "failed", "cannot be reached"),
     "a fault of ours": (RuntimeError("x" * 1000), "failed", "cannot be reached"),
 }
 DIAL_SECURE = {
@@ -94,19 +94,19 @@ def is_well_worded(problem: Problem) -> None:
     assert set(problem.as_json()) == {"code", "title", "hint", "mark"}
 
 
-@pytest.mark.parametrize(("error", "code", "words"), DIAL.values(), ids=DIAL)
-def test_dialling_failed(error: BaseException, code: str, words: str) -> None:
+@pytest.mark.parametrize(("error", "code", "text"), DIAL.values(), ids=DIAL)
+def test_dialling_failed(error: BaseException, code: str, text: str) -> None:
     problem = of_dial_error(error, CAR)
     assert problem.code == code
-    assert words in problem.title
+    assert text in problem.title
     is_well_worded(problem)
 
 
-@pytest.mark.parametrize(("error", "code", "words"), DIAL_SECURE.values(), ids=DIAL_SECURE)
-def test_dialling_a_secure_address_failed(error: BaseException, code: str, words: str) -> None:
+@pytest.mark.parametrize(("error", "code", "text"), DIAL_SECURE.values(), ids=DIAL_SECURE)
+def test_dialling_a_secure_address_failed(error: BaseException, code: str, text: str) -> None:
     problem = of_dial_error(error, SECURE)
     assert problem.code == code
-    assert words in problem.title
+    assert text in problem.title
     is_well_worded(problem)
 
 
@@ -114,15 +114,15 @@ def test_a_reset_without_tls_is_no_matter_of_tls() -> None:
     assert of_dial_error(system_error(errno.ECONNRESET), CAR).code == "failed"
 
 
-@pytest.mark.parametrize(("reason", "answer", "code", "words"), HANDSHAKE.values(), ids=HANDSHAKE)
-def test_no_websocket(reason: str, answer: bytes, code: str, words: str) -> None:
+@pytest.mark.parametrize(("reason", "answer", "code", "text"), HANDSHAKE.values(), ids=HANDSHAKE)
+def test_no_websocket(reason: str, answer: bytes, code: str, text: str) -> None:
     problem = of_handshake(CAR, reason, answer)
     assert problem.code == code
-    assert words in problem.hint
+    assert text in problem.hint
     is_well_worded(problem)
 
 
-def test_a_secure_connection_is_not_told_to_be_secure() -> None:
+def test_a_secure_connection_gets_no_hint_to_be_secure() -> None:
     answer = b"HTTP/1.1 404 Not Found\r\n\r\nonly HTTPS here"
     assert of_handshake(SECURE, "upgrade failed [404]: ", answer).code == "not_rosbridge"
 
@@ -139,7 +139,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("problem", OTHERS.values(), ids=OTHERS)
-def test_the_other_problems_are_well_told(problem: Problem) -> None:
+def test_the_other_problems_have_sentences(problem: Problem) -> None:
     is_well_worded(problem)
 
 
@@ -156,7 +156,7 @@ FOXGLOVE = parse("foxglove://car")
 
 
 @pytest.mark.parametrize(
-    ("problem", "words"),
+    ("problem", "text"),
     [
         (of_dial_error(system_error(errno.ECONNREFUSED), FOXGLOVE), "Start Foxglove's server on the car"),
         (of_dial_error(system_error(errno.ECONNREFUSED), parse("foxglove://car:80")), "usually listens on 8765."),
@@ -169,5 +169,5 @@ FOXGLOVE = parse("foxglove://car")
         (of_dial_error(untrusted(), parse("foxglove+tls://car")), "or try foxglove://car:8765."),
     ],
 )
-def test_a_foxglove_server_is_named_as_one(problem: Problem, words: str) -> None:
-    assert words in f"{problem.title} {problem.hint}"
+def test_a_foxglove_server_is_named_as_one(problem: Problem, text: str) -> None:
+    assert text in f"{problem.title} {problem.hint}"

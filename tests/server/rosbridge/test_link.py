@@ -48,13 +48,13 @@ async def leaving_nothing() -> AsyncIterator[None]:
 
 
 async def test_the_table_is_sent_once_an_opening_in_order_before_anything_else() -> None:
-    ear = Ear()
+    listener = Ear()
     async with bridging() as bridge:
-        link = RosLink(parse(bridge.address), ear, now=time.monotonic)
+        link = RosLink(parse(bridge.address), listener, now=time.monotonic)
         for row in (SPEED, SCAN, ANY):
             link.subscribe(row)
         assert link.subscriptions == (SPEED, SCAN, ANY)
-        ear.link_opened = lambda: link.send_now(OVER)  # type: ignore[method-assign]
+        listener.link_opened = lambda: link.send_now(OVER)  # type: ignore[method-assign]
         link.start()
         await until(lambda: OVER in bridge.operations)
         assert bridge.operations == [*ROWS, OVER]
@@ -63,9 +63,9 @@ async def test_the_table_is_sent_once_an_opening_in_order_before_anything_else()
 
 
 async def test_a_changed_row_takes_the_place_of_the_old_one_an_equal_one_is_left() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        await listener.hears("opened")
         link.subscribe(SPEED)
         link.subscribe(Subscription(topic="/vel", type="geometry_msgs/Twist", queue_length=50))
         link.subscribe(Subscription(topic="/vel", type="geometry_msgs/Twist", queue_length=1))
@@ -95,40 +95,40 @@ async def test_a_changed_row_takes_the_place_of_the_old_one_an_equal_one_is_left
 
 
 async def test_what_changes_while_down_counts_at_the_next_opening() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
         link.subscribe(SPEED)
-        await ear.hears("opened")
+        await listener.hears("opened")
         bridge.socket.transport.abort()
-        await ear.hears("closed")
+        await listener.hears("closed")
         link.unsubscribe("/vel")
         link.subscribe(ANY)
-        await ear.hears("opened", 2)
+        await listener.hears("opened", 2)
         link.send_now(OVER)
         await until(lambda: OVER in bridge.operations)
         assert bridge.operations == [ROWS[2], OVER]
 
 
 async def test_nothing_is_sent_while_down_and_nothing_later() -> None:
-    """Before the first opening, between two, while the other side says goodbye, and after the end."""
-    ear = Ear()
+    """Before the first opening, between two, while the other side closes, and after the end."""
+    listener = Ear()
     async with bridging() as bridge:
-        link = RosLink(parse(bridge.address), ear, now=time.monotonic)
+        link = RosLink(parse(bridge.address), listener, now=time.monotonic)
         with pytest.raises(LinkDown):
             link.send_now(OVER)
         link.start()
         with pytest.raises(LinkDown):
             link.send_now(OVER)
-        await ear.hears("opened")
+        await listener.hears("opened")
         bridge.socket.transport.abort()
-        await ear.hears("closed")
+        await listener.hears("closed")
         assert not link.is_open
         for _ in range(50):
             with pytest.raises(LinkDown):
                 link.send_now(OVER)
         with pytest.raises(LinkDown):
             await link.call("/rosapi/topics")
-        await ear.hears("opened", 2)
+        await listener.hears("opened", 2)
         link.send_now(OVER)
         await until(lambda: bridge.operations)
         link.stop()
@@ -139,8 +139,8 @@ async def test_nothing_is_sent_while_down_and_nothing_later() -> None:
 
 
 async def test_after_the_bridges_goodbye_nothing_is_sent_and_the_link_closes_at_once() -> None:
-    """A bridge that says goodbye and then leaves the connection standing."""
-    ear = Ear()
+    """A bridge that sends a close frame and then leaves the connection open."""
+    listener = Ear()
 
     async def leave(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await accept(reader, writer)
@@ -148,9 +148,9 @@ async def test_after_the_bridges_goodbye_nothing_is_sent_and_the_link_closes_at_
         writer.write(b"\x88\x12\x03\xe9roslaunch is over")
         await asyncio.sleep(5)
 
-    async with answering(leave) as port, linked(f"127.0.0.1:{port}", ear) as link:
-        await ear.hears("opened")
-        problem = await ear.hears("closed", within_s=0.06)
+    async with answering(leave) as port, linked(f"127.0.0.1:{port}", listener) as link:
+        await listener.hears("opened")
+        problem = await listener.hears("closed", within_s=0.06)
         assert problem.code == "closed"
         assert "roslaunch is over" not in problem.title
         assert "(roslaunch is ove" in problem.hint
@@ -160,57 +160,57 @@ async def test_after_the_bridges_goodbye_nothing_is_sent_and_the_link_closes_at_
 
 
 async def test_hurried_while_waiting_it_dials_at_once() -> None:
-    ear = Ear()
+    listener = Ear()
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
-        async with linked(f"127.0.0.1:{closed.getsockname()[1]}", ear) as link:
+        async with linked(f"127.0.0.1:{closed.getsockname()[1]}", listener) as link:
             for attempt in range(1, 6):
-                await ear.hears("failed", attempt, within_s=0.01)
+                await listener.hears("failed", attempt, within_s=0.01)
                 await asyncio.sleep(dialer.FIRST_RETRY_S - 0.05)
                 assert link.attempts == attempt
                 link.retry_now()
 
 
-async def test_hurried_while_dialling_shaking_hands_or_open_there_is_never_a_second_connection() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
+async def test_hurried_while_dialling_in_the_handshake_or_open_there_is_never_a_second_connection() -> None:
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
         for _ in range(100):
             link.retry_now()
             await asyncio.sleep(0)
-        await ear.hears("opened")
+        await listener.hears("opened")
         for _ in range(20):
             link.retry_now()
             await asyncio.sleep(0.01)
         assert len(bridge.connections) == 1
         bridge.socket.transport.abort()
-        await ear.hears("closed")
+        await listener.hears("closed")
         for _ in range(100):
             link.retry_now()
             await asyncio.sleep(0)
-        await ear.hears("opened", 2)
+        await listener.hears("opened", 2)
         await asyncio.sleep(2 * dialer.LAST_RETRY_S)
         assert len(bridge.connections) == 2
-        assert len(ear.all("opened")) == 2
+        assert len(listener.all("opened")) == 2
 
 
 async def test_hurried_in_the_very_moment_of_closing_it_goes_on_trying() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        ear.link_closed = lambda problem: link.retry_now()  # type: ignore[method-assign]
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        listener.link_closed = lambda problem: link.retry_now()  # type: ignore[method-assign]
         for opening in range(1, 4):
-            await ear.hears("opened", opening)
+            await listener.hears("opened", opening)
             bridge.socket.transport.abort()
-        await ear.hears("opened", 4)
+        await listener.hears("opened", 4)
 
 
 async def test_the_wait_between_two_tries_grows_to_its_limit_and_not_beyond() -> None:
-    ear = Ear()
+    listener = Ear()
     times_s: list[float] = []
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
-        async with linked(f"127.0.0.1:{closed.getsockname()[1]}", ear):
+        async with linked(f"127.0.0.1:{closed.getsockname()[1]}", listener):
             for count in range(1, 11):
-                await ear.hears("failed", count)
+                await listener.hears("failed", count)
                 times_s.append(time.monotonic())
     waits_s = [later - earlier for earlier, later in itertools.pairwise(times_s)]
     assert waits_s == pytest.approx([0.2, 0.34, 0.578, 0.9826, 1.67042, 2.0, 2.0, 2.0, 2.0], abs=0.001)
@@ -226,11 +226,11 @@ async def test_ended_before_it_began() -> None:
 
 
 async def test_ended_while_open() -> None:
-    ear = Ear()
+    listener = Ear()
     async with bridging() as bridge:
         async with leaving_nothing():
-            async with linked(bridge.address, ear) as link:
-                await ear.hears("opened")
+            async with linked(bridge.address, listener) as link:
+                await listener.hears("opened")
                 call = asyncio.create_task(link.call("/rosapi/topics"))
                 await asyncio.sleep(0.05)
             with pytest.raises(LinkDown):
@@ -238,11 +238,11 @@ async def test_ended_while_open() -> None:
             await until(lambda: bridge.socket.state == 3)
             await bridge.socket.wait_closed()
             bridge.sockets.clear()
-        assert [name for name, _ in ear.received] == ["opened"]
+        assert [name for name, _ in listener.received] == ["opened"]
 
 
-async def test_ended_while_shaking_hands() -> None:
-    ear = Ear()
+async def test_ended_during_the_handshake() -> None:
+    listener = Ear()
     arrived, left = asyncio.Event(), asyncio.Event()
 
     async def say_nothing(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -253,14 +253,14 @@ async def test_ended_while_shaking_hands() -> None:
         left.set()
 
     async with answering(say_nothing) as port, leaving_nothing():
-        async with linked(f"127.0.0.1:{port}", ear):
+        async with linked(f"127.0.0.1:{port}", listener):
             await asyncio.wait_for(arrived.wait(), 2)
         await asyncio.wait_for(left.wait(), 0.01)
-    assert ear.received == []
+    assert listener.received == []
 
 
 async def test_ended_just_before_the_handshake_is_done() -> None:
-    ear = Ear()
+    listener = Ear()
     arrived, may_answer, left = asyncio.Event(), asyncio.Event(), asyncio.Event()
 
     async def answer_late(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -272,21 +272,21 @@ async def test_ended_just_before_the_handshake_is_done() -> None:
         left.set()
 
     async with answering(answer_late) as port:
-        async with linked(f"127.0.0.1:{port}", ear) as link:
+        async with linked(f"127.0.0.1:{port}", listener) as link:
             await asyncio.wait_for(arrived.wait(), 2)
             may_answer.set()
             link.stop()
             await asyncio.wait_for(left.wait(), 0.01)
-    assert ear.received == []
+    assert listener.received == []
 
 
 async def test_ended_while_waiting_for_the_next_try() -> None:
-    ear = Ear()
+    listener = Ear()
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         async with leaving_nothing():
-            async with linked(f"127.0.0.1:{closed.getsockname()[1]}", ear):
-                await ear.hears("failed")
+            async with linked(f"127.0.0.1:{closed.getsockname()[1]}", listener):
+                await listener.hears("failed")
                 await asyncio.sleep(0.01)
 
 
@@ -294,13 +294,13 @@ async def test_ended_by_the_listener_itself() -> None:
     """A session may end its link from within what the link tells it."""
     async with bridging() as bridge:
         for kind in ("link_opened", "message_received", "link_closed"):
-            ear = Ear()
-            link = RosLink(parse(bridge.address), ear, now=time.monotonic)
+            listener = Ear()
+            link = RosLink(parse(bridge.address), listener, now=time.monotonic)
 
             def end(*_: Any, link: RosLink = link) -> None:
                 link.stop()
 
-            setattr(ear, kind, end)
+            setattr(listener, kind, end)
             link.start()
             openings = len(bridge.connections)
             while len(bridge.connections) == openings:
@@ -315,7 +315,7 @@ async def test_ended_by_the_listener_itself() -> None:
             link.stop()
 
 
-# -- calls -----------------------------------------------------------------------------------------------------------
+# -- calls -------------------------------------------------------------------------------------------------------------
 
 
 def respond(values: Any, **others: Any) -> Any:
@@ -328,9 +328,9 @@ def respond(values: Any, **others: Any) -> Any:
 
 
 async def test_a_call_is_answered_with_the_values() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        await listener.hears("opened")
         bridge.answer = respond({"topics": ["/a"]})
         assert await link.call("/rosapi/topic_type", {"topic": "/a"}) == {"topics": ["/a"]}
         assert bridge.operations[0] | {"id": ""} == {
@@ -342,9 +342,9 @@ async def test_a_call_is_answered_with_the_values() -> None:
 
 
 async def test_answers_find_their_own_calls_in_any_order() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        await listener.hears("opened")
         calls = [asyncio.create_task(link.call("/rosapi/topic_type", {"topic": f"/s{n}"})) for n in range(5)]
         await until(lambda: len(bridge.operations) == 5)
         for operation in reversed(bridge.operations):
@@ -353,28 +353,28 @@ async def test_answers_find_their_own_calls_in_any_order() -> None:
 
 
 FAILURES = {
-    "words": ("Service /x does not exist", "Service /x does not exist"),
-    "no words": (None, ""),
+    "text": ("Service /x does not exist", "Service /x does not exist"),
+    "no text": (None, ""),
     "an object": ({"deep": [[1]] * 9}, "(dict)"),
-    "too many words": ("x" * 100_000, "x" * 300),
+    "too much text": ("x" * 100_000, "x" * 300),
 }
 
 
-@pytest.mark.parametrize(("values", "said"), FAILURES.values(), ids=FAILURES)
-async def test_a_failed_call_says_what_the_bridge_said(values: Any, said: str) -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        await ear.hears("opened")
+@pytest.mark.parametrize(("values", "text"), FAILURES.values(), ids=FAILURES)
+async def test_a_failed_call_has_the_text_of_the_bridge(values: Any, text: str) -> None:
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        await listener.hears("opened")
         bridge.answer = respond(values, result=False)
         with pytest.raises(CallFailed) as failure:
             await link.call("/rosapi/get_time")
-        assert str(failure.value) == said
+        assert str(failure.value) == text
 
 
 async def test_a_call_without_an_answer_fails_in_time_and_a_late_answer_harms_nothing() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        await listener.hears("opened")
         with pytest.raises(CallFailed, match=r"/rosapi/topics did not answer within 0\.05 s"):
             await link.call("/rosapi/topics", timeout_s=0.05)
         identity = bridge.operations[0]["id"]
@@ -383,13 +383,13 @@ async def test_a_call_without_an_answer_fails_in_time_and_a_late_answer_harms_no
         await bridge.say({"op": "service_response"})
         bridge.answer = respond("fine")
         assert await link.call("/rosapi/get_time") == "fine"
-        assert ear.all("junk") == []
+        assert listener.all("junk") == []
 
 
 async def test_calls_end_with_the_link_that_carried_them() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        await listener.hears("opened")
         calls = [asyncio.create_task(link.call("/rosapi/get_time", timeout_s=5)) for _ in range(3)]
         await until(lambda: len(bridge.operations) == 3)
         bridge.socket.transport.abort()
@@ -399,9 +399,9 @@ async def test_calls_end_with_the_link_that_carried_them() -> None:
 
 
 async def test_unanswered_calls_are_bounded_and_a_cancelled_one_is_forgotten() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        await listener.hears("opened")
         calls = [
             asyncio.create_task(link.call("/rosapi/get_time", timeout_s=5))
             for _ in range(service_calls.MAX_PENDING_CALLS)

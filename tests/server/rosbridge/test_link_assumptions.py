@@ -156,7 +156,7 @@ async def test_it_dials_in_one_place_and_tries_again_by_one_way() -> None:
 
 
 @holds("protocol")
-async def test_it_is_told_of_the_opening_and_once_of_the_end_opened_or_not() -> None:
+async def test_it_is_called_for_the_opening_and_once_for_the_end_opened_or_not() -> None:
     async with bridging() as bridge:
         protocol, factory = await dial(bridge.port)
         await until(lambda: factory.calls == ["ready"])
@@ -206,7 +206,7 @@ async def test_a_message_comes_frame_by_frame() -> None:
 
 
 @holds("state")
-async def test_the_state_says_whether_it_is_open() -> None:
+async def test_the_state_shows_whether_it_is_open() -> None:
     async def say_goodbye(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await accept(reader, writer)
         await asyncio.sleep(0.05)
@@ -223,7 +223,7 @@ async def test_the_state_says_whether_it_is_open() -> None:
         await until(lambda: protocol.state == protocol.STATE_CLOSING)
         with pytest.raises(Disconnected):
             protocol.sendMessage(b"{}")
-        protocol.sendPing()  # no word, no error
+        protocol.sendPing()  # no answer, no error
         protocol.dropConnection(abort=True)
         assert protocol.state == protocol.STATE_CLOSED
 

@@ -1,4 +1,4 @@
-"""What may answer at an address instead of a rosbridge, and what the operator is told of it."""
+"""What may answer at an address instead of a rosbridge, and what the operator sees of it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.virtual_time
 
 
 def saying(answer: bytes, *, hang_up: bool = False, first: bool = False) -> Handler:
-    """Answers the handshake, whatever it asks; or speaks first."""
+    """Answers the handshake, whatever it requests; or sends first."""
 
     async def handle(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if not first:
@@ -60,7 +60,7 @@ OTHERS: dict[str, tuple[Handler, str, str]] = {
     "web server that stays": (saying(b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nOK"), "not_rosbridge", "HTTP 200"),
     "web server of old": (saying(b"HTTP/1.0 200 OK\r\n\r\n"), "not_rosbridge", "not as a WebSocket"),
     "one that sends elsewhere": (saying(b"HTTP/1.1 302 Found\r\nLocation: /\r\n\r\n"), "not_rosbridge", "HTTP 302"),
-    "one that asks for a login": (saying(b"HTTP/1.1 401 Unauthorized\r\n\r\n"), "not_rosbridge", "login"),
+    "one that requires a login": (saying(b"HTTP/1.1 401 Unauthorized\r\n\r\n"), "not_rosbridge", "login"),
     "one that is full": (saying(b"HTTP/1.1 503 Service Unavailable\r\n\r\n"), "busy", "automatically"),
     "a wrong key": (
         saying(b"HTTP/1.1 101 X\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: x\r\n\r\n"),
@@ -85,115 +85,115 @@ OTHERS: dict[str, tuple[Handler, str, str]] = {
 }
 
 
-@pytest.mark.parametrize(("handler", "code", "words"), OTHERS.values(), ids=OTHERS)
-async def test_something_else_answers(handler: Handler, code: str, words: str) -> None:
-    ear = Ear()
-    async with answering(handler) as port, linked(f"127.0.0.1:{port}", ear) as link:
-        problem = await ear.hears("failed")
-        assert (problem.code, words in problem.hint) == (code, True), problem
+@pytest.mark.parametrize(("handler", "code", "text"), OTHERS.values(), ids=OTHERS)
+async def test_something_else_answers(handler: Handler, code: str, text: str) -> None:
+    listener = Ear()
+    async with answering(handler) as port, linked(f"127.0.0.1:{port}", listener) as link:
+        problem = await listener.hears("failed")
+        assert (problem.code, text in problem.hint) == (code, True), problem
         assert not link.is_open
         assert link.heard_s is None
-        await ear.hears("failed", 2)  # and goes on trying
-        assert link.attempts - len(ear.all("failed")) in (0, 1)  # one word for each try
-        assert {name for name, _ in ear.received} == {"failed"}
+        await listener.hears("failed", 2)  # and goes on trying
+        assert link.attempts - len(listener.all("failed")) in (0, 1)  # one report for each try
+        assert {name for name, _ in listener.received} == {"failed"}
 
 
 async def test_one_that_talks_without_end_fills_no_memory() -> None:
-    ear = Ear()
+    listener = Ear()
     before = psutil.Process().memory_info().rss
-    async with answering(say_without_end) as port, linked(f"127.0.0.1:{port}", ear):
-        await ear.hears("failed", 3)
+    async with answering(say_without_end) as port, linked(f"127.0.0.1:{port}", listener):
+        await listener.hears("failed", 3)
     assert psutil.Process().memory_info().rss - before < 30e6
 
 
 async def test_a_handshake_that_comes_letter_by_letter_is_one() -> None:
-    ear = Ear()
+    listener = Ear()
 
     async def dribble(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        write, said = writer.write, bytearray()
-        writer.write = said.extend  # type: ignore[method-assign, assignment]
+        write, written = writer.write, bytearray()
+        writer.write = written.extend  # type: ignore[method-assign, assignment]
         await accept(reader, writer)
-        for letter in said + b'\x81\x0f{"op":"status"}':
+        for letter in written + b'\x81\x0f{"op":"status"}':
             write(bytes([letter]))
             await asyncio.sleep(0)
         await asyncio.sleep(5)
 
-    async with answering(dribble) as port, linked(f"127.0.0.1:{port}", ear):
-        await ear.hears("status")
-        assert [name for name, _ in ear.received] == ["opened", "status"]
+    async with answering(dribble) as port, linked(f"127.0.0.1:{port}", listener):
+        await listener.hears("status")
+        assert [name for name, _ in listener.received] == ["opened", "status"]
 
 
 async def test_what_comes_with_the_handshake_is_read_after_it() -> None:
-    ear = Ear()
+    listener = Ear()
 
     async def hasten(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        write, said = writer.write, bytearray()
-        writer.write = said.extend  # type: ignore[method-assign, assignment]
+        write, written = writer.write, bytearray()
+        writer.write = written.extend  # type: ignore[method-assign, assignment]
         await accept(reader, writer)
-        write(bytes(said) + b'\x81\x0f{"op":"status"}\x88\x00')
+        write(bytes(written) + b'\x81\x0f{"op":"status"}\x88\x00')
         await asyncio.sleep(5)
 
-    async with answering(hasten) as port, linked(f"127.0.0.1:{port}", ear):
-        await ear.hears("closed")
-        assert [name for name, _ in ear.received][:3] == ["opened", "status", "closed"]
+    async with answering(hasten) as port, linked(f"127.0.0.1:{port}", listener):
+        await listener.hears("closed")
+        assert [name for name, _ in listener.received][:3] == ["opened", "status", "closed"]
 
 
-# -- nothing answers -------------------------------------------------------------------------------------------------
+# -- nothing answers ---------------------------------------------------------------------------------------------------
 
 
 async def test_refused() -> None:
-    ear = Ear()
+    listener = Ear()
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         port = closed.getsockname()[1]
-        async with linked(f"127.0.0.1:{port}", ear):
-            problem = await ear.hears("failed")
+        async with linked(f"127.0.0.1:{port}", listener):
+            problem = await listener.hears("failed")
             assert problem.code == "refused"
             assert problem.title == f"127.0.0.1 is there, but nothing listens on port {port}."
-            await ear.hears("failed", 3)
+            await listener.hears("failed", 3)
 
 
 async def test_the_car_comes_up_later() -> None:
-    ear = Ear()
+    listener = Ear()
     with socket.socket() as closed:
         closed.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         closed.bind(("127.0.0.1", 0))
         port = closed.getsockname()[1]
-        async with linked(f"127.0.0.1:{port}", ear):
-            await ear.hears("failed", 2)
+        async with linked(f"127.0.0.1:{port}", listener):
+            await listener.hears("failed", 2)
             closed.close()
             async with bridging(port):
-                await ear.hears("opened")
+                await listener.hears("opened")
 
 
 async def test_no_answer_at_all() -> None:
-    ear = Ear()
+    listener = Ear()
     with black_hole() as port:
-        async with linked(f"127.0.0.1:{port}", ear) as link:
+        async with linked(f"127.0.0.1:{port}", listener) as link:
             began_s = time.monotonic()
             for _ in range(10):
                 link.retry_now()  # while dialling: no second dial
                 await asyncio.sleep(0.01)
-            assert (await ear.hears("failed")).code == "timeout"
+            assert (await listener.hears("failed")).code == "timeout"
             assert link.attempts == 1
             assert time.monotonic() - began_s == pytest.approx(dialer.DIAL_TIMEOUT_S, abs=0.01)
 
 
 async def test_no_such_host() -> None:
-    ear = Ear()
-    async with linked("no-such-host.invalid", ear):
-        assert (await ear.hears("failed")).code in ("no_such_host", "no_lookup")  # where no name server answers
+    listener = Ear()
+    async with linked("no-such-host.invalid", listener):
+        assert (await listener.hears("failed")).code in ("no_such_host", "no_lookup")  # where no name server answers
 
 
 @pytest.mark.parametrize("typed", ["169.254.169.254", "3758096385:80", "[::ffff:224.0.0.1]", "0.0.0.0", "[ff02::1]"])
 async def test_what_is_never_dialled_is_not(typed: str) -> None:
-    ear = Ear()
-    async with linked(typed, ear):
-        problem = await ear.hears("failed")
+    listener = Ear()
+    async with linked(typed, listener):
+        problem = await listener.hears("failed")
         assert problem.code == "forbidden"
 
 
-# -- several addresses -----------------------------------------------------------------------------------------------
+# -- several addresses -------------------------------------------------------------------------------------------------
 
 
 def found(*ips: str) -> list[Any]:
@@ -221,90 +221,93 @@ async def test_every_address_of_a_host_is_tried_to_its_handshake(
 ) -> None:
     """On asyncio's loop, whose resolver can be exchanged; what is dialled after it is the same on both."""
     monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: found(*ips))
-    ear = Ear()
+    listener = Ear()
     async with bridging() as bridge:
-        async with answering(hang_up, host="127.0.0.2", port=bridge.port), linked(f"car:{bridge.port}", ear) as link:
+        async with (
+            answering(hang_up, host="127.0.0.2", port=bridge.port),
+            linked(f"car:{bridge.port}", listener) as link,
+        ):
             if code is None:
-                await ear.hears("opened")
-                assert ear.all("failed") == []
+                await listener.hears("opened")
+                assert listener.all("failed") == []
                 assert link.attempts == 1
             else:
-                assert (await ear.hears("failed")).code == code
+                assert (await listener.hears("failed")).code == code
 
 
-async def test_a_name_server_that_hangs_is_asked_once_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[str] = []
+async def test_a_name_server_that_hangs_is_queried_once_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked_up: list[str] = []
     answers = asyncio.Event()
 
     async def hang(host: str, *_: Any, **__: Any) -> list[Any]:
-        asked.append(host)
+        looked_up.append(host)
         await answers.wait()
         return found("127.0.0.1")
 
     monkeypatch.setattr(asyncio.get_running_loop(), "getaddrinfo", hang)
-    ear = Ear()
-    async with bridging() as bridge, linked(f"car:{bridge.port}", ear):
-        assert (await ear.hears("failed")).code == "no_lookup"
-        await ear.hears("failed", 3)
-        assert asked == ["car"]
+    listener = Ear()
+    async with bridging() as bridge, linked(f"car:{bridge.port}", listener):
+        assert (await listener.hears("failed")).code == "no_lookup"
+        await listener.hears("failed", 3)
+        assert looked_up == ["car"]
         answers.set()
-        await ear.hears("opened")
-        assert asked == ["car"]
+        await listener.hears("opened")
+        assert looked_up == ["car"]
 
 
 async def test_ended_while_a_name_is_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
     answers = threading.Event()
     monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: answers.wait(8) and found("127.0.0.1"))
-    ear = Ear()
+    listener = Ear()
     before = asyncio.all_tasks()
-    async with linked("car", ear):
+    async with linked("car", listener):
         await asyncio.sleep(0.05)
     await until(lambda: asyncio.all_tasks() == before, within_s=0.3)
     answers.set()
     await asyncio.sleep(0.05)
-    assert ear.received == []
+    assert listener.received == []
 
 
-# -- TLS -------------------------------------------------------------------------------------------------------------
+# -- TLS ---------------------------------------------------------------------------------------------------------------
 
 
 async def test_secure_but_not_trusted(secure: ssl.SSLContext) -> None:
-    ear = Ear()
-    async with bridging(ssl=secure) as bridge, linked(f"wss://127.0.0.1:{bridge.port}", ear):
-        problem = await ear.hears("failed")
+    listener = Ear()
+    async with bridging(ssl=secure) as bridge, linked(f"wss://127.0.0.1:{bridge.port}", listener):
+        problem = await listener.hears("failed")
         assert problem.code == "tls_untrusted"
-        assert "self" in problem.hint  # self-signed, in OpenSSL's words
-        await ear.hears("failed", 2)
+        assert "self" in problem.hint  # self-signed, in OpenSSL's text
+        await listener.hears("failed", 2)
 
 
 async def test_secure_for_another_host(
     certificate: Path, secure: ssl.SSLContext, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
-    ear = Ear()
-    async with bridging(ssl=secure) as bridge, linked(f"wss://localhost:{bridge.port}", ear):
-        assert (await ear.hears("failed")).code == "tls_untrusted"
+    listener = Ear()
+    async with bridging(ssl=secure) as bridge, linked(f"wss://localhost:{bridge.port}", listener):
+        assert (await listener.hears("failed")).code == "tls_untrusted"
 
 
 async def test_a_bridge_without_tls_dialled_with_wss() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(f"wss://127.0.0.1:{bridge.port}", ear):
-        problem = await ear.hears("failed")
+    listener = Ear()
+    async with bridging() as bridge, linked(f"wss://127.0.0.1:{bridge.port}", listener):
+        problem = await listener.hears("failed")
         assert problem.code == "tls"
         assert f"ws://127.0.0.1:{bridge.port}" in problem.hint
-        await ear.hears("failed", 2)
+        await listener.hears("failed", 2)
 
 
 @pytest.mark.parametrize("handler", [hang_up, saying(b"", first=True)], ids=["hangs up", "silent"])
-async def test_something_without_words_dialled_with_wss(handler: Handler) -> None:
-    ear = Ear()
-    async with answering(handler) as port, linked(f"wss://127.0.0.1:{port}", ear):
-        assert (await ear.hears("failed")).code in ("tls", "timeout")
+async def test_something_silent_dialled_with_wss(handler: Handler) -> None:
+    listener = Ear()
+    async with answering(handler) as port, linked(f"wss://127.0.0.1:{port}", listener):
+        assert (await listener.hears("failed")).code in ("tls", "timeout")
 
 
 async def test_a_bridge_with_tls_dialled_with_ws(secure: ssl.SSLContext) -> None:
-    ear = Ear()
-    async with bridging(ssl=secure) as bridge, linked(f"ws://127.0.0.1:{bridge.port}", ear):
-        problem = await ear.hears("failed")
+    listener = Ear()
+    async with bridging(ssl=secure) as bridge, linked(f"ws://127.0.0.1:{bridge.port}", listener):
+        problem = await listener.hears("failed")
         assert "wss://" in problem.hint
-        await ear.hears("failed", 2)
+        await listener.hears("failed", 2)

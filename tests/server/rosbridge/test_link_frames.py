@@ -50,13 +50,13 @@ JUNK: dict[str, tuple[bytes | str, str]] = {
 
 @pytest.mark.parametrize(("frame", "why"), JUNK.values(), ids=JUNK)
 async def test_junk_is_counted_and_harms_nothing(frame: bytes | str, why: str) -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear):
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener):
+        await listener.hears("opened")
         await bridge.say(frame)
         await bridge.say(GOOD)
-        await ear.hears("message")
-        assert ear.received == [("opened", None), ("junk", why), ("message", ("/a", {"data": 1}, None))]
+        await listener.hears("message")
+        assert listener.received == [("opened", None), ("junk", why), ("message", ("/a", {"data": 1}, None))]
 
 
 QUIET: dict[str, bytes | str] = {
@@ -70,39 +70,39 @@ QUIET: dict[str, bytes | str] = {
 
 @pytest.mark.parametrize("frame", QUIET.values(), ids=QUIET)
 async def test_answers_that_nobody_waits_for_are_passed_over(frame: bytes | str) -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear):
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener):
+        await listener.hears("opened")
         await bridge.say(frame)
         await bridge.say(GOOD)
-        await ear.hears("message")
-        assert [name for name, _ in ear.received] == ["opened", "message"]
+        await listener.hears("message")
+        assert [name for name, _ in listener.received] == ["opened", "message"]
 
 
 STATUS: dict[str, tuple[dict[str, Any], tuple[str, str]]] = {
-    "words": ({"level": "error", "msg": "no such topic"}, ("error", "no such topic")),
+    "text": ({"level": "error", "msg": "no such topic"}, ("error", "no such topic")),
     "nothing": ({}, ("", "")),
-    "many words": ({"level": "e" * 999, "msg": "m" * 99_999}, ("e" * 20, "m" * 500)),
-    "no words": ({"level": 3, "msg": {"deep": [1]}}, ("(int)", "(dict)")),
+    "much text": ({"level": "e" * 999, "msg": "m" * 99_999}, ("e" * 20, "m" * 500)),
+    "no text": ({"level": 3, "msg": {"deep": [1]}}, ("(int)", "(dict)")),
     "a long list": ({"level": None, "msg": [1.5] * 100_000}, ("", "(list)")),
 }
 
 
 @pytest.mark.parametrize(("fields", "received"), STATUS.values(), ids=STATUS)
-async def test_what_the_bridge_says_is_told_in_short(fields: dict[str, Any], received: tuple[str, str]) -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear):
-        await ear.hears("opened")
+async def test_a_status_of_the_bridge_is_passed_on_shortened(fields: dict[str, Any], received: tuple[str, str]) -> None:
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener):
+        await listener.hears("opened")
         await bridge.say({"op": "status"} | fields)
-        assert await ear.hears("status") == received
+        assert await listener.hears("status") == received
 
 
 async def test_indulgence_is_noted() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear):
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener):
+        await listener.hears("opened")
         await bridge.say('{"op":"publish","topic":"/fix","msg":{"position_covariance":[NaN]}}')
-        topic, message, note = await ear.hears("message")
+        topic, message, note = await listener.hears("message")
         assert topic == "/fix"
         assert message["position_covariance"][0] != message["position_covariance"][0]
         assert note == "bare NaN or Infinity, read as unknown"
@@ -110,17 +110,17 @@ async def test_indulgence_is_noted() -> None:
 
 async def test_a_message_of_20_mb_is_skipped_and_the_link_stays() -> None:
     """Hanging up would not help: the next message of that topic would be as large, and the link would flap for ever."""
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear):
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener):
+        await listener.hears("opened")
         await bridge.say(b"x" * 20_000_000)
-        await ear.hears("junk")
+        await listener.hears("junk")
         pieces = ['{"op":"publish","topic":"/big","msg":"', *["x" * 5_000_000] * 4, '"}']
         await bridge.socket.send(pieces)  # in fragments, each small enough
         await bridge.say(GOOD)
-        await ear.hears("message", within_s=8)
+        await listener.hears("message", within_s=8)
         why = "a message of more than 16 MB"
-        assert ear.received == [
+        assert listener.received == [
             ("opened", None),
             ("junk", why),
             ("large", (None, 20_000_000)),
@@ -132,25 +132,25 @@ async def test_a_message_of_20_mb_is_skipped_and_the_link_stays() -> None:
 
 @pytest.mark.field
 async def test_of_a_message_of_20_mb_nothing_is_kept() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear):
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener):
+        await listener.hears("opened")
         before = psutil.Process().memory_info().rss
         await bridge.say(b"x" * 20_000_000)
-        await ear.hears("junk")
+        await listener.hears("junk")
         grown = psutil.Process().memory_info().rss - before
         assert grown < 37e6  # the sender in this process holds 20 MB of it; a copy kept by the link would make it 40
 
 
 async def test_a_message_just_as_large_as_may_be_is_read() -> None:
-    ear = Ear()
+    listener = Ear()
     empty = len(orjson.dumps({"op": "publish", "topic": "/a", "msg": ""}))
-    async with bridging() as bridge, linked(bridge.address, ear):
-        await ear.hears("opened")
+    async with bridging() as bridge, linked(bridge.address, listener):
+        await listener.hears("opened")
         await bridge.say({"op": "publish", "topic": "/a", "msg": "x" * (MAX_MESSAGE_BYTES - empty)})
-        await ear.hears("message", within_s=8)
+        await listener.hears("message", within_s=8)
         await bridge.say({"op": "publish", "topic": "/a", "msg": "x" * (MAX_MESSAGE_BYTES - empty + 1)})
-        await ear.hears("junk", within_s=8)
+        await listener.hears("junk", within_s=8)
 
 
 FAULTY = {
@@ -166,9 +166,9 @@ FAULTY = {
 }
 
 
-@pytest.mark.parametrize(("frame", "words"), FAULTY.values(), ids=FAULTY)
-async def test_what_is_no_websocket_any_more_ends_the_connection_and_it_is_made_anew(frame: bytes, words: str) -> None:
-    ear = Ear()
+@pytest.mark.parametrize(("frame", "text"), FAULTY.values(), ids=FAULTY)
+async def test_what_is_no_websocket_any_more_ends_the_connection_and_it_is_made_anew(frame: bytes, text: str) -> None:
+    listener = Ear()
     openings = 0
 
     async def err_once(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -178,16 +178,16 @@ async def test_what_is_no_websocket_any_more_ends_the_connection_and_it_is_made_
         writer.write(frame if openings == 1 else text_frame(orjson.dumps(GOOD)))
         await asyncio.sleep(5)
 
-    async with answering(err_once) as port, linked(f"127.0.0.1:{port}", ear):
-        problem = await ear.hears("closed")
+    async with answering(err_once) as port, linked(f"127.0.0.1:{port}", listener):
+        problem = await listener.hears("closed")
         assert problem.code == "closed"
-        assert words in problem.hint
-        await ear.hears("message")
-        assert [name for name, _ in ear.received] == ["opened", "closed", "opened", "message"]
+        assert text in problem.hint
+        await listener.hears("message")
+        assert [name for name, _ in listener.received] == ["opened", "closed", "opened", "message"]
 
 
 async def test_a_message_in_pieces_with_pings_between_is_whole() -> None:
-    ear = Ear()
+    listener = Ear()
     text = orjson.dumps(GOOD)
 
     async def split(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -200,12 +200,12 @@ async def test_a_message_in_pieces_with_pings_between_is_whole() -> None:
             await asyncio.sleep(0.0005)
         await asyncio.sleep(5)
 
-    async with answering(split) as port, linked(f"127.0.0.1:{port}", ear):
-        assert await ear.hears("message") == ("/a", {"data": 1}, None)
+    async with answering(split) as port, linked(f"127.0.0.1:{port}", listener):
+        assert await listener.hears("message") == ("/a", {"data": 1}, None)
 
 
 async def test_ten_thousand_messages_at_once_come_in_order() -> None:
-    ear = Ear()
+    listener = Ear()
     one = b"".join(text_frame(b'{"op":"publish","topic":"/a","msg":%d}' % n) for n in range(10_000))
 
     async def flood(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -213,54 +213,54 @@ async def test_ten_thousand_messages_at_once_come_in_order() -> None:
         writer.write(one)
         await asyncio.sleep(5)
 
-    async with answering(flood) as port, linked(f"127.0.0.1:{port}", ear):
-        await ear.hears("message", 10_000)
-        assert [message for _, message, _ in ear.all("message")] == list(range(10_000))
+    async with answering(flood) as port, linked(f"127.0.0.1:{port}", listener):
+        await listener.hears("message", 10_000)
+        assert [message for _, message, _ in listener.all("message")] == list(range(10_000))
 
 
-# -- faults of our own -----------------------------------------------------------------------------------------------
+# -- faults of our own -------------------------------------------------------------------------------------------------
 
 
-async def test_a_listener_that_stumbles_costs_one_message_and_is_told_once() -> None:
-    ear = Ear()
+async def test_a_listener_that_fails_costs_one_message_and_is_logged_once() -> None:
+    listener = Ear()
     logged: list[logging.LogRecord] = []
     handler = logging.Handler()
     handler.emit = logged.append  # type: ignore[method-assign]
     logging.getLogger("catgraph.link").addHandler(handler)
-    take = ear.message_received
+    take = listener.message_received
 
     def stumble(topic: str, message: Any, note: str | None) -> None:
         if topic == "/bad":
             raise KeyError(topic)
         take(topic, message, note)
 
-    ear.message_received = stumble  # type: ignore[method-assign]
+    listener.message_received = stumble  # type: ignore[method-assign]
     try:
-        async with bridging() as bridge, linked(bridge.address, ear):
-            await ear.hears("opened")
+        async with bridging() as bridge, linked(bridge.address, listener):
+            await listener.hears("opened")
             for _ in range(5):
                 await bridge.say({"op": "publish", "topic": "/bad", "msg": {}})
             await bridge.say(GOOD)
-            await ear.hears("message")
-            assert ear.all("junk") == ["a message that caused an internal error"] * 5
-            assert ear.all("closed") == []
+            await listener.hears("message")
+            assert listener.all("junk") == ["a message that caused an internal error"] * 5
+            assert listener.all("closed") == []
             assert len(logged) == 1
     finally:
         logging.getLogger("catgraph.link").removeHandler(handler)
 
 
 async def test_a_listener_that_stumbles_over_a_failed_dial_does_not_end_the_dialling() -> None:
-    ear = Ear()
+    listener = Ear()
     problems: list[Any] = []
 
     def stumble(problem: Any) -> None:
         problems.append(problem)
         raise RuntimeError("no")
 
-    ear.dial_failed = stumble  # type: ignore[method-assign]
+    listener.dial_failed = stumble  # type: ignore[method-assign]
     logging.getLogger("catgraph.link").addFilter(hush := lambda record: False)
     try:
-        async with linked("127.0.0.1:1", ear):
+        async with linked("127.0.0.1:1", listener):
             await until(lambda: len(problems) == 3)
     finally:
         logging.getLogger("catgraph.link").removeFilter(hush)

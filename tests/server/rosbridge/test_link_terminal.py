@@ -33,11 +33,11 @@ async def hostile(reader, writer):
     writer.write(text_frame(b"noise") + text_frame(b"x" * 200, opcode=2) + b"\\x82\\x7f\\x7f" + b"\\xff" * 100)
 
 async def main():
-    ears = []
+    listeners = []
 
     def link_to(address):
-        ears.append(Ear())
-        return linked(address, ears[-1])
+        listeners.append(Ear())
+        return linked(address, listeners[-1])
 
     async with answering(http) as a, answering(rude) as b, answering(silent) as c, answering(hostile) as d:
         async with bridging() as e, link_to(f"127.0.0.1:{a}"), link_to(f"127.0.0.1:{b}"), \\
@@ -49,7 +49,7 @@ async def main():
             await asyncio.sleep(1.8)
             e.sockets[-1].transport.abort()
             await asyncio.sleep(0.1)
-            kinds = [set(kind for kind, _ in ear.received) for ear in ears]
+            kinds = [set(kind for kind, _ in listener.received) for listener in listeners]
             assert kinds == [{"failed"}, {"opened", "closed"}, {"opened", "closed"}, {"opened", "junk", "closed"},
                              {"failed"}, {"failed"}, {"opened", "closed"}], kinds
             assert isinstance(task.exception(), Exception)
@@ -66,7 +66,7 @@ else:
 @pytest.mark.field
 @pytest.mark.parametrize("loop", ["asyncio", "uvloop"])
 def test_nothing_of_all_this_reaches_the_operators_terminal(loop: str) -> None:
-    """However logging is set up: what a dropped connection means is told once, by us, in the page."""
+    """However logging is set up: a dropped connection is reported once, by us, in the page."""
     ended = subprocess.run(
         [sys.executable, "-W", "error", "-c", NOISY, loop],
         cwd=PROJECT,

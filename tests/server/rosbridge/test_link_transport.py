@@ -19,30 +19,30 @@ pytestmark = pytest.mark.both_loops
 
 
 async def test_twenty_reconnects_multiply_no_subscription() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
         bridge.hangs_up = True
         for row in (SPEED, SCAN, ANY):
             link.subscribe(row)
         for opening in range(1, 21):
-            await ear.hears("opened", opening)
-            await ear.hears("closed", opening)
+            await listener.hears("opened", opening)
+            await listener.hears("closed", opening)
             if opening == 20:
                 bridge.hangs_up = False
             await asyncio.sleep(0)
             link.retry_now()
-        await ear.hears("opened", 21)
+        await listener.hears("opened", 21)
         link.send_now(OVER)
         await until(lambda: OVER in bridge.operations)
         assert bridge.operations == [*ROWS, OVER]
         assert len(bridge.connections) == link.attempts == 21
-        assert [name for name, _ in ear.received] == ["opened", "closed"] * 20 + ["opened"]
+        assert [name for name, _ in listener.received] == ["opened", "closed"] * 20 + ["opened"]
 
 
 @pytest.mark.field
 async def test_a_goodbye_that_cannot_be_answered_ends_the_link_all_the_same() -> None:
     """The bridge reads nothing, so that our answer stays in the pipe for ever."""
-    ear = Ear()
+    listener = Ear()
     sent = asyncio.Event()
 
     async def leave(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -52,17 +52,17 @@ async def test_a_goodbye_that_cannot_be_answered_ends_the_link_all_the_same() ->
         writer.write(b"\x88\x00")
         await asyncio.sleep(5)
 
-    async with answering(leave) as port, linked(f"127.0.0.1:{port}", ear) as link:
-        await ear.hears("opened")
+    async with answering(leave) as port, linked(f"127.0.0.1:{port}", listener) as link:
+        await listener.hears("opened")
         link._socket.sendMessage(b"x" * 12_000_000)  # type: ignore[union-attr]
         sent.set()
-        assert (await ear.hears("closed", within_s=1.2)).code == "closed"
+        assert (await listener.hears("closed", within_s=1.2)).code == "closed"
 
 
 @pytest.mark.field
 async def test_what_a_dropped_link_still_held_is_never_delivered() -> None:
     """The bridge stops reading with commands on their way to it: once the link is dropped, they are void."""
-    ear = Ear()
+    listener = Ear()
     got = bytearray()
     may_read = asyncio.Event()
     is_read = asyncio.Event()
@@ -80,11 +80,11 @@ async def test_what_a_dropped_link_still_held_is_never_delivered() -> None:
                 got.extend(data)
         is_read.set()
 
-    async with answering(stop_reading, sock=listening) as port, linked(f"127.0.0.1:{port}", ear) as link:
-        await ear.hears("opened")
+    async with answering(stop_reading, sock=listening) as port, linked(f"127.0.0.1:{port}", listener) as link:
+        await listener.hears("opened")
         for _ in range(100):
             link._socket.sendMessage(b"x" * 10_000)  # type: ignore[union-attr]
-        assert (await ear.hears("closed", within_s=2.5)).code == "bridge_silent"
+        assert (await listener.hears("closed", within_s=2.5)).code == "bridge_silent"
         link.stop()
         may_read.set()
         await asyncio.wait_for(is_read.wait(), 3)
@@ -93,15 +93,15 @@ async def test_what_a_dropped_link_still_held_is_never_delivered() -> None:
 
 @pytest.mark.field
 async def test_a_hundred_openings_leave_nothing_behind() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
+    listener = Ear()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
         bridge.hangs_up = True
         link.subscribe(ANY)
-        await ear.hears("closed", 1)
+        await listener.hears("closed", 1)
         before: tuple[int, int, int] = (0, 0, 0)
         process = psutil.Process()
         for opening in range(1, 101):
-            await ear.hears("closed", opening)
+            await listener.hears("closed", opening)
             if opening in (10, 100):
                 for socket_ in bridge.sockets:
                     await socket_.wait_closed()
@@ -116,25 +116,25 @@ async def test_a_hundred_openings_leave_nothing_behind() -> None:
 
 @pytest.mark.field
 async def test_ended_while_dialling() -> None:
-    ear = Ear()
+    listener = Ear()
     with black_hole() as port:
         before = asyncio.all_tasks()
         fds = psutil.Process().num_fds()
-        async with linked(f"127.0.0.1:{port}", ear):
+        async with linked(f"127.0.0.1:{port}", listener):
             await asyncio.sleep(0.1)
         await until(lambda: asyncio.all_tasks() == before, within_s=0.3)
         await until(lambda: psutil.Process().num_fds() <= fds + 1, within_s=0.3)  # uvloop keeps one of its own
-    assert ear.received == []
+    assert listener.received == []
 
 
 async def test_secure(certificate: Path, secure: ssl.SSLContext, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
-    ear = Ear()
-    async with bridging(ssl=secure) as bridge, linked(f"wss://127.0.0.1:{bridge.port}", ear) as link:
-        await ear.hears("opened")
+    listener = Ear()
+    async with bridging(ssl=secure) as bridge, linked(f"wss://127.0.0.1:{bridge.port}", listener) as link:
+        await listener.hears("opened")
         link.send_now({"op": "unsubscribe", "id": "a", "topic": "/a"})
         await until(lambda: bridge.operations)
         await bridge.say({"op": "publish", "topic": "/a", "msg": 1})
-        assert await ear.hears("message") == ("/a", 1, None)
+        assert await listener.hears("message") == ("/a", 1, None)
         link.abort()
-        await ear.hears("opened", 2)
+        await listener.hears("opened", 2)

@@ -1,4 +1,4 @@
-"""A command that reads a file takes no more memory than the machine has, and says so."""
+"""A command that reads a file takes no more memory than the machine has, and reports the limit."""
 
 from __future__ import annotations
 

@@ -30,13 +30,13 @@ def test_enough_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     demand_free()
 
 
-def test_few_left_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_few_left_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     limited(monkeypatch, KEPT_FREE)
     with pytest.raises(FilesExhausted, match=r"more files and connections can be opened, of 32 \(ulimit -n\)"):
         demand_free()
 
 
-def test_none_left_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_none_left_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the real limit, at what is open now."""
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (0, before[1]))

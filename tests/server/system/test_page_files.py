@@ -1,4 +1,4 @@
-"""The server says in one sentence what is wrong with the page's third-party files."""
+"""The server reports in one sentence what is wrong with the page's third-party files."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def test_its_key_is_for_its_owner_only(tmp_path: Path) -> None:
 def test_a_damaged_one_is_never_replaced_in_silence(tmp_path: Path, content: bytes) -> None:
     kept = tmp_path / authority.FILE
     kept.write_bytes(content)
-    with pytest.raises(TlsRefused, match=r"is damaged.*every phone must be set up anew"):
+    with pytest.raises(TlsRefused, match=r"is damaged.*every phone must be set up again"):
         load_or_make(tmp_path, host="pit", now=NOW)
     assert kept.read_bytes() == content
 
@@ -53,7 +53,7 @@ def test_a_key_of_another_authority_is_refused(tmp_path: Path) -> None:
         load_or_make(tmp_path, host="pit", now=NOW)
 
 
-def test_a_folder_that_cannot_be_used_is_said(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_used_is_reported(tmp_path: Path) -> None:
     (tmp_path / "tls").write_text("a file")
     with pytest.raises(TlsRefused, match="cannot be used"):
         load_or_make(tmp_path / "tls", host="pit", now=NOW)

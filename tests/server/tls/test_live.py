@@ -64,8 +64,8 @@ class Line:
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._reader, self._writer = reader, writer
 
-    async def says(self, word: bytes) -> bytes:
-        self._writer.write(word + b"\n")
+    async def sends(self, text: bytes) -> bytes:
+        self._writer.write(text + b"\n")
         return (await self._reader.readline()).strip()
 
     async def end(self) -> None:
@@ -99,17 +99,17 @@ async def test_new_connections_see_the_renewed_one_and_old_ones_go_on(
     certificate, listening = own
     first, old = await listening.connect(trusting(certificate), name)
     machine.addresses = [FIELD]
-    said = certificate.refresh(NOW)
-    assert said is not None
-    assert "addresses or names changed" in said
-    assert str(FIELD) in said
+    notice = certificate.refresh(NOW)
+    assert notice is not None
+    assert "addresses or names changed" in notice
+    assert str(FIELD) in notice
     second, new = await listening.connect(trusting(certificate), name)
     assert second.serial_number != first.serial_number
     names = second.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     assert FIELD in names.get_values_for_type(x509.IPAddress)
     assert HOME not in names.get_values_for_type(x509.IPAddress)
-    assert await old.says(b"still here") == b"still here"
-    assert await new.says(b"here too") == b"here too"
+    assert await old.sends(b"still here") == b"still here"
+    assert await new.sends(b"here too") == b"here too"
     await old.end()
     await new.end()
 
@@ -121,7 +121,7 @@ async def test_a_session_of_before_is_not_resumed_with_the_old_one(
     context = trusting(certificate)
     context.maximum_version = ssl.TLSVersion.TLSv1_2
     _, line = await listening.connect(context, "localhost")
-    assert await line.says(b"x") == b"x"
+    assert await line.sends(b"x") == b"x"
     session = line._writer.get_extra_info("ssl_object").session
     assert session is None or not session.has_ticket
     await line.end()
@@ -148,7 +148,7 @@ def test_the_same_certificate_is_shown_after_a_restart(tmp_path: Path, machine: 
     assert third.authority.fingerprint == first.authority.fingerprint
 
 
-def test_what_cannot_be_renewed_stays_and_is_told_once(tmp_path: Path, machine: Machine) -> None:
+def test_what_cannot_be_renewed_stays_and_is_reported_once(tmp_path: Path, machine: Machine) -> None:
     certificate = OwnCertificate(tmp_path, machine.names, host="pit", now=NOW)
     machine.is_broken = True
     assert "cannot be renewed, the one before stays" in str(certificate.refresh(NOW))

@@ -1,4 +1,4 @@
-"""What a server is called, and for which of its names the authority may vouch."""
+"""What a server is called, and which of its names the authority may certify."""
 
 from __future__ import annotations
 

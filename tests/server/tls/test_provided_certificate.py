@@ -1,4 +1,4 @@
-"""A certificate that was given: what is wrong with it is said in words, and a changed one is read again."""
+"""A provided certificate: its faults are reported as sentences, and a changed one is read again."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_a_good_one_is_taken_with_its_names(tmp_path: Path, is_rsa: bool) -> Non
 
 
 @pytest.mark.parametrize(
-    ("after", "words"),
+    ("after", "text"),
     [
         (days(-1), "is valid from 2027-03-01 12:00 UTC only"),
         (days(75.9), None),
@@ -37,10 +37,10 @@ def test_a_good_one_is_taken_with_its_names(tmp_path: Path, is_rsa: bool) -> Non
         (days(90), "expires on 2027-05-30"),
     ],
 )
-def test_what_somebody_should_see_to_is_told(tmp_path: Path, after: dt.timedelta, words: str | None) -> None:
+def test_a_fault_of_a_usable_certificate_is_reported(tmp_path: Path, after: dt.timedelta, text: str | None) -> None:
     files = pair(tmp_path, start=NOW)
     warning = look(files.cert, files.key, now=NOW + after).warning
-    assert warning is None if words is None else words in str(warning)
+    assert warning is None if text is None else text in str(warning)
 
 
 def test_an_expired_one_is_refused(tmp_path: Path) -> None:
@@ -71,16 +71,16 @@ def test_one_without_names_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("which", ["cert", "key"])
 @pytest.mark.parametrize(
-    ("content", "words"), [(None, "cannot be read: No such file"), (b"\x00nothing", "holds no .* as PEM")]
+    ("content", "text"), [(None, "cannot be read: No such file"), (b"\x00nothing", "holds no .* as PEM")]
 )
-def test_what_is_no_certificate_or_key_is_named(tmp_path: Path, which: str, content: bytes | None, words: str) -> None:
+def test_what_is_no_certificate_or_key_is_named(tmp_path: Path, which: str, content: bytes | None, text: str) -> None:
     files = pair(tmp_path, start=NOW)
     broken: Path = getattr(files, which)
     if content is None:
         broken.unlink()
     else:
         broken.write_bytes(content)
-    with pytest.raises(TlsRefused, match=f"{broken.name}.*{words}|{broken.name} {words}"):
+    with pytest.raises(TlsRefused, match=f"{broken.name}.*{text}|{broken.name} {text}"):
         look(files.cert, files.key, now=NOW)
 
 
@@ -94,7 +94,7 @@ def test_a_changed_pair_is_read_again(tmp_path: Path) -> None:
     assert served.refresh(NOW + days(60)) is None
 
 
-def test_a_bad_one_leaves_the_one_of_before_and_is_told_once(tmp_path: Path) -> None:
+def test_a_bad_one_leaves_the_one_of_before_and_is_reported_once(tmp_path: Path) -> None:
     files = pair(tmp_path, start=NOW)
     served = ProvidedCertificateRenewal(files.cert, files.key, now=NOW)
     before = files.key.read_bytes()
@@ -110,7 +110,7 @@ def test_a_bad_one_leaves_the_one_of_before_and_is_told_once(tmp_path: Path) -> 
     assert served.given.cert.serial_number == renewed.serial
 
 
-def test_files_that_vanish_are_told_once_and_change_nothing(tmp_path: Path) -> None:
+def test_files_that_vanish_are_reported_once_and_change_nothing(tmp_path: Path) -> None:
     files = pair(tmp_path, start=NOW)
     served = ProvidedCertificateRenewal(files.cert, files.key, now=NOW)
     content = files.cert.read_bytes()
@@ -121,7 +121,7 @@ def test_files_that_vanish_are_told_once_and_change_nothing(tmp_path: Path) -> N
     assert "was read again" in str(served.refresh(NOW))
 
 
-def test_one_that_grows_old_while_it_is_served_is_told_once(tmp_path: Path) -> None:
+def test_one_that_expires_while_it_is_served_is_reported_once(tmp_path: Path) -> None:
     files = pair(tmp_path, start=NOW)
     served = ProvidedCertificateRenewal(files.cert, files.key, now=NOW)
     assert served.refresh(NOW + days(75)) is None
@@ -131,7 +131,7 @@ def test_one_that_grows_old_while_it_is_served_is_told_once(tmp_path: Path) -> N
     assert served.refresh(NOW + days(92)) is None
 
 
-def test_no_key_is_ever_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_no_key_is_ever_answered(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     files = pair(tmp_path, start=NOW)
     files.cert.write_bytes(files.key.read_bytes())
     with caplog.at_level(logging.DEBUG), pytest.raises(TlsRefused) as refused:

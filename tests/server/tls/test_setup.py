@@ -1,4 +1,4 @@
-"""The plain page: what it hands out, what it leads to, and that it serves nothing else."""
+"""The plain page: what it serves, where its links lead, and that it serves nothing else."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def test_every_platform_has_its_file_its_pictures_and_the_way_back(platform: ste
             assert max(map(len, lines)) <= 24  # what the drawn screen has room for
 
 
-def test_the_iphone_is_told_both_steps() -> None:
+def test_the_iphone_gets_both_steps() -> None:
     (iphone,) = (one for one in PLATFORMS if one.id == "iphone")
     text = " ".join(step.text for step in iphone.steps)
     assert "Profile Downloaded" in text

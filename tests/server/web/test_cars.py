@@ -1,4 +1,4 @@
-"""Several cars of one server: what a page is told of the others, and that an order reaches the car it was meant for."""
+"""Several cars of one server: what a page gets of the others, and that an order reaches the car it was meant for."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ async def test_a_page_of_another_car_is_heard_where_it_announces_alarms(bridge: 
         await hearing(["serval"], 1)
         await hearing(["serval"], 0, sound="asks")
         await hearing(["serval"], 1)
-        assert (await one.ask(kind="announces", visible=True, sound="ready"))["ok"] is False  # the server's own word
+        assert (await one.ask(kind="announces", visible=True, sound="ready"))["ok"] is False  # the server's own message
         await one.send(seen | {"announces": ["serval"], "leaves": True})
         await there.state(lambda state: state["reach"]["can"] == 0)
         await hearing(["serval"], 1)

@@ -92,7 +92,7 @@ def test_a_state_refers_to_the_last_one_over_what_came_between() -> None:
 
 
 def test_pages_that_got_the_same_share_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where each asked for something of its own meanwhile."""
+    """Also where each requested something of its own meanwhile."""
     made = []
     compressobj = zlib.compressobj
 

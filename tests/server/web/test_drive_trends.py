@@ -38,7 +38,7 @@ async def test_a_drive_is_told_in_buckets(bridge: RosBridge, server: str) -> Non
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "sentence"),
     [
         ({"signals": "nothing"}, "No signal is named 'nothing'"),
         ({"signals": "speed,brake,steering,distance,bearing"}, "At most 4 signals"),
@@ -51,11 +51,13 @@ async def test_a_drive_is_told_in_buckets(bridge: RosBridge, server: str) -> Non
         ({"buckets": 601}, "buckets"),
     ],
 )
-async def test_what_cannot_be_answered_is_refused_in_a_sentence(server: str, wrong: dict[str, str], said: str) -> None:
+async def test_what_cannot_be_answered_is_refused_in_a_sentence(
+    server: str, wrong: dict[str, str], sentence: str
+) -> None:
     async with http_client() as http:
         answer = await http.get(f"{server}/api/trends/drive", params=wrong)
     assert answer.status_code == 422
-    assert said in answer.json()["detail"]
+    assert sentence in answer.json()["detail"]
 
 
 async def test_no_such_vehicle_and_no_such_replay(server: str) -> None:

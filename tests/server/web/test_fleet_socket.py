@@ -74,7 +74,7 @@ def holder(one: Viewer, car: str) -> str | None:
 
 
 def logged(one: Viewer) -> list[tuple[str, str, str | None]]:
-    """What was said to happen to items."""
+    """The logged events of items."""
     return [(m["vehicle"], m["text"], m["by"]) for m in one.other if m["kind"] == "fleet_event"]
 
 
@@ -302,8 +302,8 @@ async def test_the_same_over_http(bridge: RosBridge, other: RosBridge) -> None:
         assert (nobody.status_code, nobody.json()["detail"]) in [
             (409, "This car needs nobody now."), (200, None),
         ]  # fmt: skip
-        asked = await client.post("/api/attention/offer", params=serval, json={"to": "page-nobody"})
-        assert (asked.status_code, asked.json()["detail"]) == (409, "That page is closed or not visible.")
+        offered = await client.post("/api/attention/offer", params=serval, json={"to": "page-nobody"})
+        assert (offered.status_code, offered.json()["detail"]) == (409, "That page is closed or not visible.")
         assert (await client.post("/api/attention/withdraw", params=serval)).status_code == 200
         assert (await client.post("/api/attention/answer", params=serval, json={"accept": True})).status_code == 409
         assert (await client.post("/api/attention/release", params=serval)).status_code == 200

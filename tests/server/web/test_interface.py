@@ -1,4 +1,4 @@
-"""The description of the HTTP interface is valid, and says of every route what it answers."""
+"""The description of the HTTP interface is valid, and has the answers of every route."""
 
 from __future__ import annotations
 

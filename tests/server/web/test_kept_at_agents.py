@@ -109,7 +109,7 @@ async def test_a_node_answers_as_the_agent_does_and_names_who_does_not_answer(tm
         await until(done)
         assert (await room.get(f"/agents/ocelot/api/exports/{job}/file")).content.startswith(b"PK")
 
-        assert (await room.get("/api/recordings")).status_code == 422, "whose is not said"
+        assert (await room.get("/api/recordings")).status_code == 422, "whose is not stated"
         assert (await room.get("/agents/nobody/api/recordings")).status_code == 404
         assert (await room.get("/agents/ocelot/api/state")).status_code == 404, "not kept at the agent"
         assert (await room.get(f"/agents/ocelot{kept.REPLAYS}/x")).status_code == 404
@@ -177,9 +177,11 @@ async def test_a_replay_runs_at_the_agent_and_only_its_newest_frames_come(tmp_pa
             await page.until(lambda: replay_of(page)["at_s"] >= 5.0, SOON_S)
             trends = await one.room.get("/api/trends", params={"replay": shown["token"]})
             assert trends.status_code == 200
-            await page.until(lambda: any(said.get("kind") == "timeline" for said in page.other), SOON_S)
+            await page.until(lambda: any(message.get("kind") == "timeline" for message in page.other), SOON_S)
             await one.stop_agent()
-            await page.until(lambda: any(said.get("kind") == "replay" and said["ended"] for said in page.other), 40.0)
+            await page.until(
+                lambda: any(message.get("kind") == "replay" and message["ended"] for message in page.other), 40.0
+            )
 
 
 def replay_of(page: Viewer) -> Any:
@@ -202,7 +204,7 @@ async def test_a_car_that_is_off_on_purpose_is_not_lost_until_it_is_heard(tmp_pa
         assert found["status"] == "cars lost"
         assert found["lost"] == {"margay": "The agent of margay has sent nothing since the server started."}
         ann = {"x-catgraph-name": "Ann"}
-        assert (await one.room.put("/api/off/ocelot", headers=ann)).status_code == 409, "it is heard"
+        assert (await one.room.put("/api/off/ocelot", headers=ann)).status_code == 409, "it sends data"
         assert (await one.room.put("/api/off/nobody", headers=ann)).status_code == 404
         assert (await one.room.put("/api/off/margay", headers=ann)).status_code == 200
         found = await health()
@@ -233,9 +235,9 @@ def is_on(health: Callable[[], Awaitable[Any]]) -> Callable[[], Awaitable[bool]]
 
 
 def off_of(page: Viewer, name: str) -> Any:
-    for said in reversed(page.other):
-        if said.get("kind") == "cars":
-            return next((car.get("off") for car in said["cars"] if car["name"] == name), None)
+    for message in reversed(page.other):
+        if message.get("kind") == "cars":
+            return next((car.get("off") for car in message["cars"] if car["name"] == name), None)
     return None
 
 

@@ -11,7 +11,7 @@ from server.web.known_vehicles import FILE, MOST, KnownVehicles
 
 
 def known(folder: Path | None, *names: str, forget: tuple[str, ...] = ()) -> set[str]:
-    """What a node knows that hears these, and is then started again."""
+    """The vehicles of a node that got messages of these and was then started again."""
     storage = StorageThread()
     one = KnownVehicles(folder, storage)
     for name in names:
@@ -20,7 +20,7 @@ def known(folder: Path | None, *names: str, forget: tuple[str, ...] = ()) -> set
     return KnownVehicles(folder, StorageThread(), forget=forget).names
 
 
-def test_what_was_heard_is_known_after_a_restart(tmp_path: Path) -> None:
+def test_vehicles_that_sent_data_are_known_after_a_restart(tmp_path: Path) -> None:
     assert known(tmp_path, "ocelot", "margay", "ocelot") == {"ocelot", "margay"}
     assert known(tmp_path, "serval") == {"ocelot", "margay", "serval"}
     assert known(tmp_path, forget=("margay",)) == {"ocelot", "serval"}

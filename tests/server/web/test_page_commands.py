@@ -1,4 +1,4 @@
-"""What one page says reaches the cars that it concerns, also where its own car is not served."""
+"""The status of a page reaches the cars that it concerns, also where its own car is not served."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ async def test_another_car_that_is_lost_does_not_hold_up_the_page() -> None:
 
 
 async def test_other_cars_are_announced_while_the_own_one_is_not_served() -> None:
-    heard: list[Mapping[str, Any]] = []
+    received: list[Mapping[str, Any]] = []
 
     async def serval(command: Mapping[str, Any]) -> Mapping[str, Any]:
-        heard.append(command)
+        received.append(command)
         return {"ok": True}
 
     bus = LocalBus(Journal(None), now=lambda: 0.0)
@@ -76,7 +76,7 @@ async def test_other_cars_are_announced_while_the_own_one_is_not_served() -> Non
         {"kind": "present", "visible": True, "sound": "ready", "awake": "ready", "announces": ["serval"]}
     )
     await page.leave()
-    assert [(one["kind"], one["leaves"]) for one in heard] == [("announces", False), ("announces", True)]
+    assert [(one["kind"], one["leaves"]) for one in received] == [("announces", False), ("announces", True)]
     assert complaints == []
 
 

@@ -184,7 +184,7 @@ async def test_each_state_is_newer_than_the_one_before_and_no_two_come_close_tog
 
 
 @pytest.mark.parametrize("ahead", [1, 6, 10**9])
-async def test_a_page_that_stops_answering_gets_as_many_as_it_said_and_one_offer(ahead: int) -> None:
+async def test_a_page_that_stops_answering_gets_as_many_as_it_announced_and_one_offer(ahead: int) -> None:
     page = SlowPage(ahead)
     async with watching(page):
         await asyncio.sleep(5.0)

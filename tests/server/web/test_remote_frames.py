@@ -86,7 +86,7 @@ def test_what_is_no_state_of_this_car_is_refused(payload: str | bytes) -> None:
         {"mode": {**live()["mode"], "mode": "teleoperated"}},
     ],
 )
-def test_a_word_of_a_newer_agent_does_not_hide_its_state(newer: dict[str, Any]) -> None:
+def test_a_value_of_a_newer_agent_does_not_hide_its_state(newer: dict[str, Any]) -> None:
     found = orjson.loads(READ("ocelot", "state", state(**newer), 0.0))
     assert {name: found[name] for name in newer} == newer
 

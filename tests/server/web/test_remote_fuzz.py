@@ -78,8 +78,8 @@ class Page:
         assert self.process.stdout is not None
         self.process.stdin.write(f"{json.dumps(text)}\n")
         self.process.stdin.flush()
-        said: dict[str, Any] = json.loads(self.process.stdout.readline())
-        return said
+        answer: dict[str, Any] = json.loads(self.process.stdout.readline())
+        return answer
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.virtual_time
 
 
 async def boot_of(one: Viewer) -> str:
-    hello = await one.until(lambda: next((said for said in one.other if said["kind"] == "hello"), None))
+    hello = await one.until(lambda: next((message for message in one.other if message["kind"] == "hello"), None))
     return str(hello["boot"])
 
 
@@ -60,8 +60,8 @@ async def test_a_restored_folder_gives_no_number_of_a_run_again(bridge: RosBridg
                 await one.until(lambda: later in one.events)
                 assert one.events[0]["n"] == kept["n"] + 1
             async with http_client(base_url=server) as client:
-                asked = {"after": lost["n"], "run": second}
-                answer = (await client.get("/api/events", params=asked)).json()
+                query = {"after": lost["n"], "run": second}
+                answer = (await client.get("/api/events", params=query)).json()
                 assert answer["resumed"]["common"] == 0
                 assert answer["events"][0]["n"] == 1
                 same = (await client.get("/api/events", params={"after": 1, "run": answer["run"]})).json()

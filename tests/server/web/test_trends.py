@@ -1,4 +1,4 @@
-"""The last minute over HTTP and in each state: what a page missed, it gets; what nobody heard, nobody tells."""
+"""The last minute over HTTP and in each state: what a page missed, it gets; what was not received is in no answer."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ async def test_a_page_that_comes_late_gets_what_it_missed(bridge: RosBridge, ser
     assert whole["highest"]["speed"][at : at + 4] == carried["highest"]["speed"]
     assert all(low >= 3.999 and high <= 4.401 for low, high in zip(*map(known, ends(whole)), strict=True))
     assert whole["first"] == whole["since"]
-    assert known(whole["lowest"]["brake"]) == []  # not published: nothing is told
+    assert known(whole["lowest"]["brake"]) == []  # not published: nothing is sent
 
 
 async def test_only_what_came_after(server: str) -> None:

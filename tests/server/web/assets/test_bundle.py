@@ -30,7 +30,7 @@ def static(tmp_path: Path) -> Path:
         (tmp_path / "js" / folder).mkdir(parents=True)
     (tmp_path / "css").mkdir()
     (tmp_path / "js" / "main.js").write_text(
-        "import { word } from './core/format.js';\nconsole.log(word);\n"
+        "import { greeting } from './core/format.js';\nconsole.log(greeting);\n"
         "globalThis.later = () => import('./later.js');\nglobalThis.theirs = () => import('../vendor/theirs.js');\n"
         "import './boot/threads.js';\n"
     )
@@ -38,17 +38,17 @@ def static(tmp_path: Path) -> Path:
         "globalThis.thread = new URL('../scan/scan-painter.js', import.meta.url).href;\n"
     )
     (tmp_path / "js" / "scan" / "scan-painter.js").write_text(
-        "import { word } from '../core/format.js';\nconsole.log('painting', word);\n"
+        "import { greeting } from '../core/format.js';\nconsole.log('painting', greeting);\n"
     )
-    (tmp_path / "js" / "core" / "format.js").write_text("// said at once\nexport const word = 'hello';\n")
+    (tmp_path / "js" / "core" / "format.js").write_text("// at once\nexport const greeting = 'hello';\n")
     (tmp_path / "js" / "later.js").write_text(
-        "import { word } from './core/format.js';\nexport const said = word + ' later';\n"
+        "import { greeting } from './core/format.js';\nexport const later = greeting + ' later';\n"
     )
     (tmp_path / "js" / "boot" / "early.js").write_text(
         "// before all others\n(() => {\n  globalThis.early = 'first';\n})();\n"
     )
     (tmp_path / "js" / "shell" / "fleet.js").write_text(
-        "import { word } from '../core/format.js';\nconsole.log(word, 'to all cars');\n"
+        "import { greeting } from '../core/format.js';\nconsole.log(greeting, 'to all cars');\n"
     )
     for name in {*STYLES, *FLEET_STYLES}:
         (tmp_path / "css" / f"{name}.css").write_text(f".{name} {{ color: red; }}\n")
@@ -73,7 +73,7 @@ def test_the_joined_script_says_what_the_many_said_and_the_rest_comes_later(stat
     built = find(static)
     assert built is not None
     program = (
-        f"await import({json.dumps(str(static / built.script))}); console.log((await later()).said);"
+        f"await import({json.dumps(str(static / built.script))}); console.log((await later()).later);"
         "theirs().catch((why) => console.log(why.message));"
     )
     done = subprocess.run([NODE, "--input-type=module", "-e", program], capture_output=True, text=True, check=True)
@@ -114,8 +114,8 @@ def test_the_script_of_a_thread_is_whole_in_itself_and_named_by_its_content(stat
         return Path(done.stdout.splitlines()[-1].removeprefix("file://"))
 
     first = thread()
-    said = subprocess.run([NODE, "--input-type=module", "-e", first.read_text()], capture_output=True, text=True)
-    assert said.stdout == "painting hello\n"
+    ran = subprocess.run([NODE, "--input-type=module", "-e", first.read_text()], capture_output=True, text=True)
+    assert ran.stdout == "painting hello\n"
     (static / "js" / "scan" / "scan-painter.js").write_text("console.log('painting anew');\n")
     join(TOOLS, static)
     second = thread()
@@ -123,7 +123,7 @@ def test_the_script_of_a_thread_is_whole_in_itself_and_named_by_its_content(stat
     assert second.is_file()
     renewed = find(static)
     assert renewed is not None
-    assert renewed.script != built.script, "what asks for another thread is another script"
+    assert renewed.script != built.script, "a script that loads another thread is another script"
 
 
 @pytest.mark.field

@@ -143,7 +143,7 @@ def test_another_content_is_another_version_and_the_same_is_the_same(static: Pat
     assert len(seen) == 7
 
 
-def test_the_worker_is_told_of_every_joined_file_and_of_nothing_that_is_live(static: Path) -> None:
+def test_the_worker_has_every_joined_file_and_nothing_that_is_live(static: Path) -> None:
     script = shell_of(static, BUILT, asset, b"").worker(static)
     found = json.loads(script.partition("\n")[0].removeprefix("self.SHELL = ").removesuffix(";"))
     assert {f"/static/built/{name}" for name in ("app-AAAAAAAA.js", "log-BBBBBBBB.js", "page-CCCCCCCC.css")} <= set(

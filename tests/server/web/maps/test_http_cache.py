@@ -1,10 +1,10 @@
-"""How long a tile holds by what its server says, and when that server may be asked again."""
+"""How long a tile is fresh by its server's headers, and when that server may be requested again."""
 
 from __future__ import annotations
 
 import pytest
 
-from server.web.maps.http_cache import LONGEST_S, MOST, UNSAID_S, WITHIN_S, Pace, fresh_for_s, retry_after_s
+from server.web.maps.http_cache import DEFAULT_FRESH_S, LONGEST_S, MOST, WITHIN_S, Pace, fresh_for_s, retry_after_s
 
 NOW_S = 1_790_000_000.0  # Mon, 21 Sep 2026 14:13:20 GMT
 DATE = "Mon, 21 Sep 2026 14:13:20 GMT"
@@ -14,7 +14,7 @@ LATER = "Mon, 21 Sep 2026 15:13:20 GMT"
 @pytest.mark.parametrize(
     ("headers", "seconds"),
     [
-        ({}, UNSAID_S),
+        ({}, DEFAULT_FRESH_S),
         ({"Cache-Control": "max-age=600"}, 600),
         ({"cache-control": "public, MAX-AGE=600 , immutable"}, 600),
         ({"Cache-Control": 'max-age="600"'}, 600),
@@ -28,7 +28,7 @@ LATER = "Mon, 21 Sep 2026 15:13:20 GMT"
         ({"Cache-Control": "max-age=" + "9" * 5000}, 0),
         ({"Cache-Control": "no-store, max-age=600"}, None),
         ({"Cache-Control": "no-cache"}, 0),
-        ({"Cache-Control": "public"}, UNSAID_S),
+        ({"Cache-Control": "public"}, DEFAULT_FRESH_S),
         ({"Expires": LATER, "Date": DATE}, 3600),
         ({"Expires": LATER}, 3600),
         ({"Expires": DATE, "Date": LATER}, 0),
@@ -48,7 +48,7 @@ def test_how_long_an_answer_holds(headers: dict[str, str], seconds: float | None
         ("Mon, 21 Sep 2026 14:00:00 GMT", 1), ("-5", None), ("nan", None), ("soon", None), ("1e3", None), ("٣", None),
     ],
 )  # fmt: skip
-def test_the_pause_that_is_asked_for(value: str | None, seconds: float | None) -> None:
+def test_the_pause_that_is_requested(value: str | None, seconds: float | None) -> None:
     assert retry_after_s(value, NOW_S) == seconds
 
 
@@ -61,9 +61,9 @@ def test_pauses_grow_with_each_failure_and_end_with_an_answer() -> None:
             now_s += 1.0
         pauses.append(now_s - began_s)
     assert pauses == [5, 10, 20, 40, 80, 160, 300, 300, 300]
-    assert pace.words(now_s) == "It does not answer."
+    assert pace.problem_now(now_s) == "It does not answer."
     pace.well()
-    assert pace.words(now_s) is None
+    assert pace.problem_now(now_s) is None
     pace.failed("It does not answer.", now_s)
     assert pace.may_ask(now_s + 5)
 
@@ -83,10 +83,10 @@ def test_so_many_within_so_long_and_no_more() -> None:
     pace = Pace()
     for i in range(MOST):
         assert pace.may_ask(float(i) / 10)
-        pace.asked(float(i) / 10)
+        pace.note_request(float(i) / 10)
     assert not pace.may_ask(WITHIN_S - 0.1)
-    assert "more come later" in str(pace.words(WITHIN_S - 0.1))
+    assert "more come later" in str(pace.problem_now(WITHIN_S - 0.1))
     assert pace.may_ask(WITHIN_S)
-    pace.asked(WITHIN_S)
+    pace.note_request(WITHIN_S)
     assert not pace.may_ask(WITHIN_S + 0.05)
     assert pace.may_ask(WITHIN_S + 0.1)

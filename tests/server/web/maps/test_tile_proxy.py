@@ -58,8 +58,8 @@ class Source:
             self._process = None
 
     @property
-    def asked(self) -> list[dict[str, Any]]:
-        path = self.folder / "asked.jsonl"
+    def requests(self) -> list[dict[str, Any]]:
+        path = self.folder / "requests.jsonl"
         return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
     def upstream(self, **more: Any) -> MapUpstream:
@@ -89,7 +89,7 @@ class Clock:
 
 
 class Server:
-    """Our own server, asked as a page asks."""
+    """Our own server, with requests as a page sends them."""
 
     def __init__(self, client: httpx.AsyncClient, clock: Clock) -> None:
         self.client = client
@@ -139,7 +139,7 @@ async def test_a_tile_is_fetched_once_and_shown_without_internet_ever_after(sour
         assert (answer.content, answer.headers["content-type"]) == (drawn("/3/5/2"), "image/png")
         assert answer.headers["cache-control"] == "private, max-age=86400"
         assert (await one.at(3, 5, 2)).content == drawn("/3/5/2")
-        assert [asked["path"] for asked in source.asked] == ["/3/5/2.png?key=SECRET"]
+        assert [one["path"] for one in source.requests] == ["/3/5/2.png?key=SECRET"]
     source.kill()
     async with serving(source.upstream(), data) as again:
         assert (await again.at(3, 5, 2)).content == drawn("/3/5/2")
@@ -185,9 +185,9 @@ async def test_the_source_is_told_who_asks_and_never_more_than_two_at_a_time(sou
         wanted = [tiles.format(z=5, x=x, y=y) for x in range(4) for y in range(4)]
         answers = await asyncio.gather(*(one.client.get(url) for url in wanted * 2))
         assert {answer.status_code for answer in answers} == {200}
-    assert len(source.asked) == 16, "asked by two phones at once, each is fetched once"
-    assert max(asked["at_once"] for asked in source.asked) == 2
-    headers = source.asked[0]["headers"]
+    assert len(source.requests) == 16, "requested by two phones at once, each is fetched once"
+    assert max(one["at_once"] for one in source.requests) == 2
+    headers = source.requests[0]["headers"]
     assert headers["User-Agent"] == f"catgraph/{catgraph_version()}"
     assert not {"Cookie", "Referer", "Authorization"} & set(headers)
 
@@ -195,25 +195,25 @@ async def test_the_source_is_told_who_asks_and_never_more_than_two_at_a_time(sou
 # -- how long a tile holds ---------------------------------------------------------------------------------------------
 
 
-async def test_an_old_tile_is_shown_at_once_and_asked_for_anew_behind_it(source: Source, tmp_path: Path) -> None:
+async def test_an_old_tile_is_shown_at_once_and_requested_again_behind_it(source: Source, tmp_path: Path) -> None:
     source.be(headers={"Cache-Control": "max-age=600"}, etag='"a"')
     async with serving(source.upstream(), tmp_path / "data") as one:
         assert (await one.at(3, 5, 2)).headers["cache-control"] == "private, max-age=600"
         one.clock.s += 599
         await one.at(3, 5, 2)
-        assert len(source.asked) == 1
+        assert len(source.requests) == 1
         one.clock.s += 2
         old = await one.at(3, 5, 2)
         assert (old.content, old.headers["cache-control"]) == (drawn("/3/5/2"), "no-cache")
-        await until(lambda: len(source.asked) == 2)
-        assert source.asked[1]["headers"]["If-None-Match"] == '"a"'
+        await until(lambda: len(source.requests) == 2)
+        assert source.requests[1]["headers"]["If-None-Match"] == '"a"'
         await fresh(one, 600)
         source.be(headers={"Cache-Control": "max-age=60"}, etag='"b"', edition="second")
         one.clock.s += 601
         assert (await one.at(3, 5, 2)).content == drawn("/3/5/2")
         await fresh(one, 60)
         assert (await one.at(3, 5, 2)).content == picture("/3/5/2.png?key=SECRETsecond")
-        assert len(source.asked) == 3
+        assert len(source.requests) == 3
 
 
 async def fresh(one: Server, seconds: int) -> None:
@@ -227,32 +227,32 @@ async def test_what_must_not_be_kept_is_not(source: Source, tmp_path: Path) -> N
     async with serving(source.upstream(), tmp_path / "data") as one:
         for _ in range(2):
             assert (await one.at(3, 5, 2)).content == drawn("/3/5/2")
-        assert len(source.asked) == 2
+        assert len(source.requests) == 2
         assert (await one.layer())["upstream"]["kept_bytes"] == 0
 
 
-async def test_a_tile_that_does_not_exist_is_not_asked_for_again_and_again(source: Source, tmp_path: Path) -> None:
+async def test_a_tile_that_does_not_exist_is_not_requested_again_and_again(source: Source, tmp_path: Path) -> None:
     source.be(status=404)
     async with serving(source.upstream(), tmp_path / "data") as one:
         for _ in range(3):
             assert (await one.at(3, 5, 2)).status_code == 204
-        assert len(source.asked) == 1
+        assert len(source.requests) == 1
         assert await one.problem() is None
         one.clock.s += 86_401
         source.be()
         await one.at(3, 5, 2)
-        await until(lambda: len(source.asked) == 2)
+        await until(lambda: len(source.requests) == 2)
 
 
 # -- when it does not want, or should not be believed ------------------------------------------------------------------
 
 
 BAD: dict[str, tuple[dict[str, Any], str, float]] = {
-    "asks for a pause": ({"status": 429, "headers": {"Retry-After": "120"}}, "requests a pause", 120),
-    "asks for a pause, by a date": (
+    "requests a pause": ({"status": 429, "headers": {"Retry-After": "120"}}, "requests a pause", 120),
+    "requests a pause, by a date": (
         {"status": 503, "headers": {"Retry-After": "Mon, 21 Sep 2026 14:16:40 GMT"}}, "requests a pause", 200
     ),
-    "asks for a pause, of no length": ({"status": 429}, "requests a pause", 5),
+    "requests a pause, of no length": ({"status": 429}, "requests a pause", 5),
     "refuses the key": ({"status": 403}, r"refuses \(403\): check the key\.", 600),
     "fails": ({"status": 500}, "answers with status 500", 5),
     "points elsewhere": (
@@ -262,8 +262,8 @@ BAD: dict[str, tuple[dict[str, Any], str, float]] = {
     "a drawing with a script": ({"body": "<svg onload='alert(1)'/>"}, "something that is not an image", 5),
     "nothing": ({"body": ""}, "something that is not an image", 5),
     "too much": ({"body": "\x89PNG" + "x" * 1000, "times": 2200}, "larger than 2 MB", 5),
-    "less than it says": ({"length": 100_000}, "does not answer", 5),
-    "304 without being asked": ({"status": 304, "body": ""}, "answers with status 304", 5),
+    "less than its header states": ({"length": 100_000}, "does not answer", 5),
+    "304 without a condition": ({"status": 304, "body": ""}, "answers with status 304", 5),
 }  # fmt: skip
 
 
@@ -274,15 +274,15 @@ async def test_a_source_in_a_bad_mood_is_left_alone_for_a_while(
     source.be(**mood)
     async with serving(source.upstream(), tmp_path / "data") as one:
         assert (await one.at(3, 5, 2)).status_code == 204
-        said = await one.problem()
-        assert said is not None
-        assert re.search(sentence, said), said
-        assert said.endswith((".", "?"))
-        assert "SECRET" not in said
+        problem = await one.problem()
+        assert problem is not None
+        assert re.search(sentence, problem), problem
+        assert problem.endswith((".", "?"))
+        assert "SECRET" not in problem
         source.be()
         one.clock.s += pause_s - 1
         assert (await one.at(3, 5, 3)).status_code == 204
-        assert len(source.asked) == 1, "nobody asks while it is left alone"
+        assert len(source.requests) == 1, "no request is sent meanwhile"
         one.clock.s += 2
         assert (await one.at(3, 5, 3)).content == drawn("/3/5/3")
         assert await one.problem() is None
@@ -295,7 +295,7 @@ async def test_no_redirect_is_followed_and_no_other_host_dialled(source: Source,
         source.be(status=302, headers={"Location": f"http://127.0.0.1:{other.port}/3/5/2.png"})
         async with serving(source.upstream(), tmp_path / "data") as one:
             assert (await one.at(3, 5, 2)).status_code == 204
-        assert other.asked == []
+        assert other.requests == []
     finally:
         other.kill()
 
@@ -347,19 +347,19 @@ async def test_nobody_fetches_a_whole_country(source: Source, tmp_path: Path, mo
     async with serving(source.upstream(), tmp_path / "data") as one:
         for x in range(8):
             await one.at(6, x, 0)
-        assert len(source.asked) == 5
+        assert len(source.requests) == 5
         assert "more come later" in str(await one.problem())
         one.clock.s += 601
         assert (await one.at(6, 7, 0)).status_code == 200
 
 
 @pytest.mark.parametrize(("z", "x", "y"), [(4, 0, 0), (9, 0, 0), (6, 64, 0), (6, 0, 64), (30, 0, 0)])
-async def test_beyond_its_levels_nothing_is_asked(source: Source, tmp_path: Path, z: int, x: int, y: int) -> None:
+async def test_beyond_its_levels_nothing_is_requested(source: Source, tmp_path: Path, z: int, x: int, y: int) -> None:
     async with serving(source.upstream(zoom=(5, 8)), tmp_path / "data") as one:
         layer = await one.layer()
         assert (layer["min_zoom"], layer["max_zoom"]) == (5, 8)
         assert (await one.at(z, x, y)).status_code == 204
-        assert source.asked == []
+        assert source.requests == []
 
 
 async def test_a_key_in_the_address_is_never_shown(
@@ -389,7 +389,7 @@ def kept(size: int = 1000, until_s: float = 1e12) -> Kept:
     return Kept(data=b"\x89PNG\r\n\x1a\n" + bytes(size - 8), until_s=until_s, etag=None, modified=None)
 
 
-def test_the_longest_unseen_make_room_and_it_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_longest_unseen_are_evicted_and_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     with closing(cache(tmp_path / "a.mbtiles", limit_bytes=20_000)) as one:
         for x in range(16):
             one.put((8, x, 0), kept(), now_s=1000.0 + x)
@@ -434,7 +434,7 @@ def test_a_file_that_is_none_is_put_aside(tmp_path: Path) -> None:
     assert path.with_name("a.mbtiles.damaged").read_bytes().startswith(b"no database")
 
 
-def test_what_cannot_be_written_is_said_and_not_waited_for(tmp_path: Path) -> None:
+def test_what_cannot_be_written_is_reported_and_not_waited_for(tmp_path: Path) -> None:
     with closing(cache(tmp_path / "a.mbtiles")) as one:
         one.put((5, 1, 2), kept(), 1.0)
         one._rows.execute("PRAGMA max_page_count = 1")  # as on a disk that is full
@@ -446,7 +446,7 @@ def test_what_cannot_be_written_is_said_and_not_waited_for(tmp_path: Path) -> No
     assert one.get((5, 1, 2), 2.0) is None
 
 
-# -- how it is asked for -----------------------------------------------------------------------------------------------
+# -- how it is requested -----------------------------------------------------------------------------------------------
 
 
 GOOD = "https://tiles.example/{z}/{x}/{y}.png?key=1"
@@ -499,7 +499,7 @@ def test_without_a_data_folder_there_is_no_upstream(source: Source) -> None:
 
 @pytest.mark.field
 @pytest.mark.parametrize("command", ["serve", "demo"])
-def test_the_command_says_what_lacks(tmp_path: Path, command: str) -> None:
+def test_the_command_reports_what_is_missing(tmp_path: Path, command: str) -> None:
     arguments = ["--port", "0", "--data", str(tmp_path), "--map-upstream", GOOD]
     done = subprocess.run(
         [sys.executable, "-m", "server", command, *arguments],

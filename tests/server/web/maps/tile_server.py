@@ -1,7 +1,7 @@
 """A little server of tiles as a process of its own: `python tile_server.py FOLDER [PORT]`.
 
-FOLDER/mood.json says how it answers now, `held` not before the mood changes. FOLDER/asked.jsonl holds what it was
-asked: path, headers, how many at once.
+FOLDER/mood.json sets how it answers now, `held` not before the mood changes. FOLDER/requests.jsonl holds the
+requests: path, headers, how many at once.
 Every tile is a picture of its own.
 """
 
@@ -21,7 +21,7 @@ LOCK = threading.Lock()
 
 
 def picture(path: str) -> bytes:
-    """A tile of one colour; which, is told by its path."""
+    """A tile of one colour, which its path selects."""
     colour = zlib.crc32(path.encode()).to_bytes(4, "big")[:3]
 
     def chunk(kind: bytes, data: bytes) -> bytes:
@@ -41,9 +41,9 @@ class Tiles(BaseHTTPRequestHandler):
         mood: dict[str, Any] = json.loads((self.folder / "mood.json").read_text())
         with LOCK:
             Tiles.at_once += 1
-            with (self.folder / "asked.jsonl").open("a") as asked:
+            with (self.folder / "requests.jsonl").open("a") as requests:
                 row = {"path": self.path, "headers": dict(self.headers), "at_once": Tiles.at_once}
-                asked.write(json.dumps(row) + "\n")
+                requests.write(json.dumps(row) + "\n")
         try:
             while mood.get("held"):
                 time.sleep(0.02)

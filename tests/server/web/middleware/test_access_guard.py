@@ -1,4 +1,4 @@
-"""As an attacker: from other pages, by other names, with words that were guessed, used, forged, old or of others."""
+"""As an attacker: from other pages, by other names, with credentials that are tried, used, forged, old or of others."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ async def closed(page: websockets.ClientConnection) -> tuple[int, str]:
     return page.close_code or 0, page.close_reason or ""
 
 
-# -- pairing ---------------------------------------------------------------------------------------------------------
+# -- pairing -----------------------------------------------------------------------------------------------------------
 
 
 async def test_a_link_pairs_one_device_once_and_its_cookie_is_all_it_takes(served: Served) -> None:
@@ -85,12 +85,12 @@ async def test_a_pin_lets_one_device_in_and_takes_the_link_beside_it_along(serve
         answer = await browser.post("/api/pair", json={"pin": typed, "name": "<b>\u202ephone"})
         assert (answer.status_code, answer.json()["role"]) == (200, "viewer")
         assert answer.json()["name"] == "<b> phone"  # a label, cleaned; the page writes it as text
-        for words in ({"pin": invitation.pin}, {"token": invitation.token}):
-            assert (await browser.post("/api/pair", json=words)).status_code == 403
+        for credentials in ({"pin": invitation.pin}, {"token": invitation.token}):
+            assert (await browser.post("/api/pair", json=credentials)).status_code == 403
 
 
 @pytest.mark.parametrize(
-    "words",
+    "credentials",
     [
         {},
         {"token": "x", "pin": "1"},
@@ -101,25 +101,25 @@ async def test_a_pin_lets_one_device_in_and_takes_the_link_beside_it_along(serve
     ],
     ids=["neither", "both", "empty", "number", "long", "a-role-of-its-own"],
 )
-async def test_words_that_are_none_are_refused(served: Served, words: dict[str, object]) -> None:
+async def test_words_that_are_none_are_refused(served: Served, credentials: dict[str, object]) -> None:
     async with served.browser() as browser:
-        assert (await browser.post("/api/pair", json=words)).status_code == 422
+        assert (await browser.post("/api/pair", json=credentials)).status_code == 422
 
 
 async def test_guessing_is_slowed_also_when_all_guesses_come_at_once(served: Served) -> None:
     right = served.access.pin(Role.OPERATOR)
-    guesses = [f"{n:06d}" for n in range(200) if f"{n:06d}" != right][:60]
+    pins = [f"{n:06d}" for n in range(200) if f"{n:06d}" != right][:60]
     async with served.browser() as browser:
-        answers = await asyncio.gather(*(browser.post("/api/pair", json={"pin": guess}) for guess in guesses))
+        answers = await asyncio.gather(*(browser.post("/api/pair", json={"pin": pin}) for pin in pins))
         codes = [answer.json()["code"] for answer in answers]
         assert codes.count("wrong") == 3
-        assert codes.count("wait") == len(guesses) - 3
-        # Who guesses is not looked at: the right PIN is refused with the same words.
+        assert codes.count("wait") == len(pins) - 3
+        # The sender does not matter: the right PIN is refused with the same text.
         late = await browser.post("/api/pair", json={"pin": right})
         assert (late.status_code, late.json()["code"]) == (429, "wait")
         assert int(late.headers["retry-after"]) >= 1
         assert late.json()["detail"] == "Too many wrong PINs. Wait, or scan the QR code instead."
-        # The link has 144 bits and needs no waits: a crew is not locked out by who guesses.
+        # The link has 144 bits and needs no waits: nobody who tries PINs can lock out a crew.
         token = served.access.invite(Role.OPERATOR)
         assert (await browser.post("/api/pair", json={"token": token})).status_code == 200
 
@@ -135,7 +135,7 @@ async def test_a_forwarded_address_makes_nobody_another_guesser(served: Served) 
         assert codes == ["wrong"] * 3 + ["wait"] * 2
 
 
-# -- Host and Origin -------------------------------------------------------------------------------------------------
+# -- Host and Origin ---------------------------------------------------------------------------------------------------
 
 BAD_HOSTS = [
     "evil.example",
@@ -220,7 +220,7 @@ async def test_a_strangers_page_is_refused_on_socket_and_on_what_changes_somethi
             ticket = await served.ticket(browser)
             assert await refused(served, ticket=ticket, cookie=cookie_of(browser), Origin=origin), origin
         assert (await browser.get("/api/me")).status_code == 200
-        # Without an Origin nobody says which page asks: no browser leaves it out there.
+        # Without an Origin the page that sends the request is not known: no browser leaves it out there.
         del browser.headers["Origin"]
         assert (await browser.post("/api/ticket")).status_code == 403
         assert (await browser.post("/api/pair", json={"pin": "1"})).status_code == 403
@@ -237,7 +237,7 @@ async def test_a_picture_on_a_strangers_page_fetches_nothing(served: Served) -> 
             assert (await browser.get("/api/state", headers=headers)).status_code == status
 
 
-# -- sockets and tickets ---------------------------------------------------------------------------------------------
+# -- sockets and tickets -----------------------------------------------------------------------------------------------
 
 
 async def test_a_greeting_brings_the_ticket_of_the_next_socket(served: Served) -> None:
@@ -279,7 +279,7 @@ async def test_a_program_opens_a_socket_by_its_key_alone(served: Served) -> None
     assert await refused(served, Authorization=f"Bearer {OPERATOR_KEY}", Origin="http://evil.example")
 
 
-# -- cookies and keys ------------------------------------------------------------------------------------------------
+# -- cookies and keys --------------------------------------------------------------------------------------------------
 
 
 async def test_a_cookie_that_was_touched_forged_or_cut_is_nothing(served: Served) -> None:
@@ -330,7 +330,7 @@ async def test_two_headers_of_one_name_are_refused(served: Served) -> None:
         assert (await raw(served, head)).startswith("HTTP/1.1 400")
 
 
-# -- what needs nobody --------------------------------------------------------
+# -- what needs nobody -------------------------------------------------------------------------------------------------
 
 
 async def test_the_shell_needs_nobody_and_tells_nothing_of_the_car(served: Served) -> None:
@@ -373,7 +373,7 @@ async def test_a_link_in_a_mail_leads_over_the_pairing_to_what_it_names(served: 
         assert answer.text == ""
 
 
-# -- removal ---------------------------------------------------------------------------------------------------------
+# -- removal -----------------------------------------------------------------------------------------------------------
 
 
 async def test_who_is_removed_is_out_at_once_with_sockets_and_requests(served: Served) -> None:
@@ -463,7 +463,7 @@ async def test_who_was_paired_is_paired_after_a_restart_and_who_was_removed_is_n
         assert (await browser.get("/api/me", headers={"Cookie": gone})).status_code == 401
 
 
-# -- open ------------------------------------------------------------------------------------------------------------
+# -- open --------------------------------------------------------------------------------------------------------------
 
 
 async def test_on_this_machine_alone_nobody_pairs_and_still_no_strangers_page_comes_in() -> None:

@@ -84,7 +84,7 @@ async def test_only_a_body_becomes_the_end_of_an_answer_to_head() -> None:
     ]
 
 
-async def test_head_of_a_file_names_its_whole_length_and_asks_for_no_range(client: httpx.AsyncClient) -> None:
+async def test_head_of_a_file_has_its_whole_length_and_ignores_ranges(client: httpx.AsyncClient) -> None:
     path = f"/api/recordings/{DRIVE}/file.mcap"
     whole = await client.get(path)
     head = await client.head(path, headers={"Range": "bytes=0-9"})
@@ -112,7 +112,7 @@ async def test_allow_names_all_methods_of_a_path(client: httpx.AsyncClient) -> N
 
 
 async def test_every_error_is_a_problem_document(client: httpx.AsyncClient) -> None:
-    asked = {
+    requests = {
         400: client.get("/api/me", headers=[("Authorization", "a"), ("Authorization", "b")]),
         403: client.get("/api/me", headers={"Host": "elsewhere.example"}),
         404: client.get("/api/nothing"),
@@ -122,7 +122,7 @@ async def test_every_error_is_a_problem_document(client: httpx.AsyncClient) -> N
         416: client.get(f"/api/recordings/{DRIVE}/file.mcap", headers={"Range": "bytes=99999999-"}),
         422: client.get("/api/events?limit=none"),
     }
-    for status, asking in asked.items():
+    for status, asking in requests.items():
         answer = await asking
         if status == 415:
             assert answer.status_code in (409, 415), "there is no such mark"

@@ -60,7 +60,7 @@ async def test_head_tells_the_same_without_a_byte(client: httpx.AsyncClient) -> 
 
 
 @pytest.mark.parametrize(
-    ("wish", "first", "last"),
+    ("requested", "first", "last"),
     [
         ("bytes=0-0", 0, 0),
         ("bytes=10-19", 10, 19),
@@ -73,17 +73,17 @@ async def test_head_tells_the_same_without_a_byte(client: httpx.AsyncClient) -> 
         ("bytes = 3 - 4", 3, 4),
     ],
 )
-async def test_a_part(client: httpx.AsyncClient, wish: str, first: int, last: int) -> None:
-    answer = await client.get("/file", headers={"range": wish})
+async def test_a_part(client: httpx.AsyncClient, requested: str, first: int, last: int) -> None:
+    answer = await client.get("/file", headers={"range": requested})
     assert answer.status_code == 206
     assert answer.headers["content-range"] == f"bytes {first}-{last}/{SIZE}"
     assert answer.headers["content-length"] == str(last - first + 1)
     assert answer.content == BYTES[first : last + 1]
 
 
-@pytest.mark.parametrize("wish", [f"bytes={SIZE}-", f"bytes={SIZE + 5}-{SIZE + 9}", "bytes=-0", "bytes=0-1,5-6"])
-async def test_a_part_that_is_not_there_is_416_with_a_sentence(client: httpx.AsyncClient, wish: str) -> None:
-    answer = await client.get("/file", headers={"range": wish})
+@pytest.mark.parametrize("requested", [f"bytes={SIZE}-", f"bytes={SIZE + 5}-{SIZE + 9}", "bytes=-0", "bytes=0-1,5-6"])
+async def test_a_part_that_is_not_there_is_416_with_a_sentence(client: httpx.AsyncClient, requested: str) -> None:
+    answer = await client.get("/file", headers={"range": requested})
     assert answer.status_code == 416
     assert answer.headers["content-range"] == f"bytes */{SIZE}"
     assert answer.headers["content-type"] == "application/problem+json"
@@ -91,10 +91,10 @@ async def test_a_part_that_is_not_there_is_416_with_a_sentence(client: httpx.Asy
 
 
 @pytest.mark.parametrize(
-    "wish", ["bytes=", "bytes=-", "bytes=9-3", "lines=0-3", "bytes=a-b", "bytes=" + "9" * 40 + "-"]
+    "requested", ["bytes=", "bytes=-", "bytes=9-3", "lines=0-3", "bytes=a-b", "bytes=" + "9" * 40 + "-"]
 )
-async def test_what_is_no_range_is_as_if_it_were_not_there(client: httpx.AsyncClient, wish: str) -> None:
-    answer = await client.get("/file", headers={"range": wish})
+async def test_what_is_no_range_is_as_if_it_were_not_there(client: httpx.AsyncClient, requested: str) -> None:
+    answer = await client.get("/file", headers={"range": requested})
     assert (answer.status_code, len(answer.content)) == (200, SIZE)
 
 

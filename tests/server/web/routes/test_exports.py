@@ -1,4 +1,4 @@
-"""Exports and clips over HTTP: begun, followed, fetched in parts, cancelled, swept away; refusals in words."""
+"""Exports and clips over HTTP: begun, followed, fetched in parts, cancelled, swept away; refusals as sentences."""
 
 from __future__ import annotations
 
@@ -124,11 +124,11 @@ async def test_refusals(client: httpx.AsyncClient) -> None:
     )
     assert problem(await client.delete("/api/exports/0123"), 404)
     assert "export a ROS 1 bag" in problem(await client.get(f"/api/recordings/{DRIVE}/export/ros2"), 422)
-    said = problem(await client.get(f"/api/recordings/{STILL}/export/gpx"), 422)
-    assert said == "No position was recorded in this drive: there is no track to export."
+    sentence = problem(await client.get(f"/api/recordings/{STILL}/export/gpx"), 422)
+    assert sentence == "No position was recorded in this drive: there is no track to export."
     failed = await over(client, await begin(client, "gpx", STILL))
-    assert (failed["state"], failed["sentence"]) == ("failed", said)
-    assert problem(await client.get(f"/api/exports/{failed['job']}/file"), 422) == said
+    assert (failed["state"], failed["sentence"]) == ("failed", sentence)
+    assert problem(await client.get(f"/api/exports/{failed['job']}/file"), 422) == sentence
 
 
 async def test_cancelling_ends_the_work_and_leaves_nothing(client: httpx.AsyncClient, data: Path) -> None:
@@ -321,12 +321,12 @@ async def test_a_clip_of_what_is_being_recorded_waits_for_its_end(bench: Bench) 
         speak(begin_ns + n * 100_000_000)
     at_ns = time.time_ns()
     job = await bench.exports.clip("car_20261121T120000Z", Window(at_ns=at_ns, before_s=1.0, after_s=1.5))
-    said = set()
+    sentences = set()
     while not job.finished.is_set():
         speak(time.time_ns())
-        said.add(job.sentence.partition(":")[0])
+        sentences.add(job.sentence.partition(":")[0])
         await asyncio.sleep(0.05)
-    assert "Waiting for 2 s after it to be recorded" in said
+    assert "Waiting for 2 s after it to be recorded" in sentences
     assert (job.state, job.notes) == ("done", [])
     assert job.recording is not None
     with open_recording([bench.made[0]]) as cut:
@@ -399,7 +399,7 @@ async def test_an_export_does_not_hold_up_the_loop(bench: Bench) -> None:
         assert "speed.csv" in packed.namelist()
 
 
-async def test_a_worker_that_dies_is_a_failure_in_words(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_worker_that_dies_is_a_failure_with_a_sentence(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.recording.export.worker._ROOT", bench.root)  # where there is no catgraph
     monkeypatch.setenv("PYTHONPATH", "")
     monkeypatch.setattr("sys.executable", "/bin/false")

@@ -74,7 +74,7 @@ def number(row: dict[str, str], *heads: str) -> list[float | None]:
     return [float(row[head]) if row[head] else None for head in heads]
 
 
-async def test_each_column_says_what_was_driven(client: httpx.AsyncClient) -> None:
+async def test_each_column_shows_what_was_driven(client: httpx.AsyncClient) -> None:
     first, second, third = await rows(client)
     texts = {
         "recording": FIRST, "vehicle": "car", "started": "2023-11-14T22:13:20.000000Z", "title": "'=1+1",

@@ -1,4 +1,4 @@
-"""Mail over HTTP: orders are taken or refused in words, the password goes one way, the outbox is told."""
+"""Mail over HTTP: orders are taken or refused with a sentence, the password is never returned, the outbox is listed."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ async def test_what_is_too_large_is_linked_by_the_address_the_page_used(api: htt
 
 @pytest.mark.field
 @pytest.mark.parametrize(
-    ("more", "status", "field", "words"),
+    ("more", "status", "field", "text"),
     [
         ({"to": ["a@b, evil@x"]}, 422, "to", "is not one address"),
         ({"to": ["a@b\r\nBcc: evil@x"]}, 422, "to", "is not one address"),
@@ -114,15 +114,15 @@ async def test_what_is_too_large_is_linked_by_the_address_the_page_used(api: htt
     ],
     ids=str,
 )
-async def test_what_is_refused_says_why(
-    api: httpx.AsyncClient, more: dict[str, Any], status: int, field: str | None, words: str
+async def test_what_is_refused_has_a_reason(
+    api: httpx.AsyncClient, more: dict[str, Any], status: int, field: str | None, text: str
 ) -> None:
     await api.put("/api/mail/settings", json={"host": "127.0.0.1", "sender": "a@b"})
     answer = await api.post("/api/mail", json=order(**more))
     assert answer.status_code == status
     assert answer.headers["content-type"] == "application/problem+json"
     body = answer.json()
-    assert words in body["detail"]
+    assert text in body["detail"]
     assert body.get("field") == field
     assert (await api.get("/api/mail")).json()["mails"] == []
 
@@ -134,8 +134,8 @@ async def test_an_order_without_settings_is_refused(api: httpx.AsyncClient) -> N
         "Mail is not set up: enter SMTP host and sender in Settings, E-mail.",
     )
     assert (await api.post("/api/mail/test", json={})).status_code == 409
-    for asked in (api.get("/api/mail/7"), api.post("/api/mail/7/cancel"), api.post("/api/mail/7/resend")):
-        answer = await asked
+    for sent in (api.get("/api/mail/7"), api.post("/api/mail/7/cancel"), api.post("/api/mail/7/resend")):
+        answer = await sent
         assert (answer.status_code, answer.json()["detail"]) == (404, "There is no mail number 7.")
 
 
@@ -178,14 +178,14 @@ async def test_the_settings_can_be_tried(api: httpx.AsyncClient, post: Post) -> 
     assert sent["sentence"].endswith("It accepted a mail to ann@example.org.")
     assert sent["said"].startswith("250 2.0.0 OK")
     assert sent["largest_bytes"] == 33_554_432
-    for to, status, words in (
+    for to, status, text in (
         ("gone@example.org", 502, "refuses the mail to gone@example.org: 550 5.1.1"),
         ("ann@example.com", 422, "is not among the allowed recipients"),
         ("a@b, c@d", 422, "is not one address"),
     ):
         answer = await api.post("/api/mail/test", json={"to": to})
         assert answer.status_code == status
-        assert words in answer.json()["detail"]
+        assert text in answer.json()["detail"]
     await post.kill()
     answer = await api.post("/api/mail/test", json={})
     assert (answer.status_code, answer.json()["detail"]) == (502, f"127.0.0.1:{post.port} refuses the connection.")

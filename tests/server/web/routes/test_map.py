@@ -71,7 +71,7 @@ async def test_a_tile_may_be_kept_for_ever_and_is_nothing_but_a_picture(client: 
     assert headers["x-content-type-options"] == "nosniff"
 
 
-async def test_what_the_page_is_told(client: httpx.AsyncClient) -> None:
+async def test_what_the_page_gets(client: httpx.AsyncClient) -> None:
     (layer,) = (await ground(client))["layers"]
     assert layer | {"tiles": ""} == {
         "title": "Halves", "tiles": "", "min_zoom": 0, "max_zoom": 1, "bounds": [-180, -85, 0, 85], "attribution": "",
@@ -126,7 +126,7 @@ async def test_several_maps_keep_their_order_and_one_named_twice_is_one(tmp_path
 
 
 @pytest.mark.parametrize(
-    ("said", "bounds"),
+    ("stated", "bounds"),
     [
         ("-111,32,-110.5,32.5", (-111, 32, -110.5, 32.5)),
         (" -111, 32, -110.5, 32.5 ", (-111, 32, -110.5, 32.5)),
@@ -138,8 +138,8 @@ async def test_several_maps_keep_their_order_and_one_named_twice_is_one(tmp_path
         ("-181,0,0,1", (-180, -90, 180, 90)),
     ],
 )
-def test_bounds(tmp_path: Path, said: str, bounds: tuple[float, ...]) -> None:
-    with closing(MapFile(maps.write(tmp_path / "a.mbtiles", HALVES, bounds=said))) as one:
+def test_bounds(tmp_path: Path, stated: str, bounds: tuple[float, ...]) -> None:
+    with closing(MapFile(maps.write(tmp_path / "a.mbtiles", HALVES, bounds=stated))) as one:
         assert one.layer.bounds == bounds
 
 
@@ -164,7 +164,7 @@ def test_zoom_levels_are_looked_up_where_the_file_does_not_say(tmp_path: Path) -
         ("", ""),
     ],
 )
-def test_an_attribution_is_words(tmp_path: Path, markup: str, text: str) -> None:
+def test_an_attribution_is_plain_text(tmp_path: Path, markup: str, text: str) -> None:
     assert plain_text(markup) == text
     with closing(MapFile(maps.write(tmp_path / "a.mbtiles", HALVES, attribution=markup, name=markup or "n"))) as one:
         assert one.layer.attribution == text
@@ -211,7 +211,7 @@ BAD: dict[str, tuple[Callable[[Path], Any], str]] = {
     "overwritten": (overwrite, "damaged|cannot be read|holds tiles that are neither"),
     "empty": (lambda path: path.write_bytes(b""), "has no tiles"),
     "another database": (drop_tiles, "is not an MBTiles file: it has no tiles"),
-    "vector by its word": (
+    "vector by its format": (
         lambda path: (path.unlink(), maps.write(path, [(0, 0, 0, b"\x1a\x02")], format="pbf")), "has vector tiles"
     ),
     "vector by its bytes": (
@@ -226,10 +226,10 @@ BAD: dict[str, tuple[Callable[[Path], Any], str]] = {
         lambda path: (path.unlink(), maps.write(path, [(0, 0, 0, "text")])), "neither png"  # type: ignore[list-item]
     ),
     "absurd zoom levels": (
-        lambda path: (path.unlink(), maps.write(path, HALVES, minzoom="9", maxzoom="3")), "zoom levels go from 9 to 3"
+        lambda path: (path.unlink(), maps.write(path, HALVES, minzoom="9", maxzoom="3")), "zoom levels: 9 to 3"
     ),
     "a zoom level far beyond": (
-        lambda path: (path.unlink(), maps.write(path, HALVES, minzoom="0", maxzoom="99")), "zoom levels go from 0 to 99"
+        lambda path: (path.unlink(), maps.write(path, HALVES, minzoom="0", maxzoom="99")), "zoom levels: 0 to 99"
     ),
 }  # fmt: skip
 
@@ -243,7 +243,7 @@ def test_a_file_that_cannot_be_drawn_is_refused(halves: Path, spoil: Callable[[P
     assert "\n" not in str(why.value)
 
 
-def test_a_file_damaged_later_has_no_tile_there_and_is_told_once(
+def test_a_file_damaged_later_has_no_tile_there_and_is_logged_once(
     halves: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     with closing(MapFile(halves)) as one:

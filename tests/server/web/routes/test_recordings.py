@@ -1,4 +1,4 @@
-"""The recordings over HTTP: listed, called by names, fetched in parts, deleted, taken back; every refusal in words."""
+"""The recordings over HTTP: listed, named, fetched in parts, deleted, restored; every refusal as a sentence."""
 
 from __future__ import annotations
 
@@ -130,8 +130,8 @@ async def test_a_database_is_not_downloaded_without_its_log(
 
 
 async def test_a_title_names_the_file_and_does_no_harm(client: httpx.AsyncClient) -> None:
-    said = {"title": '../"Wet"\r\nX: y\u202e <b>lot</b> Straße', "note": "a\nb", "tags": ["wet", "Wet"]}
-    row = (await client.patch(f"/api/recordings/{SECOND}", json=said)).json()
+    change = {"title": '../"Wet"\r\nX: y\u202e <b>lot</b> Straße', "note": "a\nb", "tags": ["wet", "Wet"]}
+    row = (await client.patch(f"/api/recordings/{SECOND}", json=change)).json()
     assert row["title"] == '../"Wet" X: y <b>lot</b> Straße'
     assert (row["note"], row["tags"]) == ("a\nb", ["wet"])
     name = (await client.get(f"/api/recordings/{SECOND}/file.mcap")).headers["content-disposition"]
@@ -147,7 +147,7 @@ async def test_a_title_names_the_file_and_does_no_harm(client: httpx.AsyncClient
 
 
 @pytest.mark.parametrize(
-    ("body", "words"),
+    ("body", "text"),
     [
         ({"title": "x" * 10_000}, "A title has at most 120 letters; this has 10000."),
         ({"note": "x" * 4001}, "at most 4000 letters"),
@@ -159,8 +159,8 @@ async def test_a_title_names_the_file_and_does_no_harm(client: httpx.AsyncClient
     ],
     ids=lambda value: str(value)[:30],
 )
-async def test_what_cannot_be_said_of_it(client: httpx.AsyncClient, body: dict[str, Any], words: str) -> None:
-    assert words in problem(await client.patch(f"/api/recordings/{FIRST}", json=body), 422)
+async def test_what_cannot_be_said_of_it(client: httpx.AsyncClient, body: dict[str, Any], text: str) -> None:
+    assert text in problem(await client.patch(f"/api/recordings/{FIRST}", json=body), 422)
     assert (await client.get(f"/api/recordings/{FIRST}")).json()["title"] == ""
 
 
