@@ -136,7 +136,6 @@ def _bar(episode: Episode) -> dict[str, Any]:
         "from": round(episode.raised_s, 3),
         "to": round(episode.until_s, 3),
         "open": episode.cleared_s is None,
-        "announced": [round(one.at_s, 3) for one in episode.announcements],
         "hidden": [[round(from_s, 3), round(to_s, 3)] for from_s, to_s in episode.suppressed],
     }
 

@@ -67,8 +67,8 @@ class Connection:
     @property
     def largest_bytes(self) -> int | None:
         """The server's size limit (RFC 1870) [B]; None: not declared."""
-        on_progress = self._smtp.esmtp_extensions.get("size", "")
-        return int(on_progress) if on_progress.isdigit() and int(on_progress) > 0 else None
+        limit = self._smtp.esmtp_extensions.get("size", "")
+        return int(limit) if limit.isdigit() and int(limit) > 0 else None
 
     async def hand_over(
         self, mail: Envelope, on_progress: Callable[[int], None]

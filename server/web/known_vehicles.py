@@ -40,10 +40,16 @@ class KnownVehicles:
         self._path = None if folder is None else folder / FILE
         self._storage = storage
         self.names = self._read() - set(forget)
+        self._has_warned = False
 
     def note(self, name: str) -> None:
         """It sent something; written without waiting for the disk."""
-        if name in self.names or len(self.names) >= MOST or not is_name(name):
+        if name in self.names or not is_name(name):
+            return
+        if len(self.names) >= MOST:
+            if not self._has_warned:
+                log.warning("vehicle_not_stored vehicle=%s most=%d: once lost, more are not listed", name, MOST)
+            self._has_warned = True
             return
         self.names.add(name)
         if self._path is not None:
@@ -84,13 +90,16 @@ class OffVehicles:
         """Who declared it off and when; None: nobody."""
         return self._off.get(name)
 
-    def declare(self, name: str, by: str) -> None:
-        """A person declares it off. Written without waiting for the disk."""
-        if name in self._off or len(self._off) >= MOST_OFF:
-            return
+    def declare(self, name: str, by: str) -> bool:
+        """A person declares it off. Written without waiting for the disk. False: no more can be stored."""
+        if name in self._off:
+            return True
+        if len(self._off) >= MOST_OFF:
+            return False
         self._off[name] = {"by": by, "since_ms": self._wall_ms()}
         log.info("car_off vehicle=%s by=%s", name, by)
         self._write()
+        return True
 
     def withdraw(self, name: str, by: str) -> None:
         """A person declares that it is not off."""

@@ -10,6 +10,7 @@ from fastapi import Path as InPath
 from server.access.identity import LOCAL, principal_of
 from server.control import display_name
 from server.web.interface import raises
+from server.web.known_vehicles import MOST_OFF
 from server.web.middleware.errors import Problem
 from server.web.routes.session_request import NAME_HEADER, Done
 from server.web.services import Services, services
@@ -24,7 +25,8 @@ async def off(request: Request, vehicle: Name) -> Done:
     app = _node(request, vehicle)
     if app.bus.trouble(vehicle) is None:
         raise Problem(409, f"{vehicle} sends data: it is not off.")
-    app.off.declare(vehicle, _by(request))
+    if not app.off.declare(vehicle, _by(request)):
+        raise Problem(409, f"{MOST_OFF} cars are off on purpose already: declare one of them not off first.")
     return Done()
 
 

@@ -3,7 +3,7 @@
 /**
  * @typedef {{label: string, ink: 'ink' | 'ink2' | 'order' | 'you', limit: boolean, t: number[], v: (number | null)[]}} Curve
  * @typedef {{title: string, unit: string, digits: number, curves: Curve[]}} Panel
- * @typedef {{alarm: string, title: string, priority: string, from: number, to: number, open: boolean, announced: number[],
+ * @typedef {{alarm: string, title: string, priority: string, from: number, to: number, open: boolean,
  *   hidden: [number, number][]}} Bar
  * @typedef {{label: string, priority: string, spans: [number, number, string, string][]}} CheckTimeline
  * @typedef {{from: number, to: number, startMs: number | null, panels: Panel[], track: {t: number[], e: number[],
