@@ -19,7 +19,7 @@ from server.vehicle.delivery import Delivery
 from server.vehicle.rosapi_watch import MissingWatch
 from server.vehicle.undelivered import BLOCKED_AFTER_S, OWN_CLIENTS, Passing
 from tests.server.cli.test_doctor import doctor
-from tests.server.ear import Bridge, Ear, bridging, linked, until
+from tests.server.link_listener import Bridge, LinkListener, bridging, linked, until
 from tests.world.bridge_player import FILES, name_of, playing
 
 pytestmark = pytest.mark.world(n=8)
@@ -207,8 +207,8 @@ def answered(values: Any = None, *, result: bool = True) -> Callable[[dict[str, 
     return answer
 
 
-async def opened(link: RosLink, ear: Ear) -> tuple[Questions, Diagnosis]:
-    await ear.hears("opened")
+async def opened(link: RosLink, listener: LinkListener) -> tuple[Questions, Diagnosis]:
+    await listener.wait_for("opened")
     diagnosis = Diagnosis()
     return Questions(link, diagnosis, now=time.monotonic), diagnosis
 
@@ -216,9 +216,9 @@ async def opened(link: RosLink, ear: Ear) -> tuple[Questions, Diagnosis]:
 @pytest.mark.virtual_time
 async def test_a_question_that_is_not_answered_holds_up_no_command() -> None:
     """On ROS 2 the bridge reads nothing more from a connection until its call is answered."""
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        questions, _ = await opened(link, ear)
+    listener = LinkListener()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        questions, _ = await opened(link, listener)
         with pytest.raises(CallFailed):
             await questions.call("/rosapi/get_time", timeout_s=0.05)
         for row in link.subscriptions:
@@ -231,9 +231,9 @@ async def test_a_question_that_is_not_answered_holds_up_no_command() -> None:
 
 @pytest.mark.virtual_time
 async def test_while_a_question_waits_no_other_is_put_behind_it_and_a_late_answer_frees_it() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        questions, diagnosis = await opened(link, ear)
+    listener = LinkListener()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        questions, diagnosis = await opened(link, listener)
         for _ in range(3):
             with pytest.raises(CallFailed):
                 await questions.call("/rosapi/get_time", timeout_s=0.05)
@@ -248,14 +248,14 @@ async def test_while_a_question_waits_no_other_is_put_behind_it_and_a_late_answe
 @pytest.mark.virtual_time
 async def test_a_slow_link_is_not_held_against_rosapi() -> None:
     """Only where the bridge has answered the ping behind a question has it read the question."""
-    ear = Ear()
+    listener = LinkListener()
 
     async def slow(bridge: Bridge) -> None:
         for socket in bridge.sockets:
             socket.transport.pause_reading()  # type: ignore[attr-defined]
 
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        questions, diagnosis = await opened(link, ear)
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        questions, diagnosis = await opened(link, listener)
         bridge.answer = answered({"time": {}})
         await questions.call("/rosapi/get_time")
         await slow(bridge)
@@ -267,9 +267,9 @@ async def test_a_slow_link_is_not_held_against_rosapi() -> None:
 
 @pytest.mark.virtual_time
 async def test_rosapi_that_does_not_answer_is_named_where_the_bridge_has_read_the_question() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        questions, diagnosis = await opened(link, ear)
+    listener = LinkListener()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        questions, diagnosis = await opened(link, listener)
         with pytest.raises(CallFailed):
             await questions.call("/rosapi/get_time", timeout_s=0.3)
         found = diagnosis.problem(time.monotonic() + 60.0, flows=True)
@@ -279,11 +279,11 @@ async def test_rosapi_that_does_not_answer_is_named_where_the_bridge_has_read_th
 
 @pytest.mark.virtual_time
 async def test_questions_end_with_the_link() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(bridge.address, ear) as link:
-        questions, _ = await opened(link, ear)
+    listener = LinkListener()
+    async with bridging() as bridge, linked(bridge.address, listener) as link:
+        questions, _ = await opened(link, listener)
         link.abort()
-        await ear.hears("closed")
+        await listener.wait_for("closed")
         with pytest.raises(LinkDown):
             await questions.call("/rosapi/get_time")
         questions.stop()

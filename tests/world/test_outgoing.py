@@ -33,7 +33,7 @@ from server.slowdown.guard_client import GuardClient
 from server.slowdown.publisher import CommandPublisher
 from server.vehicle import discovery
 from server.vehicle.subscriptions import Subscriptions
-from tests.server.ear import Ear
+from tests.server.link_listener import LinkListener
 from tests.tree import RECORDINGS
 
 pytestmark = pytest.mark.world(n=1)
@@ -87,7 +87,7 @@ class Wire:
 
 def wired(answer: Callable[[dict[str, Any]], Any] = lambda operation: None) -> tuple[RosLink, Wire]:
     """A link on a socket that only writes down; to be made on a running loop."""
-    link, wire = RosLink(parse("127.0.0.1"), Ear(), now=time.monotonic), Wire(answer)
+    link, wire = RosLink(parse("127.0.0.1"), LinkListener(), now=time.monotonic), Wire(answer)
     link._socket = wire  # type: ignore[assignment]
     link._listener = SimpleNamespace()  # type: ignore[assignment]
     wire.link = link

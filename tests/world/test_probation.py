@@ -19,7 +19,7 @@ from server.vehicle.vehicle import Vehicle
 from server.vehicle.wanted_topics import LEFT_AFTER, STEADY_S, Probation
 from tests.server.cars import driving
 from tests.server.conftest import serving
-from tests.server.ear import until
+from tests.server.link_listener import until
 from tests.server.rosbridge_server.conftest import bridging
 from tests.server.viewer import viewer
 

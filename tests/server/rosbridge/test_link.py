@@ -19,7 +19,7 @@ from server.rosbridge.address import parse
 from server.rosbridge.link import RosLink
 from server.rosbridge.live_source import CallFailed, LinkDown
 from server.rosbridge.subscription import Subscription
-from tests.server.ear import Ear, accept, answering, bridging, linked, until
+from tests.server.link_listener import LinkListener, accept, answering, bridging, linked, until
 from tests.server.rosbridge.rows import ANY, OVER, ROWS, SCAN, SPEED
 
 pytestmark = pytest.mark.virtual_time
@@ -48,7 +48,7 @@ async def leaving_nothing() -> AsyncIterator[None]:
 
 
 async def test_the_table_is_sent_once_an_opening_in_order_before_anything_else() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge:
         link = RosLink(parse(bridge.address), listener, now=time.monotonic)
         for row in (SPEED, SCAN, ANY):
@@ -63,9 +63,9 @@ async def test_the_table_is_sent_once_an_opening_in_order_before_anything_else()
 
 
 async def test_a_changed_row_takes_the_place_of_the_old_one_an_equal_one_is_left() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener) as link:
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         link.subscribe(SPEED)
         link.subscribe(Subscription(topic="/vel", type="geometry_msgs/Twist", queue_length=50))
         link.subscribe(Subscription(topic="/vel", type="geometry_msgs/Twist", queue_length=1))
@@ -95,15 +95,15 @@ async def test_a_changed_row_takes_the_place_of_the_old_one_an_equal_one_is_left
 
 
 async def test_what_changes_while_down_counts_at_the_next_opening() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener) as link:
         link.subscribe(SPEED)
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         bridge.socket.transport.abort()
-        await listener.hears("closed")
+        await listener.wait_for("closed")
         link.unsubscribe("/vel")
         link.subscribe(ANY)
-        await listener.hears("opened", 2)
+        await listener.wait_for("opened", 2)
         link.send_now(OVER)
         await until(lambda: OVER in bridge.operations)
         assert bridge.operations == [ROWS[2], OVER]
@@ -111,7 +111,7 @@ async def test_what_changes_while_down_counts_at_the_next_opening() -> None:
 
 async def test_nothing_is_sent_while_down_and_nothing_later() -> None:
     """Before the first opening, between two, while the other side closes, and after the end."""
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge:
         link = RosLink(parse(bridge.address), listener, now=time.monotonic)
         with pytest.raises(LinkDown):
@@ -119,16 +119,16 @@ async def test_nothing_is_sent_while_down_and_nothing_later() -> None:
         link.start()
         with pytest.raises(LinkDown):
             link.send_now(OVER)
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         bridge.socket.transport.abort()
-        await listener.hears("closed")
+        await listener.wait_for("closed")
         assert not link.is_open
         for _ in range(50):
             with pytest.raises(LinkDown):
                 link.send_now(OVER)
         with pytest.raises(LinkDown):
             await link.call("/rosapi/topics")
-        await listener.hears("opened", 2)
+        await listener.wait_for("opened", 2)
         link.send_now(OVER)
         await until(lambda: bridge.operations)
         link.stop()
@@ -140,7 +140,7 @@ async def test_nothing_is_sent_while_down_and_nothing_later() -> None:
 
 async def test_after_the_bridges_goodbye_nothing_is_sent_and_the_link_closes_at_once() -> None:
     """A bridge that sends a close frame and then leaves the connection open."""
-    listener = Ear()
+    listener = LinkListener()
 
     async def leave(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await accept(reader, writer)
@@ -149,8 +149,8 @@ async def test_after_the_bridges_goodbye_nothing_is_sent_and_the_link_closes_at_
         await asyncio.sleep(5)
 
     async with answering(leave) as port, linked(f"127.0.0.1:{port}", listener) as link:
-        await listener.hears("opened")
-        problem = await listener.hears("closed", within_s=0.06)
+        await listener.wait_for("opened")
+        problem = await listener.wait_for("closed", within_s=0.06)
         assert problem.code == "closed"
         assert "roslaunch is over" not in problem.title
         assert "(roslaunch is ove" in problem.hint
@@ -160,57 +160,57 @@ async def test_after_the_bridges_goodbye_nothing_is_sent_and_the_link_closes_at_
 
 
 async def test_hurried_while_waiting_it_dials_at_once() -> None:
-    listener = Ear()
+    listener = LinkListener()
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         async with linked(f"127.0.0.1:{closed.getsockname()[1]}", listener) as link:
             for attempt in range(1, 6):
-                await listener.hears("failed", attempt, within_s=0.01)
+                await listener.wait_for("failed", attempt, within_s=0.01)
                 await asyncio.sleep(dialer.FIRST_RETRY_S - 0.05)
                 assert link.attempts == attempt
                 link.retry_now()
 
 
 async def test_hurried_while_dialling_in_the_handshake_or_open_there_is_never_a_second_connection() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener) as link:
         for _ in range(100):
             link.retry_now()
             await asyncio.sleep(0)
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         for _ in range(20):
             link.retry_now()
             await asyncio.sleep(0.01)
         assert len(bridge.connections) == 1
         bridge.socket.transport.abort()
-        await listener.hears("closed")
+        await listener.wait_for("closed")
         for _ in range(100):
             link.retry_now()
             await asyncio.sleep(0)
-        await listener.hears("opened", 2)
+        await listener.wait_for("opened", 2)
         await asyncio.sleep(2 * dialer.LAST_RETRY_S)
         assert len(bridge.connections) == 2
         assert len(listener.all("opened")) == 2
 
 
 async def test_hurried_in_the_very_moment_of_closing_it_goes_on_trying() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener) as link:
         listener.link_closed = lambda problem: link.retry_now()  # type: ignore[method-assign]
         for opening in range(1, 4):
-            await listener.hears("opened", opening)
+            await listener.wait_for("opened", opening)
             bridge.socket.transport.abort()
-        await listener.hears("opened", 4)
+        await listener.wait_for("opened", 4)
 
 
 async def test_the_wait_between_two_tries_grows_to_its_limit_and_not_beyond() -> None:
-    listener = Ear()
+    listener = LinkListener()
     times_s: list[float] = []
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         async with linked(f"127.0.0.1:{closed.getsockname()[1]}", listener):
             for count in range(1, 11):
-                await listener.hears("failed", count)
+                await listener.wait_for("failed", count)
                 times_s.append(time.monotonic())
     waits_s = [later - earlier for earlier, later in itertools.pairwise(times_s)]
     assert waits_s == pytest.approx([0.2, 0.34, 0.578, 0.9826, 1.67042, 2.0, 2.0, 2.0, 2.0], abs=0.001)
@@ -218,7 +218,7 @@ async def test_the_wait_between_two_tries_grows_to_its_limit_and_not_beyond() ->
 
 async def test_ended_before_it_began() -> None:
     async with leaving_nothing():
-        link = RosLink(parse("127.0.0.1:1"), Ear(), now=time.monotonic)
+        link = RosLink(parse("127.0.0.1:1"), LinkListener(), now=time.monotonic)
         link.stop()
         link.start()  # too late
         link.retry_now()
@@ -226,11 +226,11 @@ async def test_ended_before_it_began() -> None:
 
 
 async def test_ended_while_open() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge:
         async with leaving_nothing():
             async with linked(bridge.address, listener) as link:
-                await listener.hears("opened")
+                await listener.wait_for("opened")
                 call = asyncio.create_task(link.call("/rosapi/topics"))
                 await asyncio.sleep(0.05)
             with pytest.raises(LinkDown):
@@ -242,7 +242,7 @@ async def test_ended_while_open() -> None:
 
 
 async def test_ended_during_the_handshake() -> None:
-    listener = Ear()
+    listener = LinkListener()
     arrived, left = asyncio.Event(), asyncio.Event()
 
     async def say_nothing(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -260,7 +260,7 @@ async def test_ended_during_the_handshake() -> None:
 
 
 async def test_ended_just_before_the_handshake_is_done() -> None:
-    listener = Ear()
+    listener = LinkListener()
     arrived, may_answer, left = asyncio.Event(), asyncio.Event(), asyncio.Event()
 
     async def answer_late(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -281,12 +281,12 @@ async def test_ended_just_before_the_handshake_is_done() -> None:
 
 
 async def test_ended_while_waiting_for_the_next_try() -> None:
-    listener = Ear()
+    listener = LinkListener()
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         async with leaving_nothing():
             async with linked(f"127.0.0.1:{closed.getsockname()[1]}", listener):
-                await listener.hears("failed")
+                await listener.wait_for("failed")
                 await asyncio.sleep(0.01)
 
 
@@ -294,7 +294,7 @@ async def test_ended_by_the_listener_itself() -> None:
     """A session may end its link from within what the link tells it."""
     async with bridging() as bridge:
         for kind in ("link_opened", "message_received", "link_closed"):
-            listener = Ear()
+            listener = LinkListener()
             link = RosLink(parse(bridge.address), listener, now=time.monotonic)
 
             def end(*_: Any, link: RosLink = link) -> None:
@@ -328,9 +328,9 @@ def respond(values: Any, **others: Any) -> Any:
 
 
 async def test_a_call_is_answered_with_the_values() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener) as link:
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         bridge.answer = respond({"topics": ["/a"]})
         assert await link.call("/rosapi/topic_type", {"topic": "/a"}) == {"topics": ["/a"]}
         assert bridge.operations[0] | {"id": ""} == {
@@ -342,9 +342,9 @@ async def test_a_call_is_answered_with_the_values() -> None:
 
 
 async def test_answers_find_their_own_calls_in_any_order() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener) as link:
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         calls = [asyncio.create_task(link.call("/rosapi/topic_type", {"topic": f"/s{n}"})) for n in range(5)]
         await until(lambda: len(bridge.operations) == 5)
         for operation in reversed(bridge.operations):
@@ -362,9 +362,9 @@ FAILURES = {
 
 @pytest.mark.parametrize(("values", "text"), FAILURES.values(), ids=FAILURES)
 async def test_a_failed_call_has_the_text_of_the_bridge(values: Any, text: str) -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener) as link:
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         bridge.answer = respond(values, result=False)
         with pytest.raises(CallFailed) as failure:
             await link.call("/rosapi/get_time")
@@ -372,9 +372,9 @@ async def test_a_failed_call_has_the_text_of_the_bridge(values: Any, text: str) 
 
 
 async def test_a_call_without_an_answer_fails_in_time_and_a_late_answer_harms_nothing() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener) as link:
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         with pytest.raises(CallFailed, match=r"/rosapi/topics did not answer within 0\.05 s"):
             await link.call("/rosapi/topics", timeout_s=0.05)
         identity = bridge.operations[0]["id"]
@@ -387,9 +387,9 @@ async def test_a_call_without_an_answer_fails_in_time_and_a_late_answer_harms_no
 
 
 async def test_calls_end_with_the_link_that_carried_them() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener) as link:
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         calls = [asyncio.create_task(link.call("/rosapi/get_time", timeout_s=5)) for _ in range(3)]
         await until(lambda: len(bridge.operations) == 3)
         bridge.socket.transport.abort()
@@ -399,9 +399,9 @@ async def test_calls_end_with_the_link_that_carried_them() -> None:
 
 
 async def test_unanswered_calls_are_bounded_and_a_cancelled_one_is_forgotten() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener) as link:
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         calls = [
             asyncio.create_task(link.call("/rosapi/get_time", timeout_s=5))
             for _ in range(service_calls.MAX_PENDING_CALLS)

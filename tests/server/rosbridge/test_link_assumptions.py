@@ -18,7 +18,7 @@ from autobahn.websocket.protocol import WebSocketClientProtocol, WebSocketProtoc
 from roslibpy.comm.comm_asyncio import AsyncioRosBridgeClientFactory, AsyncioRosBridgeProtocol
 
 from server.rosbridge.link import ASSUMPTIONS
-from tests.server.ear import accept, answering, bridging, text_frame, until
+from tests.server.link_listener import accept, answering, bridging, text_frame, until
 
 pytestmark = pytest.mark.virtual_time
 

@@ -15,7 +15,7 @@ import psutil
 import pytest
 
 from server.rosbridge import dialer
-from tests.server.ear import Ear, Handler, accept, answering, black_hole, bridging, linked, until
+from tests.server.link_listener import Handler, LinkListener, accept, answering, black_hole, bridging, linked, until
 
 pytestmark = pytest.mark.virtual_time
 
@@ -87,27 +87,27 @@ OTHERS: dict[str, tuple[Handler, str, str]] = {
 
 @pytest.mark.parametrize(("handler", "code", "text"), OTHERS.values(), ids=OTHERS)
 async def test_something_else_answers(handler: Handler, code: str, text: str) -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with answering(handler) as port, linked(f"127.0.0.1:{port}", listener) as link:
-        problem = await listener.hears("failed")
+        problem = await listener.wait_for("failed")
         assert (problem.code, text in problem.hint) == (code, True), problem
         assert not link.is_open
         assert link.heard_s is None
-        await listener.hears("failed", 2)  # and goes on trying
+        await listener.wait_for("failed", 2)  # and goes on trying
         assert link.attempts - len(listener.all("failed")) in (0, 1)  # one report for each try
         assert {name for name, _ in listener.received} == {"failed"}
 
 
 async def test_one_that_talks_without_end_fills_no_memory() -> None:
-    listener = Ear()
+    listener = LinkListener()
     before = psutil.Process().memory_info().rss
     async with answering(say_without_end) as port, linked(f"127.0.0.1:{port}", listener):
-        await listener.hears("failed", 3)
+        await listener.wait_for("failed", 3)
     assert psutil.Process().memory_info().rss - before < 30e6
 
 
 async def test_a_handshake_that_comes_letter_by_letter_is_one() -> None:
-    listener = Ear()
+    listener = LinkListener()
 
     async def dribble(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         write, written = writer.write, bytearray()
@@ -119,12 +119,12 @@ async def test_a_handshake_that_comes_letter_by_letter_is_one() -> None:
         await asyncio.sleep(5)
 
     async with answering(dribble) as port, linked(f"127.0.0.1:{port}", listener):
-        await listener.hears("status")
+        await listener.wait_for("status")
         assert [name for name, _ in listener.received] == ["opened", "status"]
 
 
 async def test_what_comes_with_the_handshake_is_read_after_it() -> None:
-    listener = Ear()
+    listener = LinkListener()
 
     async def hasten(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         write, written = writer.write, bytearray()
@@ -134,7 +134,7 @@ async def test_what_comes_with_the_handshake_is_read_after_it() -> None:
         await asyncio.sleep(5)
 
     async with answering(hasten) as port, linked(f"127.0.0.1:{port}", listener):
-        await listener.hears("closed")
+        await listener.wait_for("closed")
         assert [name for name, _ in listener.received][:3] == ["opened", "status", "closed"]
 
 
@@ -142,54 +142,54 @@ async def test_what_comes_with_the_handshake_is_read_after_it() -> None:
 
 
 async def test_refused() -> None:
-    listener = Ear()
+    listener = LinkListener()
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         port = closed.getsockname()[1]
         async with linked(f"127.0.0.1:{port}", listener):
-            problem = await listener.hears("failed")
+            problem = await listener.wait_for("failed")
             assert problem.code == "refused"
             assert problem.title == f"127.0.0.1 is there, but nothing listens on port {port}."
-            await listener.hears("failed", 3)
+            await listener.wait_for("failed", 3)
 
 
 async def test_the_car_comes_up_later() -> None:
-    listener = Ear()
+    listener = LinkListener()
     with socket.socket() as closed:
         closed.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         closed.bind(("127.0.0.1", 0))
         port = closed.getsockname()[1]
         async with linked(f"127.0.0.1:{port}", listener):
-            await listener.hears("failed", 2)
+            await listener.wait_for("failed", 2)
             closed.close()
             async with bridging(port):
-                await listener.hears("opened")
+                await listener.wait_for("opened")
 
 
 async def test_no_answer_at_all() -> None:
-    listener = Ear()
+    listener = LinkListener()
     with black_hole() as port:
         async with linked(f"127.0.0.1:{port}", listener) as link:
             began_s = time.monotonic()
             for _ in range(10):
                 link.retry_now()  # while dialling: no second dial
                 await asyncio.sleep(0.01)
-            assert (await listener.hears("failed")).code == "timeout"
+            assert (await listener.wait_for("failed")).code == "timeout"
             assert link.attempts == 1
             assert time.monotonic() - began_s == pytest.approx(dialer.DIAL_TIMEOUT_S, abs=0.01)
 
 
 async def test_no_such_host() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with linked("no-such-host.invalid", listener):
-        assert (await listener.hears("failed")).code in ("no_such_host", "no_lookup")  # where no name server answers
+        assert (await listener.wait_for("failed")).code in ("no_such_host", "no_lookup")  # where no name server answers
 
 
 @pytest.mark.parametrize("typed", ["169.254.169.254", "3758096385:80", "[::ffff:224.0.0.1]", "0.0.0.0", "[ff02::1]"])
 async def test_what_is_never_dialled_is_not(typed: str) -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with linked(typed, listener):
-        problem = await listener.hears("failed")
+        problem = await listener.wait_for("failed")
         assert problem.code == "forbidden"
 
 
@@ -221,18 +221,18 @@ async def test_every_address_of_a_host_is_tried_to_its_handshake(
 ) -> None:
     """On asyncio's loop, whose resolver can be exchanged; what is dialled after it is the same on both."""
     monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: found(*ips))
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge:
         async with (
             answering(hang_up, host="127.0.0.2", port=bridge.port),
             linked(f"car:{bridge.port}", listener) as link,
         ):
             if code is None:
-                await listener.hears("opened")
+                await listener.wait_for("opened")
                 assert listener.all("failed") == []
                 assert link.attempts == 1
             else:
-                assert (await listener.hears("failed")).code == code
+                assert (await listener.wait_for("failed")).code == code
 
 
 async def test_a_name_server_that_hangs_is_queried_once_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -245,20 +245,20 @@ async def test_a_name_server_that_hangs_is_queried_once_at_a_time(monkeypatch: p
         return found("127.0.0.1")
 
     monkeypatch.setattr(asyncio.get_running_loop(), "getaddrinfo", hang)
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(f"car:{bridge.port}", listener):
-        assert (await listener.hears("failed")).code == "no_lookup"
-        await listener.hears("failed", 3)
+        assert (await listener.wait_for("failed")).code == "no_lookup"
+        await listener.wait_for("failed", 3)
         assert looked_up == ["car"]
         answers.set()
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         assert looked_up == ["car"]
 
 
 async def test_ended_while_a_name_is_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
     answers = threading.Event()
     monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: answers.wait(8) and found("127.0.0.1"))
-    listener = Ear()
+    listener = LinkListener()
     before = asyncio.all_tasks()
     async with linked("car", listener):
         await asyncio.sleep(0.05)
@@ -272,42 +272,42 @@ async def test_ended_while_a_name_is_looked_up(monkeypatch: pytest.MonkeyPatch) 
 
 
 async def test_secure_but_not_trusted(secure: ssl.SSLContext) -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging(ssl=secure) as bridge, linked(f"wss://127.0.0.1:{bridge.port}", listener):
-        problem = await listener.hears("failed")
+        problem = await listener.wait_for("failed")
         assert problem.code == "tls_untrusted"
         assert "self" in problem.hint  # self-signed, in OpenSSL's text
-        await listener.hears("failed", 2)
+        await listener.wait_for("failed", 2)
 
 
 async def test_secure_for_another_host(
     certificate: Path, secure: ssl.SSLContext, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
-    listener = Ear()
+    listener = LinkListener()
     async with bridging(ssl=secure) as bridge, linked(f"wss://localhost:{bridge.port}", listener):
-        assert (await listener.hears("failed")).code == "tls_untrusted"
+        assert (await listener.wait_for("failed")).code == "tls_untrusted"
 
 
 async def test_a_bridge_without_tls_dialled_with_wss() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(f"wss://127.0.0.1:{bridge.port}", listener):
-        problem = await listener.hears("failed")
+        problem = await listener.wait_for("failed")
         assert problem.code == "tls"
         assert f"ws://127.0.0.1:{bridge.port}" in problem.hint
-        await listener.hears("failed", 2)
+        await listener.wait_for("failed", 2)
 
 
 @pytest.mark.parametrize("handler", [hang_up, saying(b"", first=True)], ids=["hangs up", "silent"])
 async def test_something_silent_dialled_with_wss(handler: Handler) -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with answering(handler) as port, linked(f"wss://127.0.0.1:{port}", listener):
-        assert (await listener.hears("failed")).code in ("tls", "timeout")
+        assert (await listener.wait_for("failed")).code in ("tls", "timeout")
 
 
 async def test_a_bridge_with_tls_dialled_with_ws(secure: ssl.SSLContext) -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging(ssl=secure) as bridge, linked(f"ws://127.0.0.1:{bridge.port}", listener):
-        problem = await listener.hears("failed")
+        problem = await listener.wait_for("failed")
         assert "wss://" in problem.hint
-        await listener.hears("failed", 2)
+        await listener.wait_for("failed", 2)

@@ -13,7 +13,7 @@ import pytest
 
 from server.rosbridge.codec import MAX_CONTAINERS, MAX_DEPTH
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES, MAX_SKIPPED_BYTES
-from tests.server.ear import Ear, accept, answering, bridging, linked, text_frame, until
+from tests.server.link_listener import LinkListener, accept, answering, bridging, linked, text_frame, until
 
 pytestmark = pytest.mark.virtual_time
 
@@ -50,12 +50,12 @@ JUNK: dict[str, tuple[bytes | str, str]] = {
 
 @pytest.mark.parametrize(("frame", "why"), JUNK.values(), ids=JUNK)
 async def test_junk_is_counted_and_harms_nothing(frame: bytes | str, why: str) -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener):
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         await bridge.say(frame)
         await bridge.say(GOOD)
-        await listener.hears("message")
+        await listener.wait_for("message")
         assert listener.received == [("opened", None), ("junk", why), ("message", ("/a", {"data": 1}, None))]
 
 
@@ -70,12 +70,12 @@ QUIET: dict[str, bytes | str] = {
 
 @pytest.mark.parametrize("frame", QUIET.values(), ids=QUIET)
 async def test_answers_that_nobody_waits_for_are_passed_over(frame: bytes | str) -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener):
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         await bridge.say(frame)
         await bridge.say(GOOD)
-        await listener.hears("message")
+        await listener.wait_for("message")
         assert [name for name, _ in listener.received] == ["opened", "message"]
 
 
@@ -90,19 +90,19 @@ STATUS: dict[str, tuple[dict[str, Any], tuple[str, str]]] = {
 
 @pytest.mark.parametrize(("fields", "received"), STATUS.values(), ids=STATUS)
 async def test_a_status_of_the_bridge_is_passed_on_shortened(fields: dict[str, Any], received: tuple[str, str]) -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener):
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         await bridge.say({"op": "status"} | fields)
-        assert await listener.hears("status") == received
+        assert await listener.wait_for("status") == received
 
 
 async def test_indulgence_is_noted() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener):
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         await bridge.say('{"op":"publish","topic":"/fix","msg":{"position_covariance":[NaN]}}')
-        topic, message, note = await listener.hears("message")
+        topic, message, note = await listener.wait_for("message")
         assert topic == "/fix"
         assert message["position_covariance"][0] != message["position_covariance"][0]
         assert note == "bare NaN or Infinity, read as unknown"
@@ -110,15 +110,15 @@ async def test_indulgence_is_noted() -> None:
 
 async def test_a_message_of_20_mb_is_skipped_and_the_link_stays() -> None:
     """Hanging up would not help: the next message of that topic would be as large, and the link would flap for ever."""
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener):
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         await bridge.say(b"x" * 20_000_000)
-        await listener.hears("junk")
+        await listener.wait_for("junk")
         pieces = ['{"op":"publish","topic":"/big","msg":"', *["x" * 5_000_000] * 4, '"}']
         await bridge.socket.send(pieces)  # in fragments, each small enough
         await bridge.say(GOOD)
-        await listener.hears("message", within_s=8)
+        await listener.wait_for("message", within_s=8)
         why = "a message of more than 16 MB"
         assert listener.received == [
             ("opened", None),
@@ -132,25 +132,25 @@ async def test_a_message_of_20_mb_is_skipped_and_the_link_stays() -> None:
 
 @pytest.mark.field
 async def test_of_a_message_of_20_mb_nothing_is_kept() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener):
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         before = psutil.Process().memory_info().rss
         await bridge.say(b"x" * 20_000_000)
-        await listener.hears("junk")
+        await listener.wait_for("junk")
         grown = psutil.Process().memory_info().rss - before
         assert grown < 37e6  # the sender in this process holds 20 MB of it; a copy kept by the link would make it 40
 
 
 async def test_a_message_just_as_large_as_may_be_is_read() -> None:
-    listener = Ear()
+    listener = LinkListener()
     empty = len(orjson.dumps({"op": "publish", "topic": "/a", "msg": ""}))
     async with bridging() as bridge, linked(bridge.address, listener):
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         await bridge.say({"op": "publish", "topic": "/a", "msg": "x" * (MAX_MESSAGE_BYTES - empty)})
-        await listener.hears("message", within_s=8)
+        await listener.wait_for("message", within_s=8)
         await bridge.say({"op": "publish", "topic": "/a", "msg": "x" * (MAX_MESSAGE_BYTES - empty + 1)})
-        await listener.hears("junk", within_s=8)
+        await listener.wait_for("junk", within_s=8)
 
 
 FAULTY = {
@@ -168,7 +168,7 @@ FAULTY = {
 
 @pytest.mark.parametrize(("frame", "text"), FAULTY.values(), ids=FAULTY)
 async def test_what_is_no_websocket_any_more_ends_the_connection_and_it_is_made_anew(frame: bytes, text: str) -> None:
-    listener = Ear()
+    listener = LinkListener()
     openings = 0
 
     async def err_once(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -179,15 +179,15 @@ async def test_what_is_no_websocket_any_more_ends_the_connection_and_it_is_made_
         await asyncio.sleep(5)
 
     async with answering(err_once) as port, linked(f"127.0.0.1:{port}", listener):
-        problem = await listener.hears("closed")
+        problem = await listener.wait_for("closed")
         assert problem.code == "closed"
         assert text in problem.hint
-        await listener.hears("message")
+        await listener.wait_for("message")
         assert [name for name, _ in listener.received] == ["opened", "closed", "opened", "message"]
 
 
 async def test_a_message_in_pieces_with_pings_between_is_whole() -> None:
-    listener = Ear()
+    listener = LinkListener()
     text = orjson.dumps(GOOD)
 
     async def split(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -201,11 +201,11 @@ async def test_a_message_in_pieces_with_pings_between_is_whole() -> None:
         await asyncio.sleep(5)
 
     async with answering(split) as port, linked(f"127.0.0.1:{port}", listener):
-        assert await listener.hears("message") == ("/a", {"data": 1}, None)
+        assert await listener.wait_for("message") == ("/a", {"data": 1}, None)
 
 
 async def test_ten_thousand_messages_at_once_come_in_order() -> None:
-    listener = Ear()
+    listener = LinkListener()
     one = b"".join(text_frame(b'{"op":"publish","topic":"/a","msg":%d}' % n) for n in range(10_000))
 
     async def flood(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -214,7 +214,7 @@ async def test_ten_thousand_messages_at_once_come_in_order() -> None:
         await asyncio.sleep(5)
 
     async with answering(flood) as port, linked(f"127.0.0.1:{port}", listener):
-        await listener.hears("message", 10_000)
+        await listener.wait_for("message", 10_000)
         assert [message for _, message, _ in listener.all("message")] == list(range(10_000))
 
 
@@ -222,7 +222,7 @@ async def test_ten_thousand_messages_at_once_come_in_order() -> None:
 
 
 async def test_a_listener_that_fails_costs_one_message_and_is_logged_once() -> None:
-    listener = Ear()
+    listener = LinkListener()
     logged: list[logging.LogRecord] = []
     handler = logging.Handler()
     handler.emit = logged.append  # type: ignore[method-assign]
@@ -237,11 +237,11 @@ async def test_a_listener_that_fails_costs_one_message_and_is_logged_once() -> N
     listener.message_received = stumble  # type: ignore[method-assign]
     try:
         async with bridging() as bridge, linked(bridge.address, listener):
-            await listener.hears("opened")
+            await listener.wait_for("opened")
             for _ in range(5):
                 await bridge.say({"op": "publish", "topic": "/bad", "msg": {}})
             await bridge.say(GOOD)
-            await listener.hears("message")
+            await listener.wait_for("message")
             assert listener.all("junk") == ["a message that caused an internal error"] * 5
             assert listener.all("closed") == []
             assert len(logged) == 1
@@ -250,7 +250,7 @@ async def test_a_listener_that_fails_costs_one_message_and_is_logged_once() -> N
 
 
 async def test_a_listener_that_stumbles_over_a_failed_dial_does_not_end_the_dialling() -> None:
-    listener = Ear()
+    listener = LinkListener()
     problems: list[Any] = []
 
     def stumble(problem: Any) -> None:

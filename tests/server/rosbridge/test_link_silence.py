@@ -17,7 +17,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.frames import Frame, Opcode
 
 from server.rosbridge.subscription import Subscription
-from tests.server.ear import Bridge, Ear, accept, answering, bridging, linked, text_frame
+from tests.server.link_listener import Bridge, LinkListener, accept, answering, bridging, linked, text_frame
 
 A_BRIDGE = """
 import asyncio
@@ -51,26 +51,26 @@ async def process() -> AsyncIterator[tuple[asyncio.subprocess.Process, int]]:
 
 @pytest.mark.field
 async def test_a_stopped_process_is_found_within_2_s_and_its_return_too() -> None:
-    listener = Ear()
+    listener = LinkListener()
     async with process() as (bridge, port), linked(f"127.0.0.1:{port}", listener) as link:
         link.subscribe(Subscription(topic="/vel", type="geometry_msgs/Twist"))
-        await listener.hears("message", 5)
+        await listener.wait_for("message", 5)
         os.kill(bridge.pid, signal.SIGSTOP)
         stopped_s = time.monotonic()
-        problem = await listener.hears("closed", within_s=3.0)
+        problem = await listener.wait_for("closed", within_s=3.0)
         assert problem.code == "bridge_silent"
         assert 1.4 < time.monotonic() - stopped_s < 2.0
         assert link.heard_s == pytest.approx(stopped_s, abs=0.3)
         os.kill(bridge.pid, signal.SIGCONT)
         messages = len(listener.all("message"))
-        await listener.hears("message", messages + 5, within_s=4.0)
+        await listener.wait_for("message", messages + 5, within_s=4.0)
         assert len(listener.all("opened")) == 2
 
 
 @pytest.mark.virtual_time
 @pytest.mark.parametrize("talks_before", [True, False])
 async def test_a_bridge_that_neither_reads_nor_pongs_is_found_within_2_s(talks_before: bool) -> None:
-    listener = Ear()
+    listener = LinkListener()
     fell_silent_s = 0.0
 
     async def fall_silent(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -84,8 +84,8 @@ async def test_a_bridge_that_neither_reads_nor_pongs_is_found_within_2_s(talks_b
         await asyncio.sleep(5)
 
     async with answering(fall_silent) as port, linked(f"127.0.0.1:{port}", listener):
-        await listener.hears("opened")
-        assert (await listener.hears("closed", within_s=4.0)).code == "bridge_silent"
+        await listener.wait_for("opened")
+        assert (await listener.wait_for("closed", within_s=4.0)).code == "bridge_silent"
         assert 1.55 < time.monotonic() - fell_silent_s < 1.75
         assert len(listener.all("message")) == (30 if talks_before else 0)
 
@@ -114,10 +114,10 @@ def count_pings(bridge: Bridge, pings: list[float], *, pong_after_s: float = 0.0
 @pytest.mark.virtual_time
 async def test_a_slow_way_is_not_a_silent_one() -> None:
     """A radio link with 1.1 s there and back."""
-    listener = Ear()
+    listener = LinkListener()
     pings: list[float] = []
     async with bridging() as bridge, linked(bridge.address, listener):
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         count_pings(bridge, pings, pong_after_s=1.1)
         await asyncio.sleep(2.6)
         assert [name for name, _ in listener.received] == ["opened"]
@@ -127,10 +127,10 @@ async def test_a_slow_way_is_not_a_silent_one() -> None:
 @pytest.mark.virtual_time
 async def test_pings_come_at_one_rate_also_where_the_car_talks() -> None:
     """Each answer bounds how old what comes after it can be."""
-    listener = Ear()
+    listener = LinkListener()
     pings: list[float] = []
     async with bridging() as bridge, linked(bridge.address, listener) as link:
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         count_pings(bridge, pings)
         await asyncio.sleep(1.05)
         assert link.heard_s is not None
@@ -152,9 +152,9 @@ def hold_up(seconds: float) -> None:
 @pytest.mark.virtual_time
 async def test_held_up_ourselves_we_do_not_blame_the_bridge() -> None:
     """The loop stands still longer than any silence may last, and with it the bridge in the same process."""
-    listener = Ear()
+    listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener):
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         await asyncio.sleep(0.35)  # so that no ping is on its way
         hold_up(2.0)
         await asyncio.sleep(0.5)
@@ -163,7 +163,7 @@ async def test_held_up_ourselves_we_do_not_blame_the_bridge() -> None:
 
 @pytest.mark.virtual_time
 async def test_held_up_while_the_bridge_died_it_is_found_all_the_same() -> None:
-    listener = Ear()
+    listener = LinkListener()
 
     async def fall_silent(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await accept(reader, writer)
@@ -171,15 +171,15 @@ async def test_held_up_while_the_bridge_died_it_is_found_all_the_same() -> None:
         await asyncio.sleep(8)
 
     async with answering(fall_silent) as port, linked(f"127.0.0.1:{port}", listener):
-        await listener.hears("opened")
+        await listener.wait_for("opened")
         hold_up(2.0)
-        assert (await listener.hears("closed", within_s=0.11)).code == "bridge_silent"
+        assert (await listener.wait_for("closed", within_s=0.11)).code == "bridge_silent"
 
 
 @pytest.mark.virtual_time
 async def test_a_large_message_that_trickles_in_is_life() -> None:
     """2 s for one message, with all pongs behind it."""
-    listener = Ear()
+    listener = LinkListener()
 
     async def trickle(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await accept(reader, writer)
@@ -190,5 +190,5 @@ async def test_a_large_message_that_trickles_in_is_life() -> None:
         await asyncio.sleep(5)
 
     async with answering(trickle) as port, linked(f"127.0.0.1:{port}", listener):
-        await listener.hears("message", within_s=8.0)
+        await listener.wait_for("message", within_s=8.0)
         assert listener.all("closed") == []

@@ -11,7 +11,7 @@ from tests.tree import PROJECT
 
 NOISY = """
 import asyncio, logging, sys, time
-from tests.server.ear import *
+from tests.server.link_listener import *
 from server.rosbridge.subscription import Subscription
 
 logging.basicConfig(level=logging.INFO)
@@ -36,7 +36,7 @@ async def main():
     listeners = []
 
     def link_to(address):
-        listeners.append(Ear())
+        listeners.append(LinkListener())
         return linked(address, listeners[-1])
 
     async with answering(http) as a, answering(rude) as b, answering(silent) as c, answering(hostile) as d:

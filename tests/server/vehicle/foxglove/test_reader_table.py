@@ -10,7 +10,7 @@ from server.recording.read.errors import Undecodable
 from server.vehicle.foxglove import readers
 from server.vehicle.foxglove.protocol import Channel
 from server.vehicle.foxglove.readers import ReaderTable
-from tests.server.ear import until
+from tests.server.link_listener import until
 
 TEXT = Channel(
     id=1, topic="/0", encoding="ros1", type="std_msgs/String", schema="string data\n", schema_encoding="ros1msg"

@@ -27,7 +27,7 @@ from server.rosbridge.subscription import Subscription
 from server.vehicle.foxglove.source import FoxgloveSource
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
-from tests.server.ear import Ear, bridging, until
+from tests.server.link_listener import LinkListener, bridging, until
 from tests.server.vehicle.foxglove.peer import FIX, ODOMETRY, SCAN, TWIST, Peer, fix, odometry, peer, scan
 
 BOTH = (Capability.ClientPublish, Capability.ConnectionGraph)
@@ -54,8 +54,10 @@ class Answers:
 
 
 @asynccontextmanager
-async def linked(address: str, ear: Ear, *topics: str, marks: Answers | None = None) -> AsyncIterator[FoxgloveSource]:
-    source = FoxgloveSource(parse(address), ear, now=time.monotonic, marks=marks)
+async def linked(
+    address: str, listener: LinkListener, *topics: str, marks: Answers | None = None
+) -> AsyncIterator[FoxgloveSource]:
+    source = FoxgloveSource(parse(address), listener, now=time.monotonic, marks=marks)
     for topic in topics:
         source.subscribe(Subscription(topic=topic, type=None))
     source.start()
@@ -77,39 +79,39 @@ def is_another(source: FoxgloveSource, before: set[int]) -> bool:
     return bool({one.id for one in source._rows.channels.values()} - before)
 
 
-def came(ear: Ear, topic: str) -> list[Any]:
-    return [message for name, message, _ in ear.all("message") if name == topic]
+def came(listener: LinkListener, topic: str) -> list[Any]:
+    return [message for name, message, _ in listener.all("message") if name == topic]
 
 
 async def test_messages_of_each_encoding_come_and_no_other() -> None:
-    ear = Ear()
+    listener = LinkListener()
     with peer() as car:
         car.offer("/odom", ODOMETRY, "cdr")
         car.offer("/fix", FIX, "ros1")
         car.offer("/scan", "sensor_msgs/msg/LaserScan", "json")
         car.offer("/other", FIX, "ros1")
-        async with linked(car.address, ear, "/odom", "/fix", "/scan") as source:
-            await ear.hears("opened")
+        async with linked(car.address, listener, "/odom", "/fix", "/scan") as source:
+            await listener.wait_for("opened")
             await subscribed(source, "/odom", "/fix", "/scan")
             now_ns = time.time_ns()
             car.publish("/other", fix(1, now_ns))
             car.publish("/odom", odometry(2, 4.2, now_ns))
             car.publish("/fix", fix(1, now_ns))
             car.publish("/scan", scan(2, now_ns))
-            await ear.hears("message", 3)
+            await listener.wait_for("message", 3)
             assert source.server_software == "peer"
-    assert came(ear, "/odom")[0]["twist"]["twist"]["linear"]["x"] == 4.2
-    assert came(ear, "/fix")[0]["header"]["stamp"] == fix(1, now_ns)["header"]["stamp"]
-    assert came(ear, "/scan") == [scan(2, now_ns)]
-    assert len(ear.all("message")) == 3
-    assert ear.all("junk") == []
+    assert came(listener, "/odom")[0]["twist"]["twist"]["linear"]["x"] == 4.2
+    assert came(listener, "/fix")[0]["header"]["stamp"] == fix(1, now_ns)["header"]["stamp"]
+    assert came(listener, "/scan") == [scan(2, now_ns)]
+    assert len(listener.all("message")) == 3
+    assert listener.all("junk") == []
 
 
 async def test_a_channel_that_comes_later_and_again_under_another_number_is_subscribed_to() -> None:
-    ear = Ear()
+    listener = LinkListener()
     with peer() as car:
-        async with linked(car.address, ear, "/odom") as source:
-            await ear.hears("opened")
+        async with linked(car.address, listener, "/odom") as source:
+            await listener.wait_for("opened")
             assert await source.call("/rosapi/topics") == {"topics": [], "types": []}
             for number in range(1, 4):
                 before = {one.id for one in source._rows.channels.values()}
@@ -117,43 +119,43 @@ async def test_a_channel_that_comes_later_and_again_under_another_number_is_subs
                 await until(partial(is_another, source, before))
                 await subscribed(source, "/odom")
                 car.publish("/odom", odometry(2, float(number), 1))
-                await ear.hears("message", number)
+                await listener.wait_for("message", number)
             car.end("/odom")
             await until(lambda: not source._rows.channels)
             assert await source.call("/rosapi/topics") == {"topics": [], "types": []}
             assert await source.call("/rosapi/publishers", {"topic": "/odom"}) == {"publishers": []}
-    assert [one["twist"]["twist"]["linear"]["x"] for one in came(ear, "/odom")] == [1.0, 2.0, 3.0]
+    assert [one["twist"]["twist"]["linear"]["x"] for one in came(listener, "/odom")] == [1.0, 2.0, 3.0]
 
 
 async def test_what_cannot_be_read_is_reported_once_and_harms_nothing() -> None:
-    ear = Ear()
+    listener = LinkListener()
     with peer() as car:
         car.offer_raw("/proto", "foxglove.LocationFix", "protobuf", "protobuf", b"\x0a\x00")
         car.offer_raw("/broken", "my_msgs/msg/Level", "cdr", "ros2msg", b"float64[ x")
         car.offer("/shape", "nav_msgs/msg/Odometry", "json")
         car.offer("/odom", ODOMETRY, "cdr")
-        async with linked(car.address, ear, "/proto", "/broken", "/shape", "/odom") as source:
+        async with linked(car.address, listener, "/proto", "/broken", "/shape", "/odom") as source:
             await subscribed(source, "/shape", "/odom")
             for _ in range(3):
                 car.publish("/shape", {"speed": 4.2})
             car.publish("/odom", odometry(2, 4.2, 1))
-            await ear.hears("message")
+            await listener.wait_for("message")
             assert source.junk_count == 3
-    notes = sorted(text for level, text in ear.all("status") if level == NOTE)
+    notes = sorted(text for level, text in listener.all("status") if level == NOTE)
     assert [text.partition(" ")[0] for text in notes] == ["/broken", "/proto", "/shape"]
     assert "'protobuf' are not supported" in notes[1]
     assert "not in the shape of nav_msgs/msg/Odometry" in notes[2]
-    assert [topic for topic, _, _ in ear.all("message")] == ["/odom"]
+    assert [topic for topic, _, _ in listener.all("message")] == ["/odom"]
 
 
 async def test_a_server_that_ends_and_returns_is_dialled_again() -> None:
-    ear = Ear()
+    listener = LinkListener()
     with peer(BOTH, ["cdr"]) as car:
         car.offer("/odom", ODOMETRY, "cdr")
-        async with linked(car.address, ear, "/odom") as source:
+        async with linked(car.address, listener, "/odom") as source:
             await subscribed(source, "/odom")
             car.stop()
-            problem = await ear.hears("closed")
+            problem = await listener.wait_for("closed")
             assert problem.code == "closed"
             assert "Foxglove's server" in problem.hint
             with pytest.raises(LinkDown):
@@ -161,35 +163,35 @@ async def test_a_server_that_ends_and_returns_is_dialled_again() -> None:
             with pytest.raises(LinkDown):
                 await source.call("/rosapi/topics")
             car.start()
-            await ear.hears("opened", 2)
+            await listener.wait_for("opened", 2)
             await subscribed(source, "/odom")
             car.publish("/odom", odometry(2, 4.2, 1))
-            await ear.hears("message")
+            await listener.wait_for("message")
             with pytest.raises(NotAllowed):  # nothing is left of what was advertised, nor was kept to be sent
                 source.send_now({"op": "publish", "topic": "/cmd", "msg": COMMAND})
     assert car.listener.received == []
 
 
 async def test_a_status_of_the_server_is_passed_on() -> None:
-    ear = Ear()
+    listener = LinkListener()
     with peer() as car:
-        async with linked(car.address, ear) as source:
-            await ear.hears("opened")
+        async with linked(car.address, listener) as source:
+            await listener.wait_for("opened")
             await source.call("/rosapi/topics")
             car.server.publish_status("the disk is nearly full", foxglove.StatusLevel.Warning)
-            assert await ear.hears("status") == ("warning", "the disk is nearly full")
+            assert await listener.wait_for("status") == ("warning", "the disk is nearly full")
 
 
 async def test_publishers_are_those_of_the_connection_graph() -> None:
-    ear = Ear()
+    listener = LinkListener()
     with peer(BOTH, ["cdr"]) as car:
         car.offer("/odom", ODOMETRY, "cdr")
         graph = foxglove.ConnectionGraph()
         graph.set_published_topic("/odom", ["/ekf"])
         graph.set_subscribed_topic("/odom", ["/plan"])
         car.server.publish_connection_graph(graph)
-        async with linked(car.address, ear) as source:
-            await ear.hears("opened")
+        async with linked(car.address, listener) as source:
+            await listener.wait_for("opened")
             await source.call("/rosapi/topics")
             await until(lambda: source._state.offered._subscribers)
             assert await source.call("/rosapi/publishers", {"topic": "/odom"}) == {"publishers": ["/ekf"]}
@@ -201,11 +203,11 @@ async def test_publishers_are_those_of_the_connection_graph() -> None:
     [("cdr", "geometry_msgs/msg/Twist", b"\0\1\0\0"), ("ros1", TWIST, b"")],
 )
 async def test_a_command_arrives_with_its_bytes(encoding: str, type: str, raw: bytes) -> None:
-    ear = Ear()
+    listener = LinkListener()
     with peer([Capability.ClientPublish], [encoding]) as car:
         car.offer("/odom", ODOMETRY, encoding)
-        async with linked(car.address, ear) as source:
-            await source_known(source, ear)
+        async with linked(car.address, listener) as source:
+            await source_known(source, listener)
             assert source.command_problem is None
             source.send_now({"op": "advertise", "id": "a", "topic": "/cmd", "type": type})
             source.send_now({"op": "publish", "topic": "/cmd", "msg": COMMAND})
@@ -215,20 +217,20 @@ async def test_a_command_arrives_with_its_bytes(encoding: str, type: str, raw: b
             assert [data for _, data in car.listener.received] == [raw + struct.pack("<6d", 1.5, 0, 0, 0, 0, -0.25)]
             source.send_now({"op": "unadvertise", "id": "a", "topic": "/cmd"})
             await until(lambda: car.listener.ended)
-    assert ear.all("status") == []
+    assert listener.all("status") == []
 
 
-async def source_known(source: FoxgloveSource, ear: Ear) -> None:
-    await ear.hears("opened")
+async def source_known(source: FoxgloveSource, listener: LinkListener) -> None:
+    await listener.wait_for("opened")
     await source.call("/rosapi/topics")
 
 
 async def test_pings_are_answered_behind_the_messages() -> None:
     """Where messages flow, and where none comes."""
-    ear, marks = Ear(), Answers()
+    listener, marks = LinkListener(), Answers()
     with peer() as car:
         car.offer("/odom", ODOMETRY, "cdr")
-        async with linked(car.address, ear, "/odom", marks=marks) as source:
+        async with linked(car.address, listener, "/odom", marks=marks) as source:
             await subscribed(source, "/odom")
             assert marks.requested == ["/odom"]
             await until(lambda: marks.answered_s)
@@ -242,12 +244,12 @@ async def test_pings_are_answered_behind_the_messages() -> None:
 
 
 async def test_a_rosbridge_is_no_foxglove_server() -> None:
-    ear = Ear()
-    async with bridging() as bridge, linked(f"foxglove://127.0.0.1:{bridge.port}", ear):
-        problem = await ear.hears("failed")
+    listener = LinkListener()
+    async with bridging() as bridge, linked(f"foxglove://127.0.0.1:{bridge.port}", listener):
+        problem = await listener.wait_for("failed")
     assert problem.code == "not_rosbridge"
     assert "not a Foxglove server" in problem.title
-    assert ear.all("opened") == []
+    assert listener.all("opened") == []
 
 
 @asynccontextmanager

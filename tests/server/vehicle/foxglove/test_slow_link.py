@@ -14,7 +14,7 @@ from server.recording.read.schemas import TypeBook
 from server.rosbridge.address import parse
 from server.rosbridge.subscription import Subscription
 from server.vehicle.foxglove.source import FoxgloveSource
-from tests.server.ear import Ear, until
+from tests.server.link_listener import LinkListener, until
 from tests.server.slow_proxy import slow_proxy
 from tests.server.vehicle.foxglove.peer import ODOMETRY, SCAN, odometry, peer, scan
 
@@ -28,7 +28,7 @@ HZ = 20.0
 MOST_QUEUED = 60  # of both topics: 1.5 s of them
 
 
-class Followed(Ear):
+class Followed(LinkListener):
     """Follows how old each message is, by its stamp and by what the link is known to need."""
 
     def __init__(self, delay: TransportDelay) -> None:
@@ -57,7 +57,7 @@ def stamped(raw: bytes) -> bytes:
 
 async def test_no_age_is_too_young_on_a_slow_link_with_gaps_and_a_full_queue() -> None:
     delay = TransportDelay()
-    ear = Followed(delay)
+    listener = Followed(delay)
     schema = TypeBook(2).schema(SCAN)
     assert schema is not None
     assert schema.encode is not None
@@ -66,7 +66,9 @@ async def test_no_age_is_too_young_on_a_slow_link_with_gaps_and_a_full_queue() -
         car.offer("/odom", ODOMETRY, "cdr")
         car.offer_raw("/scan", schema.name, "cdr", schema.encoding, schema.data)
         async with slow_proxy(car.port, None) as proxy:
-            source = FoxgloveSource(parse(f"foxglove://127.0.0.1:{proxy.port}"), ear, now=time.monotonic, marks=delay)
+            source = FoxgloveSource(
+                parse(f"foxglove://127.0.0.1:{proxy.port}"), listener, now=time.monotonic, marks=delay
+            )
             for topic in ("/odom", "/scan"):
                 source.subscribe(Subscription(topic=topic, type=None))
             source.start()
@@ -82,8 +84,8 @@ async def test_no_age_is_too_young_on_a_slow_link_with_gaps_and_a_full_queue() -
             source.stop()
             proxy.rate_Bps = None
             await until(lambda: not proxy._pumps)
-    assert max(true_s for _, true_s in ear.ages) > 3.0  # the link was slow indeed
-    assert len(ear.ages) < published / 2  # and the server's queue was full
-    assert [one for one in ear.ages if one[0] < one[1] - UNDER_S] == []
-    healthy = ear.ages[: int(2 * 2 * HZ)]
+    assert max(true_s for _, true_s in listener.ages) > 3.0  # the link was slow indeed
+    assert len(listener.ages) < published / 2  # and the server's queue was full
+    assert [one for one in listener.ages if one[0] < one[1] - UNDER_S] == []
+    healthy = listener.ages[: int(2 * 2 * HZ)]
     assert max(known_s for known_s, _ in healthy) < 1.0

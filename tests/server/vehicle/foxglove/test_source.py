@@ -15,7 +15,7 @@ from websockets.asyncio.server import ServerConnection, serve
 from server.rosbridge.link_listener import NOTE
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES
 from server.vehicle.foxglove import channels, protocol
-from tests.server.ear import Ear, until
+from tests.server.link_listener import LinkListener, until
 from tests.server.vehicle.foxglove.test_server import linked
 
 STRING = {"schemaName": "std_msgs/String", "schema": "string data\n", "schemaEncoding": "ros1msg"}
@@ -69,7 +69,7 @@ async def offers_text(server: Server) -> None:
 
 
 async def test_answers_between_the_parts_of_a_message_are_known_as_such() -> None:
-    ear = Ear()
+    listener = LinkListener()
     rest = asyncio.Event()
     answers: list[bool] = []
     skipped: list[int] = []
@@ -79,7 +79,7 @@ async def test_answers_between_the_parts_of_a_message_are_known_as_such() -> Non
         await rest.wait()
         yield HELLO[6:]
 
-    async with serving(offers_text) as server, linked(f"foxglove://127.0.0.1:{server.port}", ear, "/a") as source:
+    async with serving(offers_text) as server, linked(f"foxglove://127.0.0.1:{server.port}", listener, "/a") as source:
         source._delay = _Spied(answers, skipped)  # type: ignore[assignment]
         await until(lambda: server.all("subscribe"))
         assert server.socket is not None
@@ -89,12 +89,12 @@ async def test_answers_between_the_parts_of_a_message_are_known_as_such() -> Non
         await until(lambda: sum(answers) >= 3)
         rest.set()
         await sending
-        assert (await ear.hears("message"))[:2] == ("/a", {"data": "hello"})
+        assert (await listener.wait_for("message"))[:2] == ("/a", {"data": "hello"})
         count = len(answers)
         await until(lambda: len(answers) > count)
         assert not answers[-1]
         await server.socket.send(head(1) + bytes(MAX_MESSAGE_BYTES))
-        assert (await ear.hears("large"))[0] == "/a"
+        assert (await listener.wait_for("large"))[0] == "/a"
     assert skipped == [1]
 
 
@@ -118,12 +118,12 @@ class _Spied:
 
 
 async def test_a_subscription_goes_on_where_a_kept_sample_is_wanted() -> None:
-    ear = Ear()
-    async with serving(offers_text) as server, linked(f"foxglove://127.0.0.1:{server.port}", ear, "/a") as source:
+    listener = LinkListener()
+    async with serving(offers_text) as server, linked(f"foxglove://127.0.0.1:{server.port}", listener, "/a") as source:
         await until(lambda: server.all("subscribe"))
         assert source.again("/a") is False
         await server.message(1, HELLO)
-        await ear.hears("message")
+        await listener.wait_for("message")
         assert [one["op"] for one in server.operations] == ["subscribe"]
         source.renew("/a")
         await until(lambda: len(server.operations) == 3)
@@ -131,48 +131,48 @@ async def test_a_subscription_goes_on_where_a_kept_sample_is_wanted() -> None:
 
 
 async def test_of_a_topic_with_two_types_only_the_newest_one_is_given() -> None:
-    ear = Ear()
+    listener = LinkListener()
     bool_ = {"schemaName": "std_msgs/Bool", "schema": "bool data\n", "schemaEncoding": "ros1msg"}
-    async with serving(offers_text) as server, linked(f"foxglove://127.0.0.1:{server.port}", ear, "/a"):
+    async with serving(offers_text) as server, linked(f"foxglove://127.0.0.1:{server.port}", listener, "/a"):
         await until(lambda: server.all("subscribe"))
         await server.say({"op": "advertise", "channels": [TEXT | bool_ | {"id": 2}]})
         await until(lambda: len(server.all("subscribe")) == 2)
         assert server.all("unsubscribe") == [{"op": "unsubscribe", "subscriptionIds": [1]}]
         await server.message(1, HELLO)  # it was under way
         await server.message(2, b"\x01")
-        await ear.hears("message")
+        await listener.wait_for("message")
         await server.say({"op": "unadvertise", "channelIds": [2]})
         await until(lambda: len(server.all("subscribe")) == 3)
-    assert [message for _, message, _ in ear.all("message")] == [{"data": True}]
+    assert [message for _, message, _ in listener.all("message")] == [{"data": True}]
     assert server.all("subscribe")[2]["subscriptions"] == [{"id": 3, "channelId": 1}]
 
 
 @pytest.mark.parametrize("limit", [(channels, "MAX_OFFERED"), (protocol, "MAX_CHANNELS")])
 async def test_channels_beyond_the_limit_are_reported(monkeypatch: pytest.MonkeyPatch, limit: tuple[Any, str]) -> None:
     monkeypatch.setattr(*limit, 2)
-    ear = Ear()
+    listener = LinkListener()
 
     async def greet(server: Server) -> None:
         await server.say(INFO)
         rows = [TEXT | {"id": number, "topic": f"/{number}"} for number in range(3)]
         await server.say({"op": "advertise", "channels": rows})
 
-    async with serving(greet) as server, linked(f"foxglove://127.0.0.1:{server.port}", ear) as source:
-        level, text = await ear.hears("status")
+    async with serving(greet) as server, linked(f"foxglove://127.0.0.1:{server.port}", listener) as source:
+        level, text = await listener.wait_for("status")
         assert (await source.call("/rosapi/topics"))["topics"] == ["/0", "/1"]
     assert level == NOTE
     assert "the others are not received" in text
-    assert ear.all("junk") == []
+    assert listener.all("junk") == []
 
 
 async def test_a_server_that_has_not_listed_its_channels_yet_does_not_refuse_commands() -> None:
-    ear = Ear()
+    listener = LinkListener()
 
     async def greet(server: Server) -> None:
         await server.say(INFO)
 
-    async with serving(greet) as server, linked(f"foxglove://127.0.0.1:{server.port}", ear) as source:
-        await ear.hears("opened")
+    async with serving(greet) as server, linked(f"foxglove://127.0.0.1:{server.port}", listener) as source:
+        await listener.wait_for("opened")
         await until(lambda: source.server_software == "s")
         assert source.command_problem is None
         await server.say({"op": "advertise", "channels": [TEXT]})
@@ -186,7 +186,7 @@ async def test_a_server_that_has_not_listed_its_channels_yet_does_not_refuse_com
 
 
 async def test_frames_that_are_none_are_counted_and_cost_nothing_else() -> None:
-    ear = Ear()
+    listener = LinkListener()
     frames: list[str | bytes] = ["{", b"\x01\x00", b"\x01" + bytes(12), '{"op":"advertise"}', '{"op":"serverInfo"}']
 
     async def greet(server: Server) -> None:
@@ -194,10 +194,10 @@ async def test_frames_that_are_none_are_counted_and_cost_nothing_else() -> None:
         for frame in frames:
             await server.socket.send(frame)
 
-    async with serving(greet) as server, linked(f"foxglove://127.0.0.1:{server.port}", ear) as source:
-        await ear.hears("opened")
+    async with serving(greet) as server, linked(f"foxglove://127.0.0.1:{server.port}", listener) as source:
+        await listener.wait_for("opened")
         assert await source.call("/rosapi/topics", timeout_s=20.0) == {"topics": [], "types": []}
         assert source.junk_count == 3
         assert source.command_problem is not None
         assert "clientPublish" in source.command_problem
-    assert ear.all("message") == []
+    assert listener.all("message") == []

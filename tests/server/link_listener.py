@@ -1,4 +1,4 @@
-"""Who listens to a link in tests, and the small servers it is tried on."""
+"""The listener of a link in tests, and small servers for it."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from server.rosbridge.link import RosLink
 Handler = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
 
-class Ear:
-    """Writes down what the link tells."""
+class LinkListener:
+    """Records the callbacks of a link."""
 
     def __init__(self) -> None:
         self.received: list[tuple[str, Any]] = []
-        self._heard = asyncio.Event()
+        self._noted = asyncio.Event()
 
     def link_opened(self) -> None:
         self._note("opened", None)
@@ -51,20 +51,20 @@ class Ear:
     def all(self, kind: str) -> list[Any]:
         return [what for name, what in self.received if name == kind]
 
-    async def hears(self, kind: str, count: int = 1, *, within_s: float = 20.0) -> Any:
+    async def wait_for(self, kind: str, count: int = 1, *, within_s: float = 20.0) -> Any:
         """What was received the `count`-th time."""
         try:
             async with asyncio.timeout(within_s):
                 while len(self.all(kind)) < count:
-                    self._heard.clear()
-                    await self._heard.wait()
+                    self._noted.clear()
+                    await self._noted.wait()
         except TimeoutError:
             raise AssertionError(f"no {kind}: {self.received}") from None
         return self.all(kind)[count - 1]
 
     def _note(self, kind: str, what: Any) -> None:
         self.received.append((kind, what))
-        self._heard.set()
+        self._noted.set()
 
 
 async def until(
@@ -77,29 +77,29 @@ async def until(
 
 
 @contextlib.asynccontextmanager
-async def linked(address: str, ear: Ear) -> AsyncIterator[RosLink]:
-    """A started link, stopped at the end, with nothing told after that."""
-    link = RosLink(parse(address), ear, now=time.monotonic)
+async def linked(address: str, listener: LinkListener) -> AsyncIterator[RosLink]:
+    """A started link, stopped at the end, without a callback after that."""
+    link = RosLink(parse(address), listener, now=time.monotonic)
     link.start()
     try:
         yield link
     finally:
         link.stop()
-        received = len(ear.received)
+        received = len(listener.received)
         for _ in range(10):
             await asyncio.sleep(0)
-        assert len(ear.received) == received
+        assert len(listener.received) == received
 
 
 class Bridge:
-    """A WebSocket server that writes down each connection's operations, and says what the test says."""
+    """A WebSocket server that records the operations of each connection, and sends what the test sends."""
 
     def __init__(self) -> None:
         self.port = 0
         self.connections: list[list[dict[str, Any]]] = []
         self.sockets: list[ServerConnection] = []
         self.answer: Callable[[dict[str, Any]], dict[str, Any] | None] = lambda operation: None
-        self.hangs_up = False  # as soon as a connection has said something
+        self.hangs_up = False  # as soon as a connection has sent an operation
 
     @property
     def address(self) -> str:
@@ -121,13 +121,13 @@ class Bridge:
         await self.socket.send(operation)
 
     async def serve(self, connection: ServerConnection) -> None:
-        said: list[dict[str, Any]] = []
-        self.connections.append(said)
+        operations: list[dict[str, Any]] = []
+        self.connections.append(operations)
         self.sockets.append(connection)
         with contextlib.suppress(ConnectionClosed):
             async for text in connection:
                 operation = orjson.loads(text)
-                said.append(operation)
+                operations.append(operation)
                 answer = self.answer(operation)
                 if answer is not None:
                     await connection.send(orjson.dumps(answer).decode())
@@ -148,7 +148,7 @@ async def bridging(port: int = 0, **options: Any) -> AsyncIterator[Bridge]:
 
 @contextlib.asynccontextmanager
 async def answering(handler: Handler, **options: Any) -> AsyncIterator[int]:
-    """A raw TCP server, on 127.0.0.1 unless told otherwise; yields its port."""
+    """A raw TCP server, on 127.0.0.1 unless `sock` is given; yields its port."""
     serving: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
 
     async def handle(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
