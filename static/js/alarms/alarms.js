@@ -1,7 +1,7 @@
 // The list of alarms behind the strip: every one that stands, has returned, is shelved or suppressed, with its keys.
 
 import { countWords, latelyWords, noneWords, rowsOf, together } from './alarms-layout.js';
-import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
 import { cameAt, Meant } from '../core/meant.js';
 import { openScreen } from '../core/open-screen.js';
@@ -94,8 +94,8 @@ class AlarmList {
     const speed_mps = store.signal('speed')?.value?.speed_mps;
     const isKnown = typeof speed_mps === 'number';
     write(speed, ink, isKnown ? speedWords(speed_mps)[0] ?? '–' : '–', unit, isKnown ? speedUnit() : '');
-    setWords(count, countWords(rows));
-    setWords(load, loadWords(frame?.alarm_load));
+    setSentence(count, countWords(rows));
+    setSentence(load, loadWords(frame?.alarm_load));
     setText(note, rows.length || frame?.session.paused ? whyNoKeys(store) : '');
     show(none, rows.length === 0);
     setText(none, noneWords({
@@ -103,7 +103,7 @@ class AlarmList {
       isChecked: frame?.replay ? frame.replay.silent_s !== null : store.chain.word === 'Live',
     }));
     const isQuiet = !store.isSilent && !store.replaying && !rows.some(({ kind }) => kind === 'unacknowledged' || kind === 'returned');
-    setWords(lately, isQuiet ? latelyWords(store.log.rows, frame?.alarm_load?.in_10_min) : '');
+    setSentence(lately, isQuiet ? latelyWords(store.log.rows, frame?.alarm_load?.in_10_min) : '');
     this.#drawFoot(mayAct);
   }
 
@@ -113,12 +113,12 @@ class AlarmList {
     const returned = this.#rows.filter(({ kind }) => kind === 'returned').map(({ key }) => key);
     if (returned.some((key) => !this.#returned.includes(key))) this.#ended.moved();
     this.#returned = returned;
-    setWords(ended, `Acknowledge all that ended${returned.length ? ` ${returned.length}` : ''}`);
+    setSentence(ended, `Acknowledge all that ended${returned.length ? ` ${returned.length}` : ''}`);
     show(ended, !this.store.replaying);
     setAttribute(ended, 'disabled', !mayAct || returned.length === 0);
     const { alarms, isReady } = this.#together();
     show(these, mayAct && alarms.length > 1);
-    setWords(these, `Acknowledge these ${alarms.length}`);
+    setSentence(these, `Acknowledge these ${alarms.length}`);
     setAttribute(these, 'disabled', !isReady);
   }
 
@@ -156,8 +156,8 @@ class AlarmList {
     for (const [name, row] of keyed) {
       const at = drawn.get(name);
       if (!at) continue;
-      setWords(at.detail, row.detail);
-      setWords(at.state, row.state);
+      setSentence(at.detail, row.detail);
+      setSentence(at.state, row.state);
     }
     const texts = this.#rows.map(({ detail, state }) => `${detail} ${state}`).join('|').replace(/[0-9]/g, '0'); // all digits have one width
     if (isOther) this.pager.lay();
@@ -175,7 +175,7 @@ class AlarmList {
       key.addEventListener('click', (event) => {
         const { alarm } = row;
         if (!alarm || (event.detail !== 0 && !meant.by(event))) return; // a key with the focus keeps it wherever it moves
-        if (name === 'shelve') openShelve(this.store, alarm, (sentence) => setWords(this.parts.message, sentence));
+        if (name === 'shelve') openShelve(this.store, alarm, (sentence) => setSentence(this.parts.message, sentence));
         else void this.#command(name, alarm);
       });
       return key;
@@ -188,7 +188,7 @@ class AlarmList {
       : [html('span', {}, title), html('span', {}, detail), html('span', { class: 'l3' }, state, at)]));
     text.addEventListener('click', () => openScreen('check', row.id));
     const silent = html('span', { class: 'quiet' });
-    setWords(silent, row.silent);
+    setSentence(silent, row.silent);
     const answers = [...(row.silent ? [silent] : []), ...keys];
     const element = html('li', { 'data-kind': row.kind, 'data-priority': row.priority, 'data-waits': isWaiting }, mark, text,
       ...(answers.length ? [html('div', { class: 'ac' }, ...answers)] : []));
@@ -198,9 +198,9 @@ class AlarmList {
 
   /** @param {'acknowledge' | 'silence' | 'unshelve' | 'take_alarm'} kind @param {Alarm} alarm */
   async #command(kind, alarm) {
-    setWords(this.parts.message, '');
+    setSentence(this.parts.message, '');
     const answer = await this.store.ask(kind, { alarm: alarm.id, ...(kind === 'unshelve' ? {} : { occurrence: alarm.occurrence }) });
-    if (!answer.ok) setWords(this.parts.message, answer.reason ?? 'Refused.');
+    if (!answer.ok) setSentence(this.parts.message, answer.reason ?? 'Refused.');
   }
 }
 

@@ -8,7 +8,7 @@ import { TAGS, episodeWords, figuresOf, placeOf, thresholdWords, totalWords } fr
 import { whyUnchecked } from './checks.js';
 import { openShelve } from './shelve.js';
 import { dialogWords } from './standing.js';
-import { html, icon, listen, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
 import { fixed, timeOfDay } from '../core/format.js';
 import { write } from '../core/ink.js';
 import { openScreen } from '../core/open-screen.js';
@@ -100,8 +100,8 @@ class CheckView {
     setIcon(parts.mark, verdict === 'fault' ? ICONS[priority] : MARKS[verdict]);
     const speed_mps = store.signal('speed')?.value?.speed_mps;
     write(parts.speed, store.ink('speed').ink, typeof speed_mps === 'number' ? speedWords(speed_mps)[0] ?? '–' : '–', parts.unit, typeof speed_mps === 'number' ? speedUnit() : '');
-    setWords(parts.sentence, sentenceOf(verdict, why, isKnown, alarm?.verdict === 'fault' ? alarm.text : answer?.text, feed.problem));
-    setWords(parts.needs, verdict === 'unknown' && answer ? answer.checked_when : '');
+    setSentence(parts.sentence, sentenceOf(verdict, why, isKnown, alarm?.verdict === 'fault' ? alarm.text : answer?.text, feed.problem));
+    setSentence(parts.needs, verdict === 'unknown' && answer ? answer.checked_when : '');
     this.#drawAlarm(isKnown);
     figuresOf(answer, alarm, isKnown).forEach(({ label: name, value, unit, isLimit }, i) => {
       const at = parts.figures[i];
@@ -133,13 +133,13 @@ class CheckView {
     }
     if (causes.length) {
       setText(parts.alarmTitle, title);
-      setWords(parts.state, 'suppressed');
-      setWords(parts.story, `Cause: ${causes.join(', ')}. It is announced if it is still active when that ends.`);
+      setSentence(parts.state, 'suppressed');
+      setSentence(parts.story, `Cause: ${causes.join(', ')}. It is announced if it is still active when that ends.`);
     }
     if (!alarm) return;
     setText(parts.alarmTitle, alarm.title);
-    setWords(parts.state, [stateWords(alarm), silentWords(alarm)].filter(Boolean).join(', '));
-    setWords(parts.story, isKnown ? dialogWords(alarm) : `Began ${timeOfDay(alarm.raised_ms)}. ${alarm.advice}`);
+    setSentence(parts.state, [stateWords(alarm), silentWords(alarm)].filter(Boolean).join(', '));
+    setSentence(parts.story, isKnown ? dialogWords(alarm) : `Began ${timeOfDay(alarm.raised_ms)}. ${alarm.advice}`);
   }
 
   /** @param {import('./alarms-layout.js').Key} name */
@@ -153,7 +153,7 @@ class CheckView {
   async #answer(name) {
     const { alarm, store, parts } = this;
     if (!alarm) return;
-    const say = (/** @type {string} */ sentence) => setWords(parts.message, sentence);
+    const say = (/** @type {string} */ sentence) => setSentence(parts.message, sentence);
     say('');
     if (name === 'shelve') return openShelve(store, alarm, say);
     const answer = await store.ask(name, { alarm: alarm.id, ...(name === 'unshelve' ? {} : { occurrence: alarm.occurrence }) });
@@ -169,7 +169,7 @@ class CheckView {
     show(chart, answer !== null);
     show(canvas, isMeasured);
     const unit = answer?.measured?.unit ?? this.alarm?.measured?.unit ?? this.feed.unit;
-    setWords(chartSays, !answer ? '' : !isMeasured ? 'nothing was measured' : isKnown ? unit : `until ${new Date(got_ms).toTimeString().slice(0, 8)}`);
+    setSentence(chartSays, !answer ? '' : !isMeasured ? 'nothing was measured' : isKnown ? unit : `until ${new Date(got_ms).toTimeString().slice(0, 8)}`);
     if (minute === null || !isMeasured) return;
     drawMinute(/** @type {HTMLCanvasElement} */ (canvas), minute, unit, momentOf(this.store) ?? Date.now(), this.palette);
     const known = minute.values.filter((value) => value !== null);
@@ -191,7 +191,7 @@ class CheckView {
       parts.rows.replaceChildren(...this.#rows.map(({ element }) => element));
     }
     setText(parts.thresholdTitle, model.body.schema[names[0] ?? '']?.title ?? '');
-    setWords(parts.thresholdWords, feed.answer ? thresholdWords(feed.answer) : '');
+    setSentence(parts.thresholdWords, feed.answer ? thresholdWords(feed.answer) : '');
     show(parts.change, !store.isViewer && !store.replaying);
     setAttribute(parts.change, 'aria-expanded', String(this.#isChanging));
     setText(parts.change, this.#isChanging ? 'Done' : 'Change');
@@ -208,7 +208,7 @@ class CheckView {
   #drawHistory() {
     const { feed, parts, store } = this;
     const now_ms = momentOf(store) ?? 0;
-    setWords(parts.total, feed.episodes === null ? (feed.historyProblem || '…') : totalWords(feed.episodes, now_ms));
+    setSentence(parts.total, feed.episodes === null ? (feed.historyProblem || '…') : totalWords(feed.episodes, now_ms));
     const rows = (feed.episodes ?? []).slice(0, 20).map((episode) => episodeWords(episode, now_ms));
     const key = JSON.stringify(rows);
     if (key === this.#history) return;
@@ -216,7 +216,7 @@ class CheckView {
     const mark = ICONS[feed.answer?.priority ?? 'warning'];
     parts.history.replaceChildren(...rows.map(({ at, text, lasted }) => {
       const detail = html('span', { class: 'm' });
-      setWords(detail, text);
+      setSentence(detail, text);
       return html('li', {}, html('span', { class: 'n' }, at), icon(mark, 's'), detail, html('span', { class: 'n' }, lasted));
     }));
   }
@@ -241,7 +241,7 @@ class CheckView {
   #drawFoot() {
     const { parts, feed, store } = this;
     const { at, before, after, of } = placeOf(tilesOf(store.frame?.checks ?? []), feed.id);
-    setWords(parts.place, at < 0 ? '' : `${at + 1} of ${of}`);
+    setSentence(parts.place, at < 0 ? '' : `${at + 1} of ${of}`);
     setAttribute(parts.before, 'aria-disabled', before === null);
     setAttribute(parts.after, 'aria-disabled', after === null);
     setAttribute(parts.trends, 'disabled', !feed.answer?.signal);

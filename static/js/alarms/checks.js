@@ -1,7 +1,7 @@
 // The checks on Home: a row of marks in fixed places, and a tile each that shows OK, FAULT, or not checked and why. Each opens.
 
 import { tilesOf } from './alarm-layout.js';
-import { field, html, icon, listen, setAttribute, setIcon, setText, setWords } from '../core/dom.js';
+import { field, html, icon, listen, setAttribute, setIcon, setText, setSentence } from '../core/dom.js';
 import { openScreen } from '../core/open-screen.js';
 
 /**
@@ -82,7 +82,7 @@ export function mount(root, store) {
       write(/** @type {HTMLElement} */ (list.children[i]), one);
       writeMark(/** @type {HTMLElement} */ (marks.children[i]), one);
     });
-    setWords(count, countWords(shown));
+    setSentence(count, countWords(shown));
     setAttribute(marks, 'aria-label', `Checks: ${countWords(shown)}`);
   }
 
@@ -141,5 +141,5 @@ function write(row, { label, kind, icon: glyph, lines }) {
   setAttribute(mark, 'class', kind === 'unk' ? 'i s dashed' : 'i s');
   setIcon(mark, glyph);
   setText(name, label);
-  setWords(brief, lines.join('\n'));
+  setSentence(brief, lines.join('\n'));
 }

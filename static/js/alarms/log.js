@@ -1,7 +1,7 @@
 // The alarm log: what stands and who has seen it, then what happened, newest first, with the times in which this page was blind.
 
 import { MARKS, KINDS, dayWords, eventWords, gapLine, joined, lowest, standingRows, tookWords } from './log-layout.js';
-import { html, icon, listen, setAttribute, setText, setWords, show, words } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { OlderEvents, queryOf } from './older-events.js';
 import { loadWords } from './standing.js';
 import { timeOfDay } from '../core/format.js';
@@ -69,9 +69,9 @@ class AlarmLog {
     setText(inTen, String(frame?.alarm_load?.in_10_min ?? '–'));
     setText(standing, String(alarms.filter((alarm) => alarm.state !== 'SHELVED').length));
     setText(shelved, String(alarms.filter((alarm) => alarm.state === 'SHELVED').length));
-    setWords(load, loadWords(frame?.alarm_load));
+    setSentence(load, loadWords(frame?.alarm_load));
     const why = frame?.replay ? 'These are the events of the live car. Those of the recording are in the list of its alarms.' : frame?.log_trouble ?? '';
-    setWords(trouble, why);
+    setSentence(trouble, why);
     show(trouble, why !== '');
     const lines = standingRows(alarms, frame?.suppressed ?? []);
     const key = JSON.stringify(lines);
@@ -131,8 +131,8 @@ function build(root) {
 
 /** @param {ReturnType<typeof standingRows>[number]} row */
 function standingRow({ icon: mark, colour, title, text, at, kind }) {
-  return html('li', { 'data-kind': kind }, icon(mark, colour), html('span', { class: 't' }, ...words(title)), html('span', { class: 'n h' }, at),
-    html('span', { class: 'm' }, ...words(text)));
+  return html('li', { 'data-kind': kind }, icon(mark, colour), html('span', { class: 't' }, ...textNodes(title)), html('span', { class: 'n h' }, at),
+    html('span', { class: 'm' }, ...textNodes(text)));
 }
 
 /** @param {Row} row */
@@ -157,10 +157,10 @@ function withDay(row, above, all) {
  */
 function drawRow({ event, gap }, all) {
   if (!event) {
-    return html('li', { class: 'gap hatched' }, html('span'), html('span', { class: 'tag' }, icon('link-off', 's'), ...words(gapLine(gap))));
+    return html('li', { class: 'gap hatched' }, html('span'), html('span', { class: 'tag' }, icon('link-off', 's'), ...textNodes(gapLine(gap))));
   }
   const { icon: glyph, kind, title, text } = eventWords(event);
   const details = [text, tookWords(event, all)].filter(Boolean).join(' · ');
-  return html('li', {}, icon(glyph, kind), html('span', { class: 't' }, ...words(title)), html('span', { class: 'n h' }, timeOfDay(event.at_ms)),
-    html('span', { class: 'm' }, ...words(details)));
+  return html('li', {}, icon(glyph, kind), html('span', { class: 't' }, ...textNodes(title)), html('span', { class: 'n h' }, timeOfDay(event.at_ms)),
+    html('span', { class: 'm' }, ...textNodes(details)));
 }

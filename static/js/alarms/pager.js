@@ -1,6 +1,6 @@
 // A list shown a page at a time: no row is sliced. The rows stay in the document, those of other pages hidden.
 
-import { html, icon, listen, setAttribute, setWords, show } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setSentence, show } from '../core/dom.js';
 import { pagesOf } from './alarms-layout.js';
 
 export class PagedList {
@@ -60,7 +60,7 @@ export class PagedList {
     setAttribute(this.before, 'aria-disabled', from === 0);
     setAttribute(this.after, 'aria-disabled', to >= length);
     const { above } = this;
-    setWords(this.position, length ? `${to - from > 1 ? `${above + from + 1}–${above + to}` : above + to} of ${above + length}` : '');
+    setSentence(this.position, length ? `${to - from > 1 ? `${above + from + 1}–${above + to}` : above + to} of ${above + length}` : '');
     this.onTurn();
   }
 

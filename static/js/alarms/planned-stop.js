@@ -1,7 +1,7 @@
 // A planned stop: a line under the strip as long as it is in force, and the sheet in which it begins and ends.
 
 import { lineWords, REASONS, sheetWords, titleOf, UNKNOWN } from './planned-stop-layout.js';
-import { html, icon, need, setText, setWords, show } from '../core/dom.js';
+import { html, icon, need, setText, setSentence, show } from '../core/dom.js';
 import { styled } from '../core/style-sheet.js';
 import { addSheet, openSheet } from '../shell/sheet.js';
 
@@ -27,8 +27,8 @@ export function mount(monitor, store, say) {
     show(line, stop !== null);
     show(end, !store.replaying);
     if (!stop) return;
-    setWords(title, titleOf(stop.reason));
-    setWords(text, lineWords(stop));
+    setSentence(title, titleOf(stop.reason));
+    setSentence(text, lineWords(stop));
     show(unknown, !stop.is_speed_known);
   };
   draw();
@@ -56,7 +56,7 @@ export function openPlannedStop(store, say) {
   const draw = () => {
     const stop = store.frame?.session.planned_stop ?? null;
     setText(title, stop ? titleOf(stop.reason) : 'Planned stop');
-    setWords(text, sheetWords(stop));
+    setSentence(text, sheetWords(stop));
     show(reasons, stop === null);
     show(end, stop !== null);
   };

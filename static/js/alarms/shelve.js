@@ -1,7 +1,7 @@
 // Shelving: by name, for a while, never longer than 15 minutes.
 
 import { closeSheet, openSheet } from '../shell/sheet.js';
-import { field, need, setWords } from '../core/dom.js';
+import { field, need, setSentence } from '../core/dom.js';
 
 /**
  * @param {import('../core/store.js').Store} store
@@ -10,7 +10,7 @@ import { field, need, setWords } from '../core/dom.js';
  */
 export function openShelve(store, alarm, say) {
   const sheet = /** @type {HTMLDialogElement} */ (need(document, '#sheet-shelve'));
-  setWords(field(sheet, 'words'), `“${alarm.title}” is not announced meanwhile. Shelving ends by itself.`);
+  setSentence(field(sheet, 'words'), `“${alarm.title}” is not announced meanwhile. Shelving ends by itself.`);
   for (const key of /** @type {NodeListOf<HTMLElement>} */ (sheet.querySelectorAll('[data-minutes]'))) {
     key.onclick = async () => {
       closeSheet(sheet);

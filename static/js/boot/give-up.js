@@ -1,6 +1,6 @@
 // A page that could not begin in whole shows nothing of the car: half of it would look as if somebody watched.
 
-import { field, need, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { field, need, setAttribute, setText, setSentence, show } from '../core/dom.js';
 
 /** Shows that this page does not work in place of the screen that the server is being reached. */
 export function giveUp() {
@@ -12,5 +12,5 @@ export function giveUp() {
   setAttribute(document.body, 'data-screen', 'start');
   show(field(start, 'chain'), false); // nobody knows how the link stands
   setText(field(start, 'title'), 'This page does not work');
-  setWords(field(start, 'words'), 'It could not start completely, so no value and no alarm is shown. Reload it. If that does not help, use another browser.');
+  setSentence(field(start, 'words'), 'It could not start completely, so no value and no alarm is shown. Reload it. If that does not help, use another browser.');
 }

@@ -1,7 +1,7 @@
 // The line on Home with the number of operators who would hear an alarm; behind it, what this phone can do.
 
 import { reachOf } from './control-layout.js';
-import { field, listen, setAttribute, setIcon, need, setWords } from '../core/dom.js';
+import { field, listen, setAttribute, setIcon, need, setSentence } from '../core/dom.js';
 
 /**
  * @param {HTMLElement} root
@@ -14,8 +14,8 @@ export function mount(root, store, openPhone) {
   function draw() {
     const { frame } = store;
     const seen = reachOf(store.isSilent ? null : frame?.replay ? frame.live?.reach : frame?.reach);
-    setWords(text, (frame?.replay ? 'Live: ' : '') + seen.text);
-    setWords(why, seen.why);
+    setSentence(text, (frame?.replay ? 'Live: ' : '') + seen.text);
+    setSentence(why, seen.why);
     setIcon(mark, seen.isBad ? 'bell-off' : 'bell');
     setAttribute(root, 'data-bad', seen.isBad || null);
   }

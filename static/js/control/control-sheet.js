@@ -1,7 +1,7 @@
 // The sheet behind the chip: who is in control, how this page gets it or gives it away, and who would hear an alarm.
 
 import { reachOf, sheetOf } from './control-layout.js';
-import { html, icon, setText, setWords, show, words } from '../core/dom.js';
+import { html, icon, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { addSheet, openSheet } from '../shell/sheet.js';
 
 /**
@@ -44,9 +44,9 @@ class ControlSheet {
     const seen = sheetOf(now, alarmReach, page);
     if (seen.state !== 'other' && seen.state !== 'asking') this.#isConfirming = false;
     setText(this.title, this.#isConfirming ? `Take over from ${now.holder}?` : seen.title);
-    setWords(this.text, this.#isConfirming ? `${now.holder} may be about to act. Taking over is announced to everyone and logged.` : seen.text);
+    setSentence(this.text, this.#isConfirming ? `${now.holder} may be about to act. Taking over is announced to everyone and logged.` : seen.text);
     const line = reachOf(alarmReach);
-    this.reach.replaceChildren(icon(line.isBad ? 'bell-off' : 'bell', 's'), html('span', {}, html('b', {}, ...words(line.text)), ...(line.why ? [html('br'), html('span', { class: 'small sub' }, ...words(line.why))] : [])), icon('next', 's'));
+    this.reach.replaceChildren(icon(line.isBad ? 'bell-off' : 'bell', 's'), html('span', {}, html('b', {}, ...textNodes(line.text)), ...(line.why ? [html('br'), html('span', { class: 'small sub' }, ...textNodes(line.why))] : [])), icon('next', 's'));
     const key = JSON.stringify([seen.state, this.#isConfirming, seen.handTo.map((one) => [one.page, one.name, one.can, one.why_text])]);
     if (key === this.#drawn) return;
     this.#drawn = key;
@@ -68,7 +68,7 @@ class ControlSheet {
   /** @param {string} state */
   #keysOf(state) {
     const key = (/** @type {string} */ label, /** @type {() => void} */ act, kind = 'key wide') => {
-      const button = html('button', { type: 'button', class: kind }, ...words(label));
+      const button = html('button', { type: 'button', class: kind }, ...textNodes(label));
       button.addEventListener('click', act);
       return button;
     };

@@ -3,7 +3,7 @@
 import { askedOf, noticeOf, seconds } from './control-layout.js';
 import { openHandover } from './duty.js';
 import { partOf } from './duty-layout.js';
-import { html, icon, listen, need, setAttribute, setWords } from '../core/dom.js';
+import { html, icon, listen, need, setAttribute, setSentence } from '../core/dom.js';
 
 /** A refusal is answered with a key for so long: another one with the same text is another [ms]. */
 const REFUSED_MS = 3000;
@@ -90,7 +90,7 @@ export function mount(snacks, store, control) {
     asking = request?.page ?? '';
     if (!request) prompt.remove();
     else if (!prompt.isConnected) snacks.prepend(prompt);
-    if (request) setWords(text, `${request.name} gets it in ${seconds(request.left_s - store.lag_s)} unless you keep it.`);
+    if (request) setSentence(text, `${request.name} gets it in ${seconds(request.left_s - store.lag_s)} unless you keep it.`);
   }
 
   /** @param {import('../core/protocol-types.js').LogEvent[]} events */

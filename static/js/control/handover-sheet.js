@@ -3,7 +3,7 @@
 import { partOf } from './duty-layout.js';
 import { endWords, lineWords, markOf } from './handover-layout.js';
 import { styled } from '../core/style-sheet.js';
-import { html, icon, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
+import { html, icon, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
 import { Meant } from '../core/meant.js';
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
 
@@ -80,7 +80,7 @@ export class HandoverSheet {
     setText(this.count, `${handover.lines.length - handover.left} of ${handover.lines.length} read back`);
     drawName(this.by, handover.by);
     drawName(this.to, handover.name);
-    setWords(this.text, part === 'taker' ? `Say each line aloud and press it. Control stays with ${handover.by} until the last line.` : `${handover.name} says each line aloud and presses it. You stay in control until the last line.`);
+    setSentence(this.text, part === 'taker' ? `Say each line aloud and press it. Control stays with ${handover.by} until the last line.` : `${handover.name} says each line aloud and presses it. You stay in control until the last line.`);
     this.#drawLines(handover, part);
     show(this.key, part === 'taker');
     setText(this.keyTitle, end.title);
@@ -129,7 +129,7 @@ export class HandoverSheet {
   async #order(kind, fields) {
     setText(this.bad, '');
     const answer = await this.store.ask(kind, { vehicle: this.store.vehicle, ...fields });
-    if (!answer.ok && this.sheet.open) setWords(this.bad, answer.reason ?? 'Refused.'); // a notice is behind the sheet
+    if (!answer.ok && this.sheet.open) setSentence(this.bad, answer.reason ?? 'Refused.'); // a notice is behind the sheet
     else if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Not handed over');
     return answer.ok;
   }
@@ -157,8 +157,8 @@ export class LineRow {
     this.line = line;
     setIcon(this.mark, markOf(line));
     setAttribute(this.element, 'data-kind', line.priority ?? line.kind);
-    setWords(this.title, line.title);
-    setWords(this.text, lineWords(line));
+    setSentence(this.title, line.title);
+    setSentence(this.text, lineWords(line));
     setAttribute(this.tick, 'aria-label', `Read back: ${line.title}`);
     setAttribute(this.tick, 'aria-pressed', String(line.read));
     setAttribute(this.tick, 'data-next', face === 'next');

@@ -2,7 +2,7 @@
 
 import { LineRow } from './handover-sheet.js';
 import { leftLines } from './handover-layout.js';
-import { html, icon, setAttribute, setText, setWords } from '../core/dom.js';
+import { html, icon, setAttribute, setText, setSentence } from '../core/dom.js';
 import { Meant } from '../core/meant.js';
 import { styled } from '../core/style-sheet.js';
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
@@ -87,6 +87,6 @@ export class LeftSheet {
     setText(this.bad, '');
     const answer = await this.store.ask('take_alarm', { vehicle: this.store.vehicle, alarm, occurrence: Number(occurrence) });
     if (answer.ok) this.#taken.add(line.key);
-    else setWords(this.bad, answer.reason ?? 'Refused.');
+    else setSentence(this.bad, answer.reason ?? 'Refused.');
   }
 }

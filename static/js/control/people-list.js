@@ -3,7 +3,7 @@
 import { lastWords } from './people-layout.js';
 import { styled } from '../core/style-sheet.js';
 import { request, sentenceOf } from './request.js';
-import { html, icon, listen, setText, setWords } from '../core/dom.js';
+import { html, icon, listen, setText, setSentence } from '../core/dom.js';
 import { counted } from '../core/format.js';
 
 /**
@@ -59,7 +59,7 @@ class PeopleGroup {
       this.#take(await request('/api/people'));
       setText(this.bad, '');
     } catch (error) {
-      setWords(this.bad, sentenceOf(error));
+      setSentence(this.bad, sentenceOf(error));
     }
   }
 
@@ -82,7 +82,7 @@ class PeopleGroup {
     role.value = row.role;
     const remove = html('button', { type: 'button', class: 'key', 'aria-label': `Remove ${row.name}`, 'data-f': 'person-remove' }, icon('trash'));
     const about = html('span', { class: 'm' });
-    setWords(about, lastWords(row, Date.now()));
+    setSentence(about, lastWords(row, Date.now()));
     name.addEventListener('change', () => void this.#send(path, 'PATCH', { name: name.value }, 'Not renamed'));
     role.addEventListener('change', () => void this.#send(path, 'PATCH', { role: role.value }, 'Not changed'));
     remove.addEventListener('click', () => void this.#send(path, 'DELETE', null, 'Not removed'));

@@ -4,7 +4,7 @@ import { initialsOf } from './duty-layout.js';
 import { lastWords } from './people-layout.js';
 import { styled } from '../core/style-sheet.js';
 import { request, sentenceOf } from './request.js';
-import { html, icon, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { html, icon, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { addSheet, closeSheet, mustWait, openSheet } from '../shell/sheet.js';
 import { timeOfDay } from '../core/format.js';
 import { openScreen } from '../core/open-screen.js';
@@ -83,7 +83,7 @@ class SignOn {
     try {
       this.#take(await request('/api/people'));
     } catch (error) {
-      setWords(this.bad, sentenceOf(error));
+      setSentence(this.bad, sentenceOf(error));
     }
   }
 
@@ -118,7 +118,7 @@ class SignOn {
   /** @param {string} id @param {string} disc @param {string} name @param {string} about */
   #row(id, disc, name, about) {
     const more = html('span', { class: 'm' });
-    setWords(more, about);
+    setSentence(more, about);
     const key = html('button', { type: 'button', 'data-person': id }, html('span', { class: 'disc', 'aria-hidden': 'true' }, id === NEW ? icon('plus') : disc), html('bdi', { class: 't' }, name), more, icon('ok'));
     key.addEventListener('click', () => this.#choose(id));
     return html('li', {}, key);
@@ -139,7 +139,7 @@ class SignOn {
     const row = this.#list?.people.find((one) => one.id === this.#chosen);
     const isNew = this.#chosen === NEW;
     setText(this.title, me ? `${me.name} is on duty` : 'Who is on duty?');
-    setWords(this.text, me ? `As ${me.title} since ${timeOfDay(me.since_ms).slice(0, 5)}. Choose another person if this device passes to another person.` : 'The name goes with every order, acknowledgement and setting of this device.');
+    setSentence(this.text, me ? `As ${me.title} since ${timeOfDay(me.since_ms).slice(0, 5)}. Choose another person if this device passes to another person.` : 'The name goes with every order, acknowledgement and setting of this device.');
     for (const key of this.rows.querySelectorAll('[data-person]')) setAttribute(key, 'aria-pressed', String(key.getAttribute('data-person') === this.#chosen));
     for (const key of this.roles.children) setAttribute(key, 'aria-pressed', String(key.getAttribute('data-role-key') === this.#role));
     show(this.field, isNew);
@@ -190,7 +190,7 @@ class SignOn {
     try {
       await doing();
     } catch (error) {
-      setWords(this.bad, sentenceOf(error));
+      setSentence(this.bad, sentenceOf(error));
       await this.#ask();
     }
     this.#isBusy = false;

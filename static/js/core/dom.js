@@ -84,14 +84,14 @@ export function setText(element, text) {
 }
 
 /**
- * Write a sentence whose numbers stand in the face of numbers, its speeds in the unit of this phone.
+ * Write a sentence with its numbers in the font of numbers and its speeds in the unit of this phone.
  * @param {Element} element
  * @param {string} sentence
  */
-export function setWords(element, sentence) {
+export function setSentence(element, sentence) {
   const shown = inUnits(sentence);
   if (written.get(element) === shown) return;
-  element.replaceChildren(...words(shown));
+  element.replaceChildren(...textNodes(shown));
   written.set(element, shown);
 }
 
@@ -100,7 +100,7 @@ export function setWords(element, sentence) {
  * @param {string} sentence
  * @returns {(HTMLElement | string)[]}
  */
-export function words(sentence) {
+export function textNodes(sentence) {
   return pieces(inUnits(sentence)).map((piece) => (piece.isNumber ? html('span', { class: 'n' }, piece.text) : piece.text));
 }
 

@@ -1,6 +1,6 @@
 // Reads back what was written: a browser whose functions do nothing, or the wrong thing, draws nothing although nothing throws.
 
-import { html, setAttribute, setText, setWords } from './dom.js';
+import { html, setAttribute, setText, setSentence } from './dom.js';
 import { fixed } from './format.js';
 
 export class DrawProof {
@@ -14,7 +14,7 @@ export class DrawProof {
     const [now, speed] = [`proof ${this.#n}`, fixed(this.#n + 0.25)];
     setText(this.#text, now);
     setAttribute(this.#text, 'data-n', this.#n);
-    setWords(this.#sentence, `at ${speed} m`);
+    setSentence(this.#sentence, `at ${speed} m`);
     const [text, sentence] = [this.#text, this.#sentence];
     return textOf(text) === now && text.attributes[0]?.value === String(this.#n) && speed.length === 3 && textOf(sentence) === 'at ' && textOf(sentence.childNodes[1]) === speed;
   }

@@ -7,7 +7,7 @@ import { axisOf, bothPlot, differencePlot, eventsPlot, speedPlot, waysMap } from
 import { dayOf, figure, openBoard, options, select } from './drive-board.js';
 import { styled } from '../core/style-sheet.js';
 import { request, sentenceOf } from '../control/request.js';
-import { html, icon, listen, setAttribute, setWords, words } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setSentence, textNodes } from '../core/dom.js';
 import { duration, fixed, signed } from '../core/format.js';
 
 /**
@@ -81,10 +81,10 @@ class CompareWay {
       const b = drives.find(({ id }) => id !== a?.id);
       options(this.a, choices, a?.id ?? '');
       options(this.b, choices, b?.id ?? a?.id ?? '');
-      if (!a) setWords(this.state, 'There is no drive yet.');
+      if (!a) setSentence(this.state, 'There is no drive yet.');
       else void this.#load();
     } catch (error) {
-      setWords(this.state, sentenceOf(error));
+      setSentence(this.state, sentenceOf(error));
     }
   }
 
@@ -94,12 +94,12 @@ class CompareWay {
     this.#forget();
     this.#name(this.names.a, a, 'solid line');
     this.#name(this.names.b, b, 'dotted line');
-    if (!this.#courses.has(a) || !this.#courses.has(b)) setWords(this.state, 'Loading the drives…');
+    if (!this.#courses.has(a) || !this.#courses.has(b)) setSentence(this.state, 'Loading the drives…');
     try {
       for (const id of new Set([a, b])) if (!this.#courses.has(id)) this.#courses.set(id, await request(`/api/recordings/${encodeURIComponent(id)}/course`));
       if (turn === this.#turn) this.#turnTo(this.#by);
     } catch (error) {
-      if (turn === this.#turn) setWords(this.state, sentenceOf(error));
+      if (turn === this.#turn) setSentence(this.state, sentenceOf(error));
     }
   }
 
@@ -108,7 +108,7 @@ class CompareWay {
     const drive = this.#drives.get(id);
     if (!drive) return;
     const [day, ...more] = nameOf(drive);
-    place.replaceChildren(html('b', {}, ...words(day ?? '')), html('small', {}, ...words([...more, how].join(' · '))));
+    place.replaceChildren(html('b', {}, ...textNodes(day ?? '')), html('small', {}, ...textNodes([...more, how].join(' · '))));
   }
 
   /** No figure of the drives before stands under the names of the new ones. */
@@ -127,7 +127,7 @@ class CompareWay {
     if (!a || !b) return;
     this.#rows = aligned(a, b, by);
     const met = this.#rows.filter((row) => row.b).length;
-    setWords(this.state, !this.#rows.length ? 'The distance of drive A is not known: compare by time.' : met ? '' : 'Drive B passes nowhere along drive A: compare by time.');
+    setSentence(this.state, !this.#rows.length ? 'The distance of drive A is not known: compare by time.' : met ? '' : 'Drive B passes nowhere along drive A: compare by time.');
     this.slider.max = String(Math.max(0, this.#rows.length - 1));
     this.#draw();
   }
@@ -169,7 +169,7 @@ class CompareWay {
 
   /** @param {import('./compare-way-model.js').Difference} one */
   #difference({ x, text, value }) {
-    const key = html('button', { type: 'button' }, html('span', { class: 'n' }, this.#axisWords(x)), html('b', {}, ...words(text)), html('span', { class: 'n' }, value));
+    const key = html('button', { type: 'button' }, html('span', { class: 'n' }, this.#axisWords(x)), html('b', {}, ...textNodes(text)), html('span', { class: 'n' }, value));
     listen(key, 'click', () => this.#point(this.#rows.findIndex((row) => row.x >= x)));
     return html('li', {}, key);
   }
@@ -228,7 +228,7 @@ class CompareWay {
 function summaryList(lines) {
   const number = (/** @type {import('./compare-way-summary.js').Line} */ { unit }, /** @type {number | null} */ value) => (value === null ? 'not known' : unit ? `${fixed(value, unit === '%' ? 0 : 2)} ${unit}` : String(value));
   return html('dl', { class: 'lb-check' }, ...lines.map((line) => html('div', {}, html('dt', {}, line.name), html('dd', {},
-    ...(line.a === null && line.b === null ? [] : [html('b', {}, `A ${number(line, line.a)}, B ${number(line, line.b)}`)]), html('small', {}, ...words(line.words))))));
+    ...(line.a === null && line.b === null ? [] : [html('b', {}, `A ${number(line, line.a)}, B ${number(line, line.b)}`)]), html('small', {}, ...textNodes(line.words))))));
 }
 
 /** Its day first. @param {Drive} one */

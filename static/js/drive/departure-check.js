@@ -7,7 +7,7 @@ import { styled } from '../core/style-sheet.js';
 import { openWhy } from './departure-why.js';
 import { openDuty } from '../control/duty.js';
 import { request, sentenceOf } from '../control/request.js';
-import { field, html, icon, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { field, html, icon, listen, need, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { timeOfDay } from '../core/format.js';
 import { Meant } from '../core/meant.js';
 import { openScreen } from '../core/open-screen.js';
@@ -71,7 +71,7 @@ class DepartureView {
     this.root = root;
     this.stops = [
       listen(this.key, 'click', () => void this.#press()),
-      listen(this.duty, 'click', () => void openDuty(store, (sentence) => setWords(this.bad, sentence))),
+      listen(this.duty, 'click', () => void openDuty(store, (sentence) => setSentence(this.bad, sentence))),
       listen(this.again, 'click', () => void this.#again()),
       listen(this.reopen, 'click', () => void this.#order('reopen_departure', {})),
       store.on('duty', () => this.#draw()),
@@ -136,10 +136,10 @@ class DepartureView {
   #draw() {
     const departure = this.#departure;
     const old = this.#old;
-    if (old || departure) setWords(this.state, old && departure ? `${old} What is shown here is old.` : old);
+    if (old || departure) setSentence(this.state, old && departure ? `${old} What is shown here is old.` : old);
     show(this.state, Boolean(this.state.textContent));
     if (!departure) return;
-    setWords(this.count, doneOf(departure));
+    setSentence(this.count, doneOf(departure));
     this.#due.want(this.store.vehicle, departure.items);
     const next = nextOf(departure);
     this.#drawCells(departure, next);
@@ -166,7 +166,7 @@ class DepartureView {
     setAttribute(this.seal, 'data-hash', signature.hash);
     const line = html('p', { class: 'm' });
     const date = new Date(signature.at_ms).toLocaleDateString('en-GB', { day: 'numeric', month: 'short', year: 'numeric' });
-    setWords(line, `${date}, ${timeOfDay(signature.at_ms)} · ${countWords(departure)}`);
+    setSentence(line, `${date}, ${timeOfDay(signature.at_ms)} · ${countWords(departure)}`);
     this.seal.replaceChildren(icon('ok'), html('b', {}, `Ready: signed by ${signature.by}${signature.role ? `, ${signature.role}` : ''}`), line,
       html('p', { class: 'm', title: signature.hash }, 'hash ', html('b', { class: 'n' }, shortHash(signature.hash)), ', valid until the end of this drive'));
   }
@@ -214,13 +214,13 @@ class DepartureView {
     const who = store.duty?.signs ?? store.name;
     show(this.foot, state !== 'signed' && !store.isViewer);
     setText(this.keyTitle, state === 'none' ? 'Begin the check' : left ? 'Sign' : `Sign as ${store.duty?.me?.name ?? who}`);
-    setWords(this.keyText, state === 'none' ? `${departure.of} items` : left || countWords(departure));
+    setSentence(this.keyText, state === 'none' ? `${departure.of} items` : left || countWords(departure));
     setAttribute(this.key, 'aria-disabled', isReady && !this.#old ? null : 'true');
     show(this.duty, state === 'open' && !left && !store.isViewer && store.duty !== null && !store.duty.me && store.duty.people > 0);
     show(this.reopen, state === 'signed' && !store.isViewer);
     show(this.again, state !== 'none' && !store.isViewer);
     setText(this.again, performance.now() - this.#sure_ms < SURE_MS ? 'Press again: every result is lost' : 'Begin again');
-    if (departure.complaint && !this.bad.textContent) setWords(this.bad, departure.complaint);
+    if (departure.complaint && !this.bad.textContent) setSentence(this.bad, departure.complaint);
   }
 
   async #press() {
@@ -256,7 +256,7 @@ class DepartureView {
       case 'record': return void this.#order('record', { on: true });
       case 'sound': return field(document, 'sound-off').click(); // as its banner does, within the press
       case 'check': return openScreen('check', item.of);
-      case 'files': return void setWords(this.bad, 'Go back, and open the tab Files.');
+      case 'files': return void setSentence(this.bad, 'Go back, and open the tab Files.');
       default: return openScreen('signals');
     }
   }
@@ -271,7 +271,7 @@ class DepartureView {
     this.#isBusy = false;
     if (this.#isStopped || vehicle !== this.store.vehicle) return null;
     const why = answer.ok ? null : answer.reason ?? 'Refused.';
-    if (why) setWords(this.bad, why);
+    if (why) setSentence(this.bad, why);
     await this.#ask();
     return why;
   }

@@ -4,7 +4,7 @@ import { decimalOf, local } from '../core/decimal.js';
 import { added, isSame, moved, rowOf } from './departure-layout.js';
 import { styled } from '../core/style-sheet.js';
 import { request, sentenceOf } from '../control/request.js';
-import { html, icon, listen, setText, setWords, show } from '../core/dom.js';
+import { html, icon, listen, setText, setSentence, show } from '../core/dom.js';
 import { counted } from '../core/format.js';
 
 /**
@@ -132,7 +132,7 @@ class DepartureList {
   #send(changed) {
     const sent = this.#sent.then(async () => {
       const why = await this.#whyNot(changed);
-      if (why) setWords(this.bad, why);
+      if (why) setSentence(this.bad, why);
       return why === '';
     });
     this.#sent = sent;

@@ -1,7 +1,7 @@
 // The rows of the departure check: what is done and seen now, what failed, what is open, what is done.
 
 import { barOf, failedWords, fixOf, lineWords, needWords, plain, valueOf } from './departure-layout.js';
-import { html, icon, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { html, icon, setAttribute, setText, setSentence, show } from '../core/dom.js';
 
 /**
  * @typedef {import('./departure-layout.js').Item} Item
@@ -42,11 +42,11 @@ export class Row {
     this.item = item;
     const { parts } = this;
     setAttribute(parts.element, 'data-next', isNext);
-    setWords(parts.line, parts.isNow ? needWords(item) : parts.isFailed ? item.fix : lineWords(item, due));
+    setSentence(parts.line, parts.isNow ? needWords(item) : parts.isFailed ? item.fix : lineWords(item, due));
     if (parts.isFailed) {
       const [title, allowed] = failedWords(item);
-      setWords(parts.title, title);
-      setWords(parts.allowed, allowed);
+      setSentence(parts.title, title);
+      setSentence(parts.allowed, allowed);
     } else setText(parts.title, item.title);
     if (parts.isNow) parts.draw(item);
   }

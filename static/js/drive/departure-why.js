@@ -2,7 +2,7 @@
 
 import { REASONS } from './departure-layout.js';
 import { intervalWords } from './due.js';
-import { html, icon, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { html, icon, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { addSheet, closeSheet, mustWait, openSheet } from '../shell/sheet.js';
 
 /** @typedef {import('./departure-layout.js').Item} Item @typedef {'not_applicable' | 'failed'} Verdict */
@@ -95,6 +95,6 @@ class WhySheet {
     if (result !== 'open' && !note) return setText(this.bad, 'Choose a reason, or type one.');
     const why = await this.set(result, note);
     if (why === null) closeSheet(this.sheet);
-    else setWords(this.bad, why);
+    else setSentence(this.bad, why);
   }
 }

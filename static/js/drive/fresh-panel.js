@@ -1,7 +1,7 @@
 // Above the ledge: what is spoken while the Mark key is held, and for 6 s what can be done with a fresh mark.
 
 import { Ring, shape } from './drive-parts.js';
-import { html, listen, setAttribute, setText, setWords, show, svg } from '../core/dom.js';
+import { html, listen, setAttribute, setText, setSentence, show, svg } from '../core/dom.js';
 import { fixed, timeOfDay } from '../core/format.js';
 import { markedAt, refusedWords, stepOf } from './mark-model.js';
 import { pickPhoto } from './photo-input.js';
@@ -112,14 +112,14 @@ export class FreshPanel {
     if (!mark || mark.isRemoved || left_ms <= 0) return this.close();
     const voice = this.#voice;
     setAttribute(this.element, 'data-speaking', voice !== null);
-    setWords(this.title, `Mark at ${timeOfDay(markedAt(mark))}`);
+    setSentence(this.title, `Mark at ${timeOfDay(markedAt(mark))}`);
     show(this.keys, voice === null);
     show(/** @type {any} */ (this.wave), voice !== null);
     document.documentElement.style.setProperty('--fresh', `${this.element.offsetHeight}px`); // notices stand above it
     if (voice) this.#drawVoice(voice);
     else {
       this.ring.draw(left_ms / STAYS_MS, String(Math.ceil(left_ms / 1000)));
-      setWords(this.more, storedWords(mark, this.#speed));
+      setSentence(this.more, storedWords(mark, this.#speed));
     }
   }
 
@@ -130,7 +130,7 @@ export class FreshPanel {
     const bars = Math.floor((length_ms / LONGEST_MS) * BARS);
     while (this.#levels.length < bars) this.#levels.push(voice.level);
     setAttribute(/** @type {Element} */ (this.wave.lastElementChild), 'd', levelPath(this.#levels));
-    setWords(this.more, voice.isRecording ? `Listening, ${fixed((LONGEST_MS - length_ms) / 1000)} s left. Let go: stored. Pull left: stored without voice.` : 'Waiting for the microphone. The mark is stored.');
+    setSentence(this.more, voice.isRecording ? `Listening, ${fixed((LONGEST_MS - length_ms) / 1000)} s left. Let go: stored. Pull left: stored without voice.` : 'Waiting for the microphone. The mark is stored.');
   }
 
   #undo() {

@@ -6,7 +6,7 @@ import { styled } from '../core/style-sheet.js';
 import { modesPlot, numberOf, ratePlot } from './logbook-plots.js';
 import { request, sentenceOf } from '../control/request.js';
 import { keptAt } from '../core/kept-at.js';
-import { html, icon, listen, setAttribute, setText, setWords, show, words } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { counted, fixed } from '../core/format.js';
 
 /**
@@ -78,7 +78,7 @@ class Logbook {
         const { openCompareWay } = await import('./compare-way.js');
         await openCompareWay(this.#choice.vehicle, null, this.store);
       } catch {
-        setWords(this.state, 'The comparison could not be loaded from the server. Try again.');
+        setSentence(this.state, 'The comparison could not be loaded from the server. Try again.');
       }
     });
     return html('div', { class: 'lb-filters' }, ...(from.vehicles.length > 1 ? [vehicle] : []), weeks, ...(from.tags.length ? [tag] : []), this.person, this.csv, compare);
@@ -96,15 +96,15 @@ class Logbook {
     const query = new URLSearchParams({ ...(vehicle ? { vehicle } : {}), ...(tag ? { tag } : {}), ...(person ? { person } : {}), ...(weeks ? { from: String(Date.now() - weeks * WEEK_MS) } : {}) });
     setText(this.title, `${vehicle || 'Car'} logbook`);
     setAttribute(this.csv, 'href', keptAt(`/api/logbook.csv?${query}`));
-    setWords(this.state, 'Loading the drives…');
+    setSentence(this.state, 'Loading the drives…');
     this.#forget();
     try {
       const answer = /** @type {Answer} */ (await request(`/api/logbook?${query}`));
       if (turn !== this.#turn) return;
       this.#answer = answer;
-      setWords(this.state, [...unreadWords(answer), ...(answer.totals.drives ? [] : ['No drives in this time.'])].join(' '));
+      setSentence(this.state, [...unreadWords(answer), ...(answer.totals.drives ? [] : ['No drives in this time.'])].join(' '));
     } catch (error) {
-      if (turn === this.#turn) setWords(this.state, sentenceOf(error));
+      if (turn === this.#turn) setSentence(this.state, sentenceOf(error));
       return;
     }
     this.#draw(this.#answer);
@@ -169,7 +169,7 @@ function bars(components) {
   const most = Math.max(...rows.map(([, number]) => number));
   return html('ul', { class: 'lb-bars' }, ...rows.map(([name, number]) => {
     const meter = html('progress', { max: most, value: number, 'aria-hidden': 'true' });
-    return html('li', {}, html('span', { dir: 'auto' }, ...words(name)), meter, html('b', { class: 'n' }, String(number)));
+    return html('li', {}, html('span', { dir: 'auto' }, ...textNodes(name)), meter, html('b', { class: 'n' }, String(number)));
   }));
 }
 
@@ -188,7 +188,7 @@ function checkList({ signed_ms, by, failed, failed_items, distance_m, unmeasured
     ['Failed in it', failed ? counted(failed, 'item') : 'none', failed_items.join(', ')],
   ];
   if (checks_known) rows.push(['Drives shown without one', String(checks_missing), `of ${counted(checks_known, 'drive')}`]);
-  return html('dl', { class: 'lb-check' }, ...rows.map(([title = '', value = '', more = '']) => html('div', {}, html('dt', {}, title), html('dd', {}, html('b', {}, value), ...(more ? [html('small', { dir: 'auto' }, ...words(more))] : [])))));
+  return html('dl', { class: 'lb-check' }, ...rows.map(([title = '', value = '', more = '']) => html('div', {}, html('dt', {}, title), html('dd', {}, html('b', {}, value), ...(more ? [html('small', { dir: 'auto' }, ...textNodes(more))] : [])))));
 }
 
 /** @param {import('./due.js').Due} due */
@@ -204,7 +204,7 @@ function overdueFigure(checks) {
 /** The most late one first. @param {import('./due.js').Due[]} recurring */
 function dueList(recurring) {
   return html('ul', { class: 'lb-due' }, ...recurring.map((due) => html('li', { 'data-overdue': due.is_overdue || null }, icon(due.is_overdue ? 'warn' : 'ok'),
-    html('b', { dir: 'auto' }, ...words(due.title)), html('span', { class: 'end' }, ...words(dueWords(due))), html('small', {}, ...words([intervalWords(due), lastWords(due)].filter(Boolean).join(' · '))))));
+    html('b', { dir: 'auto' }, ...textNodes(due.title)), html('span', { class: 'end' }, ...textNodes(dueWords(due))), html('small', {}, ...textNodes([intervalWords(due), lastWords(due)].filter(Boolean).join(' · '))))));
 }
 
 /** In whole days of this clock. @param {number} at_ms */
@@ -217,9 +217,9 @@ function daysAgo(at_ms) {
 function driveList(drives) {
   return html('ul', { class: 'lb-drives' }, ...drives.map((drive) => html('li', {},
     html('a', { href: keptAt(`/api/recordings/${encodeURIComponent(drive.id)}/report`), target: '_blank', rel: 'noopener' },
-      html('b', {}, dayOf(drive.started_ms)), html('span', { dir: 'auto' }, ...words(drive.title || drive.people.join(', '))),
+      html('b', {}, dayOf(drive.started_ms)), html('span', { dir: 'auto' }, ...textNodes(drive.title || drive.people.join(', '))),
       html('span', { class: 'n' }, drive.distance_m === null ? '–' : `${fixed(drive.distance_m / 1000, 2)} km`),
-      html('small', {}, ...words(driveWords(drive)))))));
+      html('small', {}, ...textNodes(driveWords(drive)))))));
 }
 
 /** @param {Drive} drive */

@@ -3,7 +3,7 @@
 import { PlayKey } from './play-key.js';
 import { countWords, headWords, markedAt, moreWords, stepOf, waitingWords } from './mark-model.js';
 import { request } from '../control/request.js';
-import { html, icon, listen, setText, setWords, show, words } from '../core/dom.js';
+import { html, icon, listen, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { timeOfDay } from '../core/format.js';
 import { addSheet, mustWait, openSheet } from '../shell/sheet.js';
 import { shape } from './drive-parts.js';
@@ -93,11 +93,11 @@ class MarkList {
     if (key === this.#drawn) return;
     this.#drawn = key;
     const { waiting } = marks;
-    setWords(this.count, countWords(waiting.length, rows.length - waiting.length));
+    setSentence(this.count, countWords(waiting.length, rows.length - waiting.length));
     show(this.waiting, waiting.length > 0);
     const said = waitingWords(waiting, marks.isDurable, !marks.isServerThere);
-    setWords(/** @type {Element} */ (this.waiting.querySelector('b')), said.title);
-    setWords(/** @type {Element} */ (this.waiting.querySelector('p')), said.text);
+    setSentence(/** @type {Element} */ (this.waiting.querySelector('b')), said.title);
+    setSentence(/** @type {Element} */ (this.waiting.querySelector('p')), said.text);
     show(this.none, rows.length === 0 || this.#problem !== '');
     setText(this.none, this.#problem || 'No marks in this drive yet. Press “Mark” to mark a moment.');
     for (const player of this.#players) player.stop();
@@ -107,7 +107,7 @@ class MarkList {
 
   /** @param {Row} row */
   #row({ id, head, more, isWaiting, isOwn, isRefused, voice }) {
-    const text = [html('b', { class: 't' }, ...words(head)), html('bdi', { class: 'm' }, ...words(more.join(' · ')))];
+    const text = [html('b', { class: 't' }, ...textNodes(head)), html('bdi', { class: 'm' }, ...textNodes(more.join(' · ')))];
     const what = isOwn ? html('button', { type: 'button', class: 'row', 'data-mark': id }, shape('flag'), ...text) : html('div', { class: 'row' }, shape('flag'), ...text);
     const state = html('span', { class: 'state', 'data-state': isWaiting ? 'waits' : 'stored' }, icon(isWaiting ? 'phone' : 'ok', 's'), isWaiting ? (isRefused ? 'Refused' : 'Waits on this device') : 'Stored');
     const item = html('li', {}, what, state);

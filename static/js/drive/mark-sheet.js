@@ -5,7 +5,7 @@ import { MarkPlot, courseOf } from './mark-plot.js';
 import { PlayKey } from './play-key.js';
 import { PhotoView } from './photo-view.js';
 import { CATEGORIES, MOST_SHIFT_S, MOST_WORDS, categoryWords, markedAt, refusedWords } from './mark-model.js';
-import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { signed, timeOfDay } from '../core/format.js';
 import { SPECS } from '../home/trends-layout.js';
 import { trendsOf } from '../home/trend-feed.js';
@@ -143,8 +143,8 @@ class MarkSheet {
     const mark = this.marks.get(this.id);
     if (!mark || mark.isRemoved) return closeSheet(this.sheet);
     const at_ms = markedAt(mark);
-    setWords(this.title, `Mark at ${timeOfDay(at_ms)}`);
-    setWords(this.when, `.${Math.floor((((at_ms % 1000) + 1000) % 1000) / 100)}`);
+    setSentence(this.title, `Mark at ${timeOfDay(at_ms)}`);
+    setSentence(this.when, `.${Math.floor((((at_ms % 1000) + 1000) % 1000) / 100)}`);
     setText(this.shift, mark.shift_s ? signed(mark.shift_s) : '0.0');
     for (const chip of this.chips) setAttribute(chip, 'aria-pressed', String(chip.dataset['category'] === mark.category));
     const { store } = this.marks;
@@ -153,7 +153,7 @@ class MarkSheet {
     this.#play.draw(mark.voice?.length_s ?? null);
     this.#photo.draw();
     const notes = [mark.voice?.note, mark.photo?.note, refusedWords(mark)].filter(Boolean).join('. ');
-    setWords(this.note, notes);
+    setSentence(this.note, notes);
     show(this.note, notes !== '');
   }
 }

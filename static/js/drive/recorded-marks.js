@@ -7,7 +7,7 @@ import { shape } from './drive-parts.js';
 import { styled } from '../core/style-sheet.js';
 import { request } from '../control/request.js';
 import { keptAt } from '../core/kept-at.js';
-import { html, icon, listen, setWords, show, words } from '../core/dom.js';
+import { html, icon, listen, setSentence, show, textNodes } from '../core/dom.js';
 import { duration } from '../core/format.js';
 import { addressOf } from '../files/files-model.js';
 
@@ -50,7 +50,7 @@ export async function listOf(id, say, open) {
   const [marks] = await Promise.all([marksOf(id), styled('drive')]);
   if (!marks.length) return null;
   return html('ul', { class: 'file-marks', 'aria-label': 'Marks' }, ...marks.map((mark) => {
-    const row = html('button', { type: 'button', class: 'row' }, shape('flag'), html('span', { class: 'n' }, duration(mark.at_s, true)), html('span', { class: 'tx' }, html('bdi', {}, mark.words || 'Mark'), html('span', { class: 'sub' }, ...words(aboutWords(mark)))));
+    const row = html('button', { type: 'button', class: 'row' }, shape('flag'), html('span', { class: 'n' }, duration(mark.at_s, true)), html('span', { class: 'tx' }, html('bdi', {}, mark.words || 'Mark'), html('span', { class: 'sub' }, ...textNodes(aboutWords(mark)))));
     listen(row, 'click', () => open(Math.max(0, mark.at_s - 2)));
     const item = html('li', {}, row);
     if (mark.voice) {
@@ -105,8 +105,8 @@ export class MarkCard {
     this.stop();
     this.#shown = mark.mark;
     if (mark.mark === this.#closed) return;
-    setWords(this.#title, mark.words || `Mark at ${duration(mark.at_s, true)}`);
-    setWords(this.#about, aboutWords(mark));
+    setSentence(this.#title, mark.words || `Mark at ${duration(mark.at_s, true)}`);
+    setSentence(this.#about, aboutWords(mark));
     if (mark.voice) {
       this.#player = new PlayKey(() => partAt(this.id, mark.mark, 'voice'), this.say);
       this.#player.draw(null);

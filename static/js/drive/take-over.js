@@ -1,7 +1,7 @@
 // An intervention is described: what the data say of it stands there already, one tap is enough. An alarm closes the form;
 // what was chosen and typed is kept until it is sent or the page is closed.
 
-import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { timeOfDay } from '../core/format.js';
 import { speedWords } from '../core/units.js';
 import { request, sentenceOf } from '../control/request.js';
@@ -122,9 +122,9 @@ class TakeOver {
     this.#isAsking = true;
     try {
       this.#found = await request(`/api/interventions/${encodeURIComponent(this.id)}?${new URLSearchParams({ vehicle: this.vehicle })}`, { signal: AbortSignal.timeout(ANSWER_MS) });
-      setWords(this.unread, '');
+      setSentence(this.unread, '');
     } catch (error) {
-      setWords(this.unread, sentenceOf(error));
+      setSentence(this.unread, sentenceOf(error));
     }
     this.#isAsking = false;
     this.draw();
@@ -134,14 +134,14 @@ class TakeOver {
     const { category, what, by } = this.draft;
     if (this.#isSent || (category === null && !what.trim())) return;
     this.#isSent = true;
-    setWords(this.bad, '');
+    setSentence(this.bad, '');
     this.draw();
     const fields = { vehicle: this.vehicle, intervention: this.id, what: what.trim(), category, initiated_by: by };
     const answer = await this.store.ask('describe_intervention', fields);
     this.#isSent = false;
     if (!answer.ok) {
       if (this.sheet.open) {
-        setWords(this.bad, answer.reason ?? 'Refused.');
+        setSentence(this.bad, answer.reason ?? 'Refused.');
         this.draw();
       } else this.say(answer.reason ?? 'Refused.', 'Not described');
       return;
@@ -184,7 +184,7 @@ class TakeOver {
       setText(fact.label, row.title);
       setText(fact.value, row.value);
       setText(fact.unit, row.unit);
-      setWords(fact.text, row.text);
+      setSentence(fact.text, row.text);
     });
     this.#plot.draw(found.samples, found.kind_of === 'to_manual');
   }

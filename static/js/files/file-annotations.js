@@ -2,7 +2,7 @@
 
 import { nameOf, tagsOf } from './files-layout.js';
 import { sentenceOf } from '../control/request.js';
-import { html, listen, setWords } from '../core/dom.js';
+import { html, listen, setSentence } from '../core/dom.js';
 
 /**
  * @typedef {import('./file-dialog.js').FileDialog} FileDialog
@@ -48,6 +48,6 @@ async function keep(dialog, model, row, annotations, refused) {
     await model.remark(row, annotations);
     dialog.close();
   } catch (error) {
-    setWords(refused, `Not saved. ${sentenceOf(error)}`);
+    setSentence(refused, `Not saved. ${sentenceOf(error)}`);
   }
 }

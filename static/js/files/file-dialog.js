@@ -1,7 +1,7 @@
 // The sheet of a recording's actions: a title, messages, actions, and the key that closes it.
 
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
-import { html, icon, listen, setAttribute, setText, words } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, textNodes } from '../core/dom.js';
 
 /** What only an operator may do with a recording, by its icon. */
 const CHANGES = ['mail', 'crit', 'edit', 'info', 'trash', 'upload'];
@@ -72,7 +72,7 @@ export class FileDialog {
 
   /** @param {string} title @param {string} sentence @param {() => void} [back] */
   refuse(title, sentence, back) {
-    this.show(title, [html('p', { class: 'bad', role: 'alert' }, ...words(sentence))], [], back ? [this.key('Back', back)] : []);
+    this.show(title, [html('p', { class: 'bad', role: 'alert' }, ...textNodes(sentence))], [], back ? [this.key('Back', back)] : []);
   }
 
   /**
@@ -82,7 +82,7 @@ export class FileDialog {
    * @param {string} [end] a label at its end
    */
   item(glyph, label, act, end = '') {
-    const key = html('button', { type: 'button', 'data-operator': CHANGES.includes(glyph) }, icon(glyph), label, ...(end ? [html('span', { class: 'end' }, ...words(end))] : []));
+    const key = html('button', { type: 'button', 'data-operator': CHANGES.includes(glyph) }, icon(glyph), label, ...(end ? [html('span', { class: 'end' }, ...textNodes(end))] : []));
     listen(key, 'click', act);
     return html('li', {}, key);
   }

@@ -5,7 +5,7 @@ import { nameOf, sizeWords, whyNotAsItIs } from './files-layout.js';
 import { keptAt } from '../core/kept-at.js';
 import { request, sentenceOf } from '../control/request.js';
 import { addressOf } from './files-model.js';
-import { html, icon, listen, setWords, words } from '../core/dom.js';
+import { html, icon, listen, setSentence, textNodes } from '../core/dom.js';
 import { timeOfDay } from '../core/format.js';
 import { ICONS, ranked } from '../core/priority.js';
 
@@ -45,7 +45,7 @@ export class FileMaker {
     const name = nameOf(row, Date.now());
     const kind = KINDS[row.format] ?? ['File', 'as it is'];
     const why = whyNotAsItIs(row);
-    const asItIs = why ? html('span', { class: 'sub why' }, ...words(why)) : html('a', { href: keptAt(addressOf(row.id, '/file.mcap')), download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, kind[0]), html('small', {}, kind[1])), html('span', { class: 'end' }, ...words(sizeWords(row.size_bytes))));
+    const asItIs = why ? html('span', { class: 'sub why' }, ...textNodes(why)) : html('a', { href: keptAt(addressOf(row.id, '/file.mcap')), download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, kind[0]), html('small', {}, kind[1])), html('span', { class: 'end' }, ...textNodes(sizeWords(row.size_bytes))));
     if (!why) listen(asItIs, 'click', () => setTimeout(() => this.#dialog.close()));
     const made = row.state === 'read' ? (this.#model.listing.formats ?? []).filter(({ name, ros_version }) => name !== row.format && (ros_version === null || ros_version === row.ros_version)) : [];
     this.#dialog.show(`Download ${name}`, [html('p', { class: 'sub' }, 'Other formats are made on request.')], [html('ul', { class: 'menu-list' }, html('li', {}, asItIs),
@@ -64,7 +64,7 @@ export class FileMaker {
     if (this.#job !== job || !this.#dialog.isOpen) return;
     if (over.state === 'done') {
       save(job.address);
-      this.#dialog.show(`${label} of ${nameOf(row, Date.now())}`, [html('p', { role: 'status' }, `Done. It is in this device’s downloads.${over.is_whole === false ? ' The export is incomplete:' : ''}`), ...(over.notes ?? []).map((note) => html('p', {}, ...words(note)))], [], [this.#dialog.key('Save again', () => save(job.address)), this.#dialog.key('Back', () => this.download(row, back))]);
+      this.#dialog.show(`${label} of ${nameOf(row, Date.now())}`, [html('p', { role: 'status' }, `Done. It is in this device’s downloads.${over.is_whole === false ? ' The export is incomplete:' : ''}`), ...(over.notes ?? []).map((note) => html('p', {}, ...textNodes(note)))], [], [this.#dialog.key('Save again', () => save(job.address)), this.#dialog.key('Back', () => this.download(row, back))]);
     } else if (over.state === 'cancelled') this.download(row, back);
     else this.#dialog.refuse('Not made', over.sentence ?? 'The server could not prepare it.', back);
   }
@@ -75,13 +75,13 @@ export class FileMaker {
     this.#job = job;
     const bar = /** @type {HTMLProgressElement} */ (html('progress', { max: 1, value: 0, 'aria-label': title }));
     const status = html('p', { role: 'status' });
-    setWords(status, 'The server is starting.');
+    setSentence(status, 'The server is starting.');
     this.#dialog.show(title, [], [html('div', { class: 'progress' }, bar, status)], [this.#dialog.key('Cancel', () => job.giveUp())]);
     return {
       /** @param {import('./files-job.js').Job} job */
       update: ({ progress, sentence }) => {
         if (progress !== null) bar.value = progress;
-        setWords(status, sentence ?? `${Math.round((progress ?? 0) * 100)} % done.`);
+        setSentence(status, sentence ?? `${Math.round((progress ?? 0) * 100)} % done.`);
       },
     };
   }
@@ -101,10 +101,10 @@ export class FileMaker {
       this.#dialog.refuse('Not fetched', sentenceOf(error), back);
       return;
     }
-    this.#dialog.show('Cut out an incident', [html('p', { class: 'sub' }, ...words(raised.length ? `From ${CLIP_S} s before an alarm to ${CLIP_S} s after it, as a separate recording.` : 'No alarm was raised in this recording.'))],
+    this.#dialog.show('Cut out an incident', [html('p', { class: 'sub' }, ...textNodes(raised.length ? `From ${CLIP_S} s before an alarm to ${CLIP_S} s after it, as a separate recording.` : 'No alarm was raised in this recording.'))],
       [html('ul', { class: 'menu-list' }, ...raised.map((alarm) => {
         const key = html('button', { type: 'button' }, icon(ICONS[alarm.priority], alarm.priority === 'critical' ? 'c-crit' : alarm.priority === 'warning' ? 'c-warn' : ''),
-          html('span', { class: 'tx' }, html('b', {}, ...words(alarm.title)), html('small', {}, ...words(alarm.text))), html('span', { class: 'end n' }, timeOfDay(alarm.at_ms)));
+          html('span', { class: 'tx' }, html('b', {}, ...textNodes(alarm.title)), html('small', {}, ...textNodes(alarm.text))), html('span', { class: 'end n' }, timeOfDay(alarm.at_ms)));
         listen(key, 'click', () => this.#cut(row, alarm.at_ms, back));
         return html('li', {}, key);
       }))], [this.#dialog.key('Back', back)]);

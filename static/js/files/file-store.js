@@ -3,7 +3,7 @@
 import { request, sentenceOf } from '../control/request.js';
 import { addressOf } from './files-model.js';
 import { sizeWords, storedWords } from './files-layout.js';
-import { html, icon, words } from '../core/dom.js';
+import { html, icon, textNodes } from '../core/dom.js';
 import { timeOfDay } from '../core/format.js';
 
 /**
@@ -24,7 +24,7 @@ export function storeActions(dialog, row, name, about) {
 
 /** @param {string} href @param {string} label @param {string} sub @param {number | null} bytes */
 function link(href, label, sub, bytes) {
-  return html('li', {}, html('a', { href, download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, ...words(label)), html('small', {}, ...words(sub))), html('span', { class: 'end' }, ...words(sizeWords(bytes)))));
+  return html('li', {}, html('a', { href, download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, ...textNodes(label)), html('small', {}, ...textNodes(sub))), html('span', { class: 'end' }, ...textNodes(sizeWords(bytes)))));
 }
 
 /**
@@ -57,9 +57,9 @@ function ask(dialog, model, row, name, back) {
   const isStored = stored.state === 'stored';
     const state = storedWords(stored);
   dialog.show(`Copy of ${name}`, [
-    html('p', {}, ...words(`${state[0]?.toUpperCase() ?? ''}${state.slice(1)}${/[.…]$/.test(state) ? '' : '.'}`)),
-    ...(stored.state === 'none' && stored.sentence ? [html('p', {}, ...words(stored.sentence))] : []),
-    ...(stored.clips ? [html('p', {}, ...words(`${stored.clips} ${stored.clips === 1 ? 'clip' : 'clips'} around alarms stored.`))] : []),
+    html('p', {}, ...textNodes(`${state[0]?.toUpperCase() ?? ''}${state.slice(1)}${/[.…]$/.test(state) ? '' : '.'}`)),
+    ...(stored.state === 'none' && stored.sentence ? [html('p', {}, ...textNodes(stored.sentence))] : []),
+    ...(stored.clips ? [html('p', {}, ...textNodes(`${stored.clips} ${stored.clips === 1 ? 'clip' : 'clips'} around alarms stored.`))] : []),
     ...(stored.is_deletion_asked ? [html('p', {}, 'It is deleted here once the copy was read back and is the same.')] : []),
   ], [], [
     ...(isStored || stored.state === 'uploading' || stored.state === 'waiting' ? [] : [dialog.key('Upload the whole file', () => void send('POST', { delete: false }), 'main')]),
@@ -71,5 +71,5 @@ function ask(dialog, model, row, name, back) {
 
 /** @param {FileDialog} dialog @param {string} name @param {() => void} act @param {() => void} back */
 function confirm(dialog, name, act, back) {
-  dialog.show(`Delete ${name} here?`, [html('p', {}, ...words('It is deleted on this server for good, once its copy in the store was read back and is the same. The copy stays.'))], [], [dialog.key('Delete after the check', act, 'main'), dialog.key('Back', back)], 'Keep it');
+  dialog.show(`Delete ${name} here?`, [html('p', {}, ...textNodes('It is deleted on this server for good, once its copy in the store was read back and is the same. The copy stays.'))], [], [dialog.key('Delete after the check', act, 'main'), dialog.key('Back', back)], 'Keep it');
 }

@@ -2,7 +2,7 @@
 
 import { nameOf, sizeWords } from './files-layout.js';
 import { sentenceOf } from '../control/request.js';
-import { html, words } from '../core/dom.js';
+import { html, textNodes } from '../core/dom.js';
 
 /** @typedef {import('./files-layout.js').Recording} Recording */
 
@@ -25,7 +25,7 @@ export class FileTrash {
   /** @param {Recording} row @param {() => void} back */
   askDelete(row, back) {
     const name = nameOf(row, Date.now());
-    this.#dialog.show(`Delete ${name}?`, [html('p', {}, ...words('It is moved to the trash and can be restored until the trash is emptied.'))], [], [this.#dialog.key('Delete', () => this.#delete(row, back), 'main')], 'Keep it');
+    this.#dialog.show(`Delete ${name}?`, [html('p', {}, ...textNodes('It is moved to the trash and can be restored until the trash is emptied.'))], [], [this.#dialog.key('Delete', () => this.#delete(row, back), 'main')], 'Keep it');
   }
 
   /** @param {Recording} row @param {() => void} back */
@@ -70,7 +70,7 @@ export class FileTrash {
 
   /** @param {string | null} id @param {string} title @param {string} sentence */
   #askDestroy(id, title, sentence) {
-    this.#dialog.show(title, [html('p', {}, ...words(sentence))], [], [this.#dialog.key(id === null ? 'Empty the trash' : 'Delete for good', async () => {
+    this.#dialog.show(title, [html('p', {}, ...textNodes(sentence))], [], [this.#dialog.key(id === null ? 'Empty the trash' : 'Delete for good', async () => {
       try {
         await this.#model.destroy(id);
         this.#dialog.close();

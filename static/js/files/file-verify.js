@@ -3,14 +3,14 @@
 import { request, sentenceOf } from '../control/request.js';
 import { addressOf } from './files-model.js';
 import { nameOf } from './files-layout.js';
-import { html, words } from '../core/dom.js';
+import { html, textNodes } from '../core/dom.js';
 
 /** @typedef {import('./files-layout.js').Recording} Recording */
 
 /** What the last verification found; nothing where there was none. @param {Recording} row */
 export function chainLines({ verified }) {
   if (!verified) return [];
-  return [html('p', verified.is_broken ? { class: 'bad', 'data-f': 'chain' } : { 'data-f': 'chain' }, ...words(`Event log: ${verified.short}`))];
+  return [html('p', verified.is_broken ? { class: 'bad', 'data-f': 'chain' } : { 'data-f': 'chain' }, ...textNodes(`Event log: ${verified.short}`))];
 }
 
 /**
@@ -29,7 +29,7 @@ export async function verify(dialog, model, row, back) {
     /** @type {import('../core/protocol-types.js').VerificationAnswer} */
     const verified = await request(addressOf(row.id, '/verify'));
     row.verified = verified;
-    if (isWanted()) dialog.show(`Verify ${name}`, [html('p', { role: 'status', 'data-f': 'verified', ...(verified.is_broken ? { class: 'bad' } : {}) }, html('b', {}, ...words(verified.short))), html('p', { class: 'chain-words' }, ...words(verified.sentence))], [], [dialog.key('Back', back)]);
+    if (isWanted()) dialog.show(`Verify ${name}`, [html('p', { role: 'status', 'data-f': 'verified', ...(verified.is_broken ? { class: 'bad' } : {}) }, html('b', {}, ...textNodes(verified.short))), html('p', { class: 'chain-words' }, ...textNodes(verified.sentence))], [], [dialog.key('Back', back)]);
     void model.refresh();
   } catch (error) {
     if (isWanted()) dialog.refuse('Not verified', sentenceOf(error), back);

@@ -2,7 +2,7 @@
 
 import { liveOf } from './files-layout.js';
 import { record } from '../shell/record-key.js';
-import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, setSentence, show } from '../core/dom.js';
 
 export class FilesLive {
   /**
@@ -32,9 +32,9 @@ export class FilesLive {
     if (!live) return;
     if (store.replaying) live.order = null; // its key is with the live car
     setText(this.name, live.name);
-    setWords(this.mark, live.mark);
-    [live.length, live.size, live.lost].forEach((text, i) => setWords(/** @type {HTMLElement} */ (this.facts[i]), text));
-    setWords(this.missing, live.missing);
+    setSentence(this.mark, live.mark);
+    [live.length, live.size, live.lost].forEach((text, i) => setSentence(/** @type {HTMLElement} */ (this.facts[i]), text));
+    setSentence(this.missing, live.missing);
     show(this.missing, live.missing !== '');
     setAttribute(this.row, 'data-on', live.isOn);
     setAttribute(this.row, 'data-bad', live.isBad);

@@ -1,7 +1,7 @@
 // One recording in the list: its track, its name, whose it is, length, size and alarms; pressed anywhere it offers what can be done.
 
 import { alarmWords, countsOf, lengthWords, nameOf, originWords, pointsOf, sizeWords, storedWords } from './files-layout.js';
-import { html, icon, listen, svg, words } from '../core/dom.js';
+import { html, icon, listen, svg, textNodes } from '../core/dom.js';
 import { NOTHING } from '../core/format.js';
 
 /** @typedef {import('./files-layout.js').Recording} Recording */
@@ -40,7 +40,7 @@ function counts(row) {
   return [...none, ...found.map(({ priority, count, text }) => {
     const [glyph, kind] = ICONS[priority] ?? ['info', 'sub'];
     return html('span', { class: `mini ${kind}`, 'data-priority': priority }, icon(glyph, 's'),
-      ...(priority === 'advisory' ? words(text) // it stands in no column of its own
+      ...(priority === 'advisory' ? textNodes(text) // it stands in no column of its own
         : [html('span', { class: 'n b', 'aria-hidden': 'true' }, String(count)), html('span', { class: 'unseen' }, text)]));
   })];
 }
@@ -54,12 +54,12 @@ function counts(row) {
 export function drawRow(row, now_ms, onPress) {
   const name = nameOf(row, now_ms);
   const more = html('button', { type: 'button', class: 'btn', 'aria-label': `Actions for ${name}`, 'aria-haspopup': 'dialog' }, icon('menu', 'dots'));
-  const length = row.state === 'read' ? html('span', {}, ...words(lengthWords(row.length_s))) : html('span', { class: 'dash', 'aria-hidden': 'true' }, NOTHING);
-  const last = row.state === 'read' ? html('span', { class: 'counts' }, ...counts(row)) : html('span', { class: 'why' }, ...words(row.state === 'waiting' ? 'being read' : row.problem ?? 'not readable'));
+  const length = row.state === 'read' ? html('span', {}, ...textNodes(lengthWords(row.length_s))) : html('span', { class: 'dash', 'aria-hidden': 'true' }, NOTHING);
+  const last = row.state === 'read' ? html('span', { class: 'counts' }, ...counts(row)) : html('span', { class: 'why' }, ...textNodes(row.state === 'waiting' ? 'being read' : row.problem ?? 'not readable'));
   const tags = row.tags.length ? [html('div', { class: 'm tags' }, ...row.tags.map((tag) => html('bdi', { class: 'file-tag' }, tag)))] : [];
-  const stored = row.stored ? [html('div', { class: 'm stored', 'data-state': row.stored.state }, ...words(storedWords(row.stored)))] : [];
+  const stored = row.stored ? [html('div', { class: 'm stored', 'data-state': row.stored.state }, ...textNodes(storedWords(row.stored)))] : [];
   const item = html('li', { class: 'file', 'data-id': row.id, 'data-state': row.state }, thumbnail(row),
-    html('div', { class: 'tx' }, html('div', { class: 't', dir: 'auto' }, name), html('div', { class: 'm' }, originWords(row, now_ms)), html('div', { class: 'm facts-line' }, length, html('span', {}, ...words(sizeWords(row.size_bytes))), last), ...stored, ...tags),
+    html('div', { class: 'tx' }, html('div', { class: 't', dir: 'auto' }, name), html('div', { class: 'm' }, originWords(row, now_ms)), html('div', { class: 'm facts-line' }, length, html('span', {}, ...textNodes(sizeWords(row.size_bytes))), last), ...stored, ...tags),
     more);
   pressed(item, () => onPress(row, more));
   return item;

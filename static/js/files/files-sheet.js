@@ -12,7 +12,7 @@ import { keptAt } from '../core/kept-at.js';
 import { share } from './files-share.js';
 import { thumbnail } from './files-row.js';
 import { duration } from '../core/format.js';
-import { html, icon, setWords, words } from '../core/dom.js';
+import { html, icon, setSentence, textNodes } from '../core/dom.js';
 import { ICONS } from '../core/priority.js';
 import { NO_ROOM, hasRoom } from '../replay/compare-room.js';
 import { jumpAt } from '../replay/replay-jumps-layout.js';
@@ -34,7 +34,7 @@ const MOST_RAISED = 8;
 function raisedLine({ at_ms, priority, title, text }, started_ms, open) {
   const at_s = Math.max(0, at_ms - started_ms) / 1000;
   const key = html('button', { type: 'button', 'data-priority': priority }, html('span', { class: 'n' }, duration(at_s, true)), icon(ICONS[priority], `s ${priority === 'critical' ? 'c-crit' : priority === 'warning' ? 'c-warn' : ''}`),
-    html('span', { class: 'tx' }, html('b', {}, ...words(title)), ' ', ...words(text)), icon('play', 's'));
+    html('span', { class: 'tx' }, html('b', {}, ...textNodes(title)), ' ', ...textNodes(text)), icon('play', 's'));
   key.addEventListener('click', () => open(jumpAt({ at_s })));
   return html('li', {}, key);
 }
@@ -111,9 +111,9 @@ export class FileSheet {
   #about() {
     const { row } = this;
     return [
-      html('p', {}, ...words(factWords(row))),
+      html('p', {}, ...textNodes(factWords(row))),
       ...chainLines(row),
-      ...warningWords(row).map((sentence) => html('p', { class: 'bad' }, ...words(sentence))),
+      ...warningWords(row).map((sentence) => html('p', { class: 'bad' }, ...textNodes(sentence))),
       ...(row.note ? [html('p', { class: 'note-text', dir: 'auto' }, row.note)] : []),
       ...(row.tags.length ? [html('p', {}, ...row.tags.map((tag) => html('bdi', { class: 'file-tag' }, tag)))] : []),
     ];
@@ -154,7 +154,7 @@ export class FileSheet {
     const list = html('ul', { class: 'file-raised', 'aria-label': 'Alarms' });
     const open = (/** @type {number} */ at_s) => void this.#replay(at_s);
     if (row.alarms) void this.#maker.raised(row).then((raised) => list.replaceChildren(...byUrgency(raised).slice(0, MOST_RAISED).map((alarm) => raisedLine(alarm, row.started_ms, open)),
-      ...(raised.length > MOST_RAISED ? [html('li', { class: 'more' }, ...words(`and ${raised.length - MOST_RAISED} more in the replay`))] : [])), () => {});
+      ...(raised.length > MOST_RAISED ? [html('li', { class: 'more' }, ...textNodes(`and ${raised.length - MOST_RAISED} more in the replay`))] : [])), () => {});
     return list;
   }
 
@@ -178,7 +178,7 @@ export class FileSheet {
     const replayed = this.store.frame?.replay?.id;
     if (!this.store.replaying || replayed === undefined) return [];
     if (replayed === this.row.id) return [html('li', { class: 'sub why' }, 'Shown in the replay now')];
-    if (!hasRoom()) return [html('li', { class: 'sub why' }, ...words(NO_ROOM))];
+    if (!hasRoom()) return [html('li', { class: 'sub why' }, ...textNodes(NO_ROOM))];
     return [this.#dialog.item('plus', 'Compare with the replay', async () => {
       const { openBeside } = await this.#module(() => import('../replay/compare.js'));
       this.#dialog.close();
@@ -220,7 +220,7 @@ export class FileSheet {
     const address = new URL(keptAt(addressOf(row.id, '/file.mcap')), location.href).href;
     const status = html('p', { role: 'status' }, 'Getting ready to share.');
     this.#dialog.show(`Share ${this.name}`, [status], []);
-    await share({ row, name: this.name, address, say: (sentence) => setWords(status, sentence), offer: (label, act) => this.#dialog.what.replaceChildren(html('div', { class: 'keys' }, this.#dialog.key(label, act, 'main'))),
+    await share({ row, name: this.name, address, say: (sentence) => setSentence(status, sentence), offer: (label, act) => this.#dialog.what.replaceChildren(html('div', { class: 'keys' }, this.#dialog.key(label, act, 'main'))),
       link: () => {
         const box = /** @type {HTMLInputElement} */ (html('input', { type: 'text', readonly: true, value: address, 'aria-label': 'Link to the recording' }));
         this.#dialog.what.replaceChildren(html('div', { class: 'form-lines' }, box));

@@ -6,7 +6,7 @@ import { FilesSearch } from './files-search.js';
 import { sizeWords } from './files-layout.js';
 import { FilesModel } from './files-model.js';
 import { drawRow } from './files-row.js';
-import { html, icon, listen, setAttribute, setText, setWords, show, words } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { counted, timeOfDay } from '../core/format.js';
 import { styled } from '../core/style-sheet.js';
 
@@ -145,15 +145,15 @@ class FilesTab {
     const shown = isTrash ? listing.trash : model.isFiltered ? listing.found : listing.all;
     const total = shown ? `${counted(shown.count, 'recording')}${model.isFiltered && !isTrash ? ` of ${listing.all?.count ?? 0}` : ''}, ${sizeWords(shown.bytes)}` : '';
     const inStore = model.inStore !== null && shown ? `${counted(shown.count, 'recording')} in the store ${model.inStore}` : null;
-    setWords(count, inStore ?? (isTrash ? `Trash: ${total}` : total));
-    setWords(free, listing.free_bytes === null || listing.free_bytes === undefined ? '' : `${sizeWords(listing.free_bytes)} free`);
-    setWords(state, this.#stateWords());
+    setSentence(count, inStore ?? (isTrash ? `Trash: ${total}` : total));
+    setSentence(free, listing.free_bytes === null || listing.free_bytes === undefined ? '' : `${sizeWords(listing.free_bytes)} free`);
+    setSentence(state, this.#stateWords());
     setAttribute(state, 'data-bad', model.problem !== null || Boolean(listing.store?.problem) || this.store.isSilent);
     this.search.draw();
     show(logbook, !isTrash && model.inStore === null && model.rows.length > 0);
     show(older, model.next !== null);
     show(trash, !isTrash && (listing.trash?.count ?? 0) > 0);
-    if (listing.trash) setWords(/** @type {HTMLElement} */ (trash.lastElementChild), `Trash: ${counted(listing.trash.count, 'recording')}, ${sizeWords(listing.trash.bytes)}`);
+    if (listing.trash) setSentence(/** @type {HTMLElement} */ (trash.lastElementChild), `Trash: ${counted(listing.trash.count, 'recording')}, ${sizeWords(listing.trash.bytes)}`);
     show(back, isTrash);
     show(clear, isTrash && model.rows.length > 0);
   }
@@ -196,7 +196,7 @@ class FilesTab {
     show(empty, isEmpty);
     if (!isEmpty) return;
     setText(emptyTitle, model.isTrash ? 'The trash is empty' : model.isFiltered ? 'Nothing found' : 'No recordings yet');
-    emptyWords.replaceChildren(...words(model.isTrash ? 'Deleted recordings are kept here until the trash is emptied.' : model.isFiltered ? 'No name, note or tag matches.' : 'A drive is recorded while the car is monitored. It appears here when it ends.'));
+    emptyWords.replaceChildren(...textNodes(model.isTrash ? 'Deleted recordings are kept here until the trash is emptied.' : model.isFiltered ? 'No name, note or tag matches.' : 'A drive is recorded while the car is monitored. It appears here when it ends.'));
   }
 
   /** @param {boolean} isTrash */

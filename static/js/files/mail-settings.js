@@ -3,7 +3,7 @@
 import { decimalOf, local } from '../core/decimal.js';
 import { keptAt } from '../core/kept-at.js';
 import { request, sentenceOf } from '../control/request.js';
-import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { recipientsOf } from './mail-layout.js';
 import { styled } from '../core/style-sheet.js';
 import { openOutbox } from './outbox.js';
@@ -113,7 +113,7 @@ class MailForm {
     this.#security = settings.security;
     this.#isChanged = false;
     this.#draw();
-    setWords(this.bad, settings.complaints.join(' '));
+    setSentence(this.bad, settings.complaints.join(' '));
     this.head(settings.is_complete ? settings.host : 'not set up');
   }
 
@@ -175,17 +175,17 @@ class MailForm {
     const to = this.to.value.trim();
     try {
       const { sentence, said: reply } = await request(`${this.at}/test`, { method: 'POST', body: to ? { to } : {} });
-      setWords(this.good, reply ? `${sentence} Server reply: ${reply}` : sentence);
+      setSentence(this.good, reply ? `${sentence} Server reply: ${reply}` : sentence);
     } catch (error) {
       setText(this.good, '');
-      setWords(this.bad, sentenceOf(error));
+      setSentence(this.bad, sentenceOf(error));
     }
     setAttribute(this.test, 'disabled', this.#isChanged);
   }
 
   /** @param {string} sentence @param {string} name of the field at fault */
   #refuse(sentence, name) {
-    setWords(this.bad, sentence);
+    setSentence(this.bad, sentence);
     const at = this.fields.find((one) => one.dataset['mailField'] === name);
     if (!at) return;
     setAttribute(at, 'aria-invalid', 'true');

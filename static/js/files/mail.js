@@ -3,7 +3,7 @@
 import { FileJob } from './files-job.js';
 import { request, sentenceOf } from '../control/request.js';
 import { keptAt } from '../core/kept-at.js';
-import { html, icon, listen, setAttribute, setText, setWords, show, words } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { FORMATS, KINDS, mailtoOf, pathOf, recipientProblem, recipientsOf, sizeNote } from './mail-layout.js';
 import { styled } from '../core/style-sheet.js';
 import { openOutbox } from './outbox.js';
@@ -136,7 +136,7 @@ class MailSheet {
     if (title) setText(this.about, title);
     this.#isSetUp = typeof settings === 'object' && settings.is_complete;
     if (typeof settings === 'object') this.#limit_mb = settings.limit_mb;
-    setWords(this.refused, typeof settings === 'string' ? settings : settings.is_complete ? '' : 'E-mail is not set up on this server: see Settings, E-mail.');
+    setSentence(this.refused, typeof settings === 'string' ? settings : settings.is_complete ? '' : 'E-mail is not set up on this server: see Settings, E-mail.');
     this.#draw();
   }
 
@@ -156,8 +156,8 @@ class MailSheet {
     for (const key of this.formats) key.setAttribute('aria-pressed', String(key.dataset['format'] === this.#format));
     for (const key of this.ways) key.setAttribute('aria-pressed', String(key.dataset['way'] === this.#tooLarge));
     setText(this.formatHint, FORMATS.find(([name]) => name === this.#format)?.[2] ?? '');
-    this.limit.replaceChildren(...words(`Above ${this.#limit_mb} MB`));
-    setWords(this.size, sizeNote(this.#format === 'mcap' ? this.#bytes : null, this.#limit_mb, this.#tooLarge));
+    this.limit.replaceChildren(...textNodes(`Above ${this.#limit_mb} MB`));
+    setSentence(this.size, sizeNote(this.#format === 'mcap' ? this.#bytes : null, this.#limit_mb, this.#tooLarge));
     setAttribute(this.send, 'disabled', !this.#isSetUp);
   }
 
@@ -169,7 +169,7 @@ class MailSheet {
       return;
     }
     setAttribute(this.send, 'disabled', true);
-    setWords(this.status, 'Sending to the server…');
+    setSentence(this.status, 'Sending to the server…');
     try {
       await request('/api/mail', { method: 'POST', body: { recordings: this.#ids, format: this.#format, to, subject: this.subject.value.trim(), text: this.text.value, too_large: this.#tooLarge, key: this.#key } });
       keep(to.join(', '));
@@ -185,7 +185,7 @@ class MailSheet {
 
   /** @param {string} sentence @param {HTMLElement | null} at fault */
   #refuse(sentence, at) {
-    setWords(this.refused, sentence);
+    setSentence(this.refused, sentence);
     if (!at) return;
     setAttribute(at, 'aria-invalid', 'true');
     at.focus();
@@ -209,11 +209,11 @@ class MailSheet {
     try {
       const address = this.#format === 'mcap' ? keptAt(pathOf(id, 'mcap')) : await this.#made(id);
       if (address === null) return;
-      setWords(this.status, 'Loading from the server…');
+      setSentence(this.status, 'Loading from the server…');
       const answer = await fetch(address);
       if (!answer.ok) throw new Error('It could not be loaded from the server. Try again.');
       this.#file = new File([await answer.blob()], `${id}.${ending}`, { type });
-      setWords(this.status, 'Ready. Press again: the device opens the file only after a press.');
+      setSentence(this.status, 'Ready. Press again: the device opens the file only after a press.');
       setText(/** @type {HTMLElement} */ (this.own.lastElementChild), 'Open it in my mail app');
     } catch (error) {
       setText(this.status, '');
@@ -224,7 +224,7 @@ class MailSheet {
   /** Where the server has made it in the format; null: it was given up. @param {string} id */
   async #made(id) {
     this.#job?.giveUp();
-    const job = new FileJob(`/api/recordings/${encodeURIComponent(id)}/exports`, { format: this.#format }, ({ progress }) => setWords(this.status, `The server is preparing it${progress === null ? '' : `: ${Math.round(progress * 100)} %`}.`));
+    const job = new FileJob(`/api/recordings/${encodeURIComponent(id)}/exports`, { format: this.#format }, ({ progress }) => setSentence(this.status, `The server is preparing it${progress === null ? '' : `: ${Math.round(progress * 100)} %`}.`));
     this.#job = job;
     const ended = await job.run();
     if (ended.state === 'failed') throw new Error(ended.sentence ?? 'The server could not prepare it.');
@@ -245,7 +245,7 @@ class MailSheet {
   #mailto() {
     const links = this.#ids.map((id) => new URL(keptAt(pathOf(id, this.#format)), location.href).href);
     const link = html('a', { href: mailtoOf({ to: recipientsOf(this.to.value), subject: this.subject.value, text: this.text.value, links }) });
-    setWords(this.status, 'Your mail app gets links, because this device cannot share files with it. The links work for anyone who can reach this server.');
+    setSentence(this.status, 'Your mail app gets links, because this device cannot share files with it. The links work for anyone who can reach this server.');
     link.click();
   }
 }

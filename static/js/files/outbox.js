@@ -2,7 +2,7 @@
 
 import { keptAt } from '../core/kept-at.js';
 import { request, sentenceOf } from '../control/request.js';
-import { html, icon, listen, setText, setWords, show, words } from '../core/dom.js';
+import { html, icon, listen, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { aboutOf, keysOf, refusedOf, stateOf } from './mail-layout.js';
 import { styled } from '../core/style-sheet.js';
 import { addSheet, openSheet } from '../shell/sheet.js';
@@ -70,11 +70,11 @@ class Outbox {
     clearTimeout(this.#next);
     try {
       const { mails, next, trouble } = await request(`${this.at}?limit=${Math.min(this.#shown, 200)}`);
-      setWords(this.state, trouble ?? '');
+      setSentence(this.state, trouble ?? '');
       show(this.older, next !== null && this.#shown < 200);
       this.#draw(mails);
     } catch (error) {
-      setWords(this.state, `${sentenceOf(error)} The list below may be outdated.`);
+      setSentence(this.state, `${sentenceOf(error)} The list below may be outdated.`);
     }
     clearTimeout(this.#next);
     if (this.sheet.open) this.#next = setTimeout(() => this.#ask(), ASK_MS);
@@ -115,9 +115,9 @@ class Outbox {
     return html('li', { 'data-mail': mail.n, 'data-state': mail.state },
       html('div', { class: 't', dir: 'auto' }, mail.subject),
       html('p', { class: 'm', dir: 'auto' }, `to ${mail.to.join(', ')}`),
-      html('p', { class: 'm' }, ...words(`${dayTime(mail.ordered_ms, now_ms)} · ${aboutOf(mail)}`)),
-      html('div', state.isBad ? { 'data-bad': true } : {}, html('p', { class: 'st' }, icon(state.icon), html('span', {}, ...words(state.label))),
-        html('p', { class: 'said' }, ...words(state.detail)), ...refusedOf(mail).map((line) => html('p', { class: 'said' }, ...words(line)))),
+      html('p', { class: 'm' }, ...textNodes(`${dayTime(mail.ordered_ms, now_ms)} · ${aboutOf(mail)}`)),
+      html('div', state.isBad ? { 'data-bad': true } : {}, html('p', { class: 'st' }, icon(state.icon), html('span', {}, ...textNodes(state.label))),
+        html('p', { class: 'said' }, ...textNodes(state.detail)), ...refusedOf(mail).map((line) => html('p', { class: 'said' }, ...textNodes(line)))),
       html('div', { class: 'pair' }, ...key(resend, 'resend'), ...key(cancel, 'cancel')));
   }
 

@@ -1,6 +1,6 @@
 // The chart of the whole drive: up to four signals on one clock, live and of a recording. It fills any box from 300 × 200 px on.
 
-import { listen, setAttribute, setWords, show, svg } from '../core/dom.js';
+import { listen, setAttribute, setSentence, show, svg } from '../core/dom.js';
 import { NOTHING, timeOfDay } from '../core/format.js';
 import { isAbsent } from '../core/ink.js';
 import { Brush } from './drive-brush.js';
@@ -134,7 +134,7 @@ class DriveChart {
     this.#specs = names.map((name) => specFor(name, offered?.[name] ?? this.store.signal(name)));
     this.panes.build(this.#specs);
     this.feed.want(names, this.view);
-    setWords(this.parts.count, `${names.length} of ${Object.keys(offered ?? this.store.frame?.signals ?? {}).length || names.length}`);
+    setSentence(this.parts.count, `${names.length} of ${Object.keys(offered ?? this.store.frame?.signals ?? {}).length || names.length}`);
     this.#filled();
   }
 
@@ -186,7 +186,7 @@ class DriveChart {
     const { parts: { ranges, stage, state, held, now }, store } = this;
     ranges.forEach((key, i) => setAttribute(key, 'aria-pressed', String(this.scope.follows && this.scope.range_s === RANGES[i]?.[1])));
     const text = stateWords(this.feed, this.view, this.scope.follows, store.replaying);
-    setWords(held, text);
+    setSentence(held, text);
     show(state, text !== '');
     show(now, !this.scope.follows && answer !== null && !this.store.replaying);
     setAttribute(state, 'data-held', !this.scope.follows && !this.store.replaying);

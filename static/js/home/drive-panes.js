@@ -1,7 +1,7 @@
 // Draws the panes of a drive's chart with uPlot: one signal each, on one clock, with limits, marks and what nobody knows.
 
 import uPlot from '../../vendor/uPlot.esm.js';
-import { html, setAttribute, setText, setWords } from '../core/dom.js';
+import { html, setAttribute, setText, setSentence } from '../core/dom.js';
 import { fixed } from '../core/format.js';
 import { shownIn } from '../core/units.js';
 import { clockWords, extentOf, lineOf, valueTicks } from './drive-layout.js';
@@ -100,7 +100,7 @@ class Pane {
     setAttribute(this.element, 'data-then', isThen);
     setAttribute(this.value, 'data-ink', ink);
     setAttribute(this.value, 'data-words', isNumber ? null : true);
-    setWords(this.value, text);
+    setSentence(this.value, text);
     setText(this.unit, isNumber ? shownIn(0, this.spec.unit).unit : '');
   }
 

@@ -1,6 +1,6 @@
 // The text on Home while no signal of the car has arrived: what is missing, and how to supply it.
 
-import { field, setWords, show } from '../core/dom.js';
+import { field, setSentence, show } from '../core/dom.js';
 import { counted } from '../core/format.js';
 
 /**
@@ -22,7 +22,7 @@ export function mount(root, store) {
   const text = field(root, 'help-text');
   function draw() {
     const sentence = store.frame && !store.frame.replay ? helpWords(store.frame) : '';
-    setWords(text, sentence);
+    setSentence(text, sentence);
     show(root, sentence !== '');
   }
   draw();

@@ -1,6 +1,6 @@
 // The nearest object ahead: in digits, and on a tape from the bumper to 20 m.
 
-import { field, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { field, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { ABSENT, isAbsent, write, writeAge } from '../core/ink.js';
 import { bearing, fixed } from '../core/format.js';
 
@@ -61,7 +61,7 @@ export function mount(root, store) {
     const isSpeedLive = speedState.ink === 'fresh' || speedState.ink === 'ageing';
     const stopping_m = isSpeedLive ? (near?.stopping_m ?? null) : null;
     const speed_mps = isSpeedLive ? (store.signal('speed')?.value?.speed_mps ?? null) : null;
-    setWords(stops, stopsWords(stopping_m, gap_s, speed_mps));
+    setSentence(stops, stopsWords(stopping_m, gap_s, speed_mps));
 
     const stop = stopping_m === null ? TAPE.from : (onTape(Math.min(stopping_m, TAPE.metres)) ?? TAPE.from);
     setAttribute(marks.stopping, 'width', (stop - TAPE.from).toFixed(1));

@@ -1,6 +1,6 @@
 // What stands behind one signal: its source and why, what else there is, its frame and unit, and the keys that change them.
 
-import { html, setAttribute, words } from '../core/dom.js';
+import { html, setAttribute, textNodes } from '../core/dom.js';
 import { openTopicPicker } from '../settings/topic-picker.js';
 import { settingsOf } from '../settings/settings-model.js';
 
@@ -84,16 +84,16 @@ export class SignalMore {
   /** @param {[string, string][]} details @param {{topic: string, detail: string}[]} others @param {{name: string, label: string}[]} choices */
   #fill(details, others, choices) {
     this.units.replaceChildren(...[{ name: '', label: 'as found' }, ...choices].map(({ name, label }) => this.#unitKey(name, label)));
-    const rows = details.map(([term, text]) => /** @type {[string, HTMLElement]} */ ([term, html('dd', {}, ...words(text))]));
+    const rows = details.map(([term, text]) => /** @type {[string, HTMLElement]} */ ([term, html('dd', {}, ...textNodes(text))]));
     if (choices.length) rows.push(['Published in', html('dd', {}, this.units)]);
     rows.push(['Choice', html('dd', {}, this.choice)]);
-    if (others.length) rows.push(['Others', html('dd', { class: 'others' }, ...others.map(({ topic, detail }) => html('p', {}, html('b', {}, topic), ...(detail ? ['\n', ...words(detail)] : []))))]);
+    if (others.length) rows.push(['Others', html('dd', { class: 'others' }, ...others.map(({ topic, detail }) => html('p', {}, html('b', {}, topic), ...(detail ? ['\n', ...textNodes(detail)] : []))))]);
     this.element.replaceChildren(...rows.flatMap(([term, description]) => [html('dt', {}, term), description]));
   }
 
   /** @param {string} unit '': as found @param {string} label */
   #unitKey(unit, label) {
-    const key = html('button', { type: 'button', class: 'key', 'data-unit': unit, 'data-operator': '' }, html('span', {}, ...words(label)));
+    const key = html('button', { type: 'button', class: 'key', 'data-unit': unit, 'data-operator': '' }, html('span', {}, ...textNodes(label)));
     key.addEventListener('click', async () => {
       const outcome = await this.feed.model.set({ units: { [this.name]: unit || null } });
       if (!outcome.ok) this.say(outcome.reason ?? 'Refused.', 'Unit not changed');

@@ -1,6 +1,6 @@
 // Signals: every signal with its value, rate and age; one press shows where it comes from and what was wrong with it.
 
-import { html, icon, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { html, icon, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { isAbsent, write } from '../core/ink.js';
 import { shownIn, speedWords } from '../core/units.js';
 import { age, counted, fixed, NOTHING } from '../core/format.js';
@@ -115,7 +115,7 @@ export function mount(root, store, { say, of }) {
       }
       fill(found, name, signal, store.ink(name));
     }
-    setWords(summary, summaryWords(store, frame));
+    setSentence(summary, summaryWords(store, frame));
   }
 
   draw();

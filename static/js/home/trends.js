@@ -1,6 +1,6 @@
 // The last minute on Home: one sparkline for each signal, in fixed places; a press opens the chart of the drive.
 
-import { field, html, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { field, html, listen, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { isAbsent, write } from '../core/ink.js';
 import { showInTrends } from './drive-choice.js';
 import { colours, drawSpark } from './spark.js';
@@ -142,7 +142,7 @@ function mountHere(root, list, store, say) {
     if (isHere !== hasRoom) return; // turned meanwhile
     show(place, chart !== null);
     show(list, chart === null);
-    setWords(field(root, 'sparks-title'), chart ? 'Trends' : 'Last 60 s');
+    setSentence(field(root, 'sparks-title'), chart ? 'Trends' : 'Last 60 s');
     setText(field(root, 'sparks-says'), chart ? '' : 'now at the right');
     if (chart) unmount = chart.mount(place, { store, say });
   };

@@ -1,6 +1,6 @@
 // The texts beside the map: both fixes with their ages, the distance, the verdict of the phone–car check, the shared phones.
 
-import { field, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { field, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
 import { bearingWords } from './map-text.js';
 import { phonesLine } from '../phone/phones-layout.js';
@@ -21,7 +21,7 @@ export class MapPanel {
     this.#drawFixes(car, phone);
     const lines = { 'car-says': car.message, 'phone-says': phone.message, 'map-says': isTooFar ? 'Car and phone are too far apart for one view.' : '' };
     for (const [name, message] of Object.entries(lines)) {
-      setWords(at(name), message);
+      setSentence(at(name), message);
       show(at(name), message !== '');
     }
     show(at('says'), Boolean(car.message || phone.message || isTooFar));
@@ -29,7 +29,7 @@ export class MapPanel {
     const [number, unit] = apart ? distanceWords(apart.distance_m) : ['–', ''];
     setText(at('apart'), number);
     setText(at('apart-unit'), unit);
-    setWords(at('bearing'), apart ? `car at ${bearingWords(apart.bearing_deg)}` : '');
+    setSentence(at('bearing'), apart ? `car at ${bearingWords(apart.bearing_deg)}` : '');
     setText(at('allowed'), fixed(apart?.allowed_m ?? null));
     setText(at('allowed-unit'), apart && apart.allowed_m !== null ? 'm' : '');
     this.#drawVerdict();
@@ -66,8 +66,8 @@ export class MapPanel {
     show(at('phones'), isThere);
     if (!frame || !isThere) return;
     const { text, why } = phonesLine(frame, page);
-    setWords(at('phones-text'), text);
-    setWords(at('phones-why'), why);
+    setSentence(at('phones-text'), text);
+    setSentence(at('phones-why'), why);
   }
 
   #drawVerdict() {
@@ -78,7 +78,7 @@ export class MapPanel {
     setAttribute(at('verdict-icon'), 'href', `#i-${verdict === 'fault' ? 'warn' : verdict === 'ok' ? 'ok' : 'unknown'}`);
     show(at('verdict-mark'), verdict !== 'unknown'); // the dashed frame shows it, and there is no room
     setText(at('verdict-word'), verdict === 'fault' ? 'FAULT' : verdict === 'ok' ? 'OK' : 'not checked');
-    setWords(at('verdict-why'), verdict === 'unknown' ? (check?.brief ?? '').replace(/^not checked:? ?/, '') : '');
+    setSentence(at('verdict-why'), verdict === 'unknown' ? (check?.brief ?? '').replace(/^not checked:? ?/, '') : '');
   }
 }
 
@@ -91,7 +91,7 @@ export class MapPanel {
  */
 function drawAge(element, age_s, ink, instead = '') {
   setAttribute(element, 'data-ink', ink);
-  setWords(element, ink === null ? '' : instead || `${ink === 'stale' ? 'STALE ' : ''}${age(age_s)} s`);
+  setSentence(element, ink === null ? '' : instead || `${ink === 'stale' ? 'STALE ' : ''}${age(age_s)} s`);
 }
 
 /** Six decimals are 0.1 m. @param {number | undefined} value */

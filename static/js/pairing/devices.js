@@ -3,7 +3,7 @@
 import { styled } from '../core/style-sheet.js';
 import { leftWords, removalWords, seenWords } from './devices-layout.js';
 import { request, sentenceOf } from '../control/request.js';
-import { html, icon, listen, setText, setWords, show } from '../core/dom.js';
+import { html, icon, listen, setText, setSentence, show } from '../core/dom.js';
 import { pinShown } from './pairing-layout.js';
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
 import { counted } from '../core/format.js';
@@ -70,7 +70,7 @@ class Devices {
       setText(this.bad, '');
       this.head(counted(devices.length, 'device'));
     } catch (error) {
-      setWords(this.bad, sentenceOf(error));
+      setSentence(this.bad, sentenceOf(error));
     }
     this.#draw();
     if (this.group.open) this.#next = setTimeout(() => this.#ask(), ASK_MS);
@@ -90,7 +90,7 @@ class Devices {
   #row(device, now_ms) {
     const isYou = device.id === this.#you;
     const about = html('span', { class: 'm' });
-    setWords(about, seenWords(device, now_ms));
+    setSentence(about, seenWords(device, now_ms));
     return html('li', { 'data-id': device.id },
       html('span', { class: 'tx' }, html('bdi', { class: 't' }, device.name), ...(isYou ? [html('span', { class: 'tag' }, 'This device')] : []), about),
       html('div', { class: 'seg', role: 'group', 'aria-label': `Role of ${device.name}` }, ...ROLES.map(([role, label]) => html('button', {
@@ -209,7 +209,7 @@ class Invitation {
       this.#tick();
       this.#ticking = setInterval(() => this.#tick(), 1000);
     } catch (error) {
-      if (mine === this.#count) setWords(this.state, sentenceOf(error));
+      if (mine === this.#count) setSentence(this.state, sentenceOf(error));
     }
   }
 
@@ -223,6 +223,6 @@ class Invitation {
       return;
     }
     const does = this.#role === 'operator' ? 'It can then act as an operator' : 'It can then watch, but not make changes';
-    setWords(this.state, `Scan the code with the other phone, or type the PIN there. For one phone, for ${leftWords(left_s)}. ${does}.`);
+    setSentence(this.state, `Scan the code with the other phone, or type the PIN there. For one phone, for ${leftWords(left_s)}. ${does}.`);
   }
 }

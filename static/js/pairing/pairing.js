@@ -1,7 +1,7 @@
 // The screen before all others where devices are paired: this phone's name, the PIN from the server's terminal, one key.
 
 import { styled } from '../core/style-sheet.js';
-import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { linkToken, onLink } from '../boot/pairing-token.js';
 import { digitsOf, PIN_DIGITS, pinShown, reasonWords, triedWords, waitWords } from './pairing-layout.js';
 
@@ -79,7 +79,7 @@ class PairingScreen {
     if (isLinkOver) this.#token = null;
     this.#waitUntil_ms = performance.now() + wait_s * 1000;
     pin.value = '';
-    setWords(message, sentence);
+    setSentence(message, sentence);
     this.draw();
     message.scrollIntoView({ block: 'nearest' }); // on a small screen it is beneath the digits
   }
@@ -93,11 +93,11 @@ class PairingScreen {
     const { byPin, go, where } = this.parts;
     const left_s = this.#waiting_s;
     show(byPin, this.#token === null);
-    setWords(where, this.#token === null
+    setSentence(where, this.#token === null
       ? 'The server’s terminal shows a PIN of 6 digits and a QR code. A paired operator can show one too: Settings, Paired devices.'
       : 'The scanned code pairs this device, once.');
     setAttribute(go, 'data-busy', this.#isBusy || left_s > 0);
-    setWords(go, this.#isBusy ? 'Pairing' : left_s > 0 ? waitWords(left_s) : 'Pair this device');
+    setSentence(go, this.#isBusy ? 'Pairing' : left_s > 0 ? waitWords(left_s) : 'Pair this device');
     if (left_s > 0) setTimeout(() => this.draw(), 250);
   }
 }

@@ -1,6 +1,6 @@
 // The sheet of all phones that share their position: why one has no position, and which of them is in the car.
 
-import { html, icon, setWords, words } from '../core/dom.js';
+import { html, icon, setSentence, textNodes } from '../core/dom.js';
 import { phoneRow } from './phones-layout.js';
 import { addSheet, openSheet } from '../shell/sheet.js';
 
@@ -28,7 +28,7 @@ export function openPhones(store, say) {
   function draw() {
     const { frame } = store;
     if (!frame) return;
-    setWords(text, frame.phone?.choice_text ?? 'No phone is sharing its position.');
+    setSentence(text, frame.phone?.choice_text ?? 'No phone is sharing its position.');
     const rows = (frame.phones ?? []).map((one) => phoneRow(one, store.lag_s, store.page));
     const key = JSON.stringify(rows);
     if (key === shown) return;
@@ -36,7 +36,7 @@ export function openPhones(store, say) {
     const focused = /** @type {HTMLElement | null} */ (document.activeElement)?.dataset['phone'];
     list.replaceChildren(...rows.map((row) => {
       const button = html('button', { type: 'button', 'aria-pressed': String(row.isChosen), 'data-phone': row.id }, icon('phone'),
-        html('span', {}, html('b', {}, ...words(row.name)), html('br'), html('span', { class: 'small sub' }, ...words(row.text))),
+        html('span', {}, html('b', {}, ...textNodes(row.name)), html('br'), html('span', { class: 'small sub' }, ...textNodes(row.text))),
         ...(row.tag ? [html('span', { class: 'tag' }, row.tag)] : []));
       button.addEventListener('click', () => void ride(row.isChosen ? null : row.id));
       return html('li', {}, button);

@@ -1,6 +1,6 @@
 // The sheet of what this phone can do: sound, screen, vibration, battery, network, position; and arms it.
 
-import { html, icon, setWords, words } from '../core/dom.js';
+import { html, icon, setSentence, textNodes } from '../core/dom.js';
 import { addSheet, openSheet } from '../shell/sheet.js';
 import { rowsOf, verdictOf } from './this-phone-layout.js';
 
@@ -34,13 +34,13 @@ export function openThisPhone(store, arming, deviceStatus) {
 
   function draw() {
     const facts = factsNow();
-    setWords(verdict, result || verdictOf(facts).text);
+    setSentence(verdict, result || verdictOf(facts).text);
     const rows = rowsOf(facts);
     const key = JSON.stringify(rows);
     if (key === shown) return;
     shown = key;
-    list.replaceChildren(...rows.map((row) => html('li', {}, icon(row.icon), html('span', {}, html('span', { class: 't' }, row.what), html('br'), html('span', { class: 'm' }, ...words(row.text))),
-      html('span', { class: row.kind === 'plain' ? 'tag' : `tag ${row.kind}` }, ...(row.kind === 'plain' ? [icon('ok', 's')] : row.kind === 'warn' ? [icon('warn', 's')] : []), ...words(row.tag)))));
+    list.replaceChildren(...rows.map((row) => html('li', {}, icon(row.icon), html('span', {}, html('span', { class: 't' }, row.what), html('br'), html('span', { class: 'm' }, ...textNodes(row.text))),
+      html('span', { class: row.kind === 'plain' ? 'tag' : `tag ${row.kind}` }, ...(row.kind === 'plain' ? [icon('ok', 's')] : row.kind === 'warn' ? [icon('warn', 's')] : []), ...textNodes(row.tag)))));
   }
 
   arm.addEventListener('click', () => {

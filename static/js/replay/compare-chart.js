@@ -1,6 +1,6 @@
 // The chart of two recordings: the chosen signals that either has, built anew when their names, the theme or the unit change.
 
-import { listen, setWords } from '../core/dom.js';
+import { listen, setSentence } from '../core/dom.js';
 import { counted } from '../core/format.js';
 import { chosenSignals } from '../home/drive-choice.js';
 import { specFor } from '../home/drive-layout.js';
@@ -63,8 +63,8 @@ export class CompareChart {
     const specs = names.map((name) => specFor(name, a.answer?.offered[name] ?? b.answer?.offered[name] ?? this.store.signal(name)));
     this.#built = this.#kinds();
     this.panes.build(specs.filter(({ name }) => !lacking.includes(name)));
-    setWords(this.parts.count, counted(names.length, 'signal'));
-    setWords(this.parts.none, lacking.length ? `Recorded in neither: ${specs.filter(({ name }) => lacking.includes(name)).map(({ label }) => label).join(', ')}` : '');
+    setSentence(this.parts.count, counted(names.length, 'signal'));
+    setSentence(this.parts.none, lacking.length ? `Recorded in neither: ${specs.filter(({ name }) => lacking.includes(name)).map(({ label }) => label).join(', ')}` : '');
     this.#drawn = '';
   }
 

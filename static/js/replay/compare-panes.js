@@ -1,7 +1,7 @@
 // Draws the signals of two recordings with uPlot's axes: A solid, B dotted, what either lacks hatched and named.
 
 import uPlot from '../../vendor/uPlot.esm.js';
-import { html, setText, setWords } from '../core/dom.js';
+import { html, setText, setSentence } from '../core/dom.js';
 import { duration, fixed, signed } from '../core/format.js';
 import { shownIn } from '../core/units.js';
 import { extentOf, foundAt, foundWords, valueTicks } from '../home/drive-layout.js';
@@ -93,7 +93,7 @@ class Pane {
       const own_s = scene.cursor_s - begin_s;
       const hole = holesOf(answer, this.spec.name, begin_s, scene.sides[name].length_s).find(({ from_s, to_s }) => scene.cursor_s > from_s && scene.cursor_s < to_s);
       const found = answer && trend && !hole ? foundAt(trend, answer, own_s) : null;
-      setWords(this.values[name], hole ? hole.why : found ? foundWords(found, this.spec) : '–');
+      setSentence(this.values[name], hole ? hole.why : found ? foundWords(found, this.spec) : '–');
       this.values[name].toggleAttribute('data-words', hole !== undefined || (found !== null && found.kind !== 'value'));
       return found?.kind === 'value' ? (found.low + found.high) / 2 : null;
     });

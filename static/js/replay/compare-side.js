@@ -1,6 +1,6 @@
 // What stands of each of two recordings at the moment of their time line: its name and car, alarms, checks, and the main values.
 
-import { html, icon, setAttribute, setText, setWords, show, svg } from '../core/dom.js';
+import { html, icon, setAttribute, setText, setSentence, show, svg } from '../core/dom.js';
 import { timeOfDay } from '../core/format.js';
 import { freshnessStyle } from '../core/freshness.js';
 import { write } from '../core/ink.js';
@@ -60,15 +60,15 @@ export class SideCard {
   draw({ replay, state, notes }, place, remarks, silent_s) {
     const missing = missingWords(place, silent_s > SILENT_S ? { ...replay, hangs_s: silent_s } : replay);
     setText(this.#name, replay.title || `${dateOf(replay.start_ms)} ${timeOfDay(replay.start_ms).slice(0, 5)}`);
-    setWords(this.#about, `${replay.vehicle} · ${replay.title ? `${dateOf(replay.start_ms)} ` : ''}${timeOfDay(replay.start_ms)} · ${lineTime(replay.length_s)} long`);
+    setSentence(this.#about, `${replay.vehicle} · ${replay.title ? `${dateOf(replay.start_ms)} ` : ''}${timeOfDay(replay.start_ms)} · ${lineTime(replay.length_s)} long`);
     setText(this.#clock, place.kind === 'in' ? timeOfDay(replay.at_ms) : '');
-    setWords(this.#missing, missing);
+    setSentence(this.#missing, missing);
     show(this.#missing, missing !== '');
     setAttribute(this.element, 'data-outside', place.kind !== 'in');
     const isKnown = place.kind === 'in' && !replay.is_seeking && silent_s <= SILENT_S;
-    setWords(this.#checks, !isKnown ? '–' : state.session.paused ? 'monitoring was paused' : checkWords(state.checks));
+    setSentence(this.#checks, !isKnown ? '–' : state.session.paused ? 'monitoring was paused' : checkWords(state.checks));
     setText(this.#source, replay.alarms_from === 'recording' ? 'Alarms as recorded. ' : 'Alarms re-evaluated. ');
-    setWords(this.#remarks, [...remarks, ...notes].join(' '));
+    setSentence(this.#remarks, [...remarks, ...notes].join(' '));
     this.#drawAlarms(state, isKnown);
   }
 
@@ -102,16 +102,16 @@ export class Figures {
    */
   draw(seen, places, at_s, now_ms) {
     write(this.#time.a, 'fresh', lineTime(at_s));
-    setWords(this.#time.b, at_s < 0 ? 'before A begins' : 'since A began');
+    setSentence(this.#time.b, at_s < 0 ? 'before A begins' : 'since A began');
     for (const { spec, a, unit, b } of this.#values) {
       const [first, second] = /** @type {const} */ (['a', 'b']).map((name) => valueOf(seen[name], places[name], spec, now_ms));
       if (!first || !second) continue;
       write(a, first.ink, first.text, unit, first.unit);
-      setWords(b, `B ${second.ink === 'stale' ? 'stale ' : ''}${second.text} ${second.unit}`.trim());
+      setSentence(b, `B ${second.ink === 'stale' ? 'stale ' : ''}${second.text} ${second.unit}`.trim());
     }
     const [a = '–', b = '–'] = /** @type {const} */ (['a', 'b']).map((name) => (isKnown(seen[name], places[name], now_ms) ? String(activeOf(seen[name].state).length) : '–'));
     write(this.#alarms.a, 'fresh', a);
-    setWords(this.#alarms.b, `B ${b}`);
+    setSentence(this.#alarms.b, `B ${b}`);
   }
 }
 

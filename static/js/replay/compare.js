@@ -1,6 +1,6 @@
 // Two recordings beside each other: the one that is replayed and a second one, on one time line. Only the first one's band shows the live car.
 
-import { html, listen, need, setAttribute, setWords } from '../core/dom.js';
+import { html, listen, need, setAttribute, setSentence } from '../core/dom.js';
 import { chosenSignals } from '../home/drive-choice.js';
 import { mountGestures } from '../home/drive-gestures.js';
 import { cannotAlign, shiftBy } from './compare-align.js';
@@ -191,7 +191,7 @@ class Compare {
     const { pace, line, parts } = this;
     if (!this.isShown) return pace.sleep();
     const seen = this.#seen;
-    setWords(parts.state, seen ? shiftWords(pace.shift_s) : 'Opening…');
+    setSentence(parts.state, seen ? shiftWords(pace.shift_s) : 'Opening…');
     if (!seen) return;
     if (!pace.isAwake && document.activeElement === document.body) parts.title.focus();
     pace.wake();

@@ -1,6 +1,6 @@
 // The one band of a replay: what is shown and when it was, the alarm of that moment, and what is live meanwhile.
 
-import { html, icon, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
+import { html, icon, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
 import { timeOfDay } from '../core/format.js';
 import { asideOf, countWords, dateOf, liveWords, momentOf } from './replay-layout.js';
 
@@ -24,7 +24,7 @@ export class ReplayBand {
 
   /** While it is being opened. @param {import('../core/protocol-types.js').Recording} row */
   sketch(row) {
-    setWords(this.#what, whatWords(row.started_ms, row.title || row.vehicle));
+    setSentence(this.#what, whatWords(row.started_ms, row.title || row.vehicle));
     setText(this.#time, timeOfDay(row.started_ms));
   }
 
@@ -35,15 +35,15 @@ export class ReplayBand {
   draw(frame, line) {
     const { replay } = frame;
     if (!replay) return;
-    setWords(this.#what, whatWords(replay.at_ms, replay.title || replay.vehicle));
+    setSentence(this.#what, whatWords(replay.at_ms, replay.title || replay.vehicle));
     setAttribute(this.moment, 'disabled', null);
     setText(this.#time, timeOfDay(replay.at_ms));
     const { kind, icon: mark, text, end } = momentOf(frame);
     setAttribute(this.moment, 'data-kind', kind || null);
     setIcon(this.#mark, mark);
-    setWords(this.#text, text);
-    setWords(this.#end, end);
-    setWords(this.#count, countWords(line));
+    setSentence(this.#text, text);
+    setSentence(this.#end, end);
+    setSentence(this.#count, countWords(line));
   }
 
   /** What is live: in a line, or as a key where it needs the operator. @param {import('../core/protocol-types.js').LiveSummary | null | undefined} live */
@@ -52,11 +52,11 @@ export class ReplayBand {
     const { text, recording } = liveWords(live);
     show(this.live, aside !== null);
     show(this.#calm, aside === null);
-    setWords(this.#calm, `Live now: ${recording}, ${text}`);
+    setSentence(this.#calm, `Live now: ${recording}, ${text}`);
     if (!aside) return null;
     setAttribute(this.live, 'data-kind', aside.kind);
-    setWords(this.#liveText, aside.text);
-    setWords(this.#recording, recording);
+    setSentence(this.#liveText, aside.text);
+    setSentence(this.#recording, recording);
     return aside.asking;
   }
 }

@@ -1,6 +1,6 @@
 // Alarms, marks, interventions and gaps of a recording as a list to jump to: a press leads to some seconds before it.
 
-import { html, icon, listen, setText, setWords, words } from '../core/dom.js';
+import { html, icon, listen, setText, setSentence, textNodes } from '../core/dom.js';
 import { timeOfDay } from '../core/format.js';
 import { shape } from '../drive/drive-parts.js';
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
@@ -77,15 +77,15 @@ export class JumpList {
     setText(this.#title, line ? jumpWords(line) : 'Alarms');
     const isPartial = line !== null && !line.is_done;
     const hint = jumps.length ? `${this.#source}Each opens ${LEAD_S} s before it begins.` : isPartial || !line ? '' : 'Nothing was announced or marked in this recording, and nothing is missing.';
-    setWords(this.#hint, `${hint}${isPartial || !line ? ` Read up to ${clockOf(line?.done_s ?? 0)}; later alarms may follow.` : ''}${line?.modes.some(({ mode }) => mode === 'manual') ? ' Shaded on the time line: a person drives.' : ''}`.trim());
+    setSentence(this.#hint, `${hint}${isPartial || !line ? ` Read up to ${clockOf(line?.done_s ?? 0)}; later alarms may follow.` : ''}${line?.modes.some(({ mode }) => mode === 'manual') ? ' Shaded on the time line: a person drives.' : ''}`.trim());
     const key = JSON.stringify([jumps, line?.is_done]);
     if (key === this.#drawn) return;
     this.#drawn = key;
     const focused = this.#focused;
     this.#list.replaceChildren(...jumps.map((jump) => html('li', {}, html('button', { type: 'button', 'data-at': jumpAt(jump), 'data-begins': jump.at_s, 'data-kind': jump.kind },
       jump.kind === 'flag' || jump.kind === 'wheel' ? shape(jump.kind) : icon(jump.icon, 's'), html('span', { class: 'n at' }, clockOf(jump.at_s)),
-      html('span', { class: 'tx' }, html('b', {}, jump.title), html('span', { class: 'sub' }, ...words(jump.text))),
-      html('span', { class: 'lasts' }, html('span', {}, ...words(lengthOfJump(jump, line?.is_done ?? false))), html('span', { class: 'n sub' }, timeOfDay(this.#start_ms + jump.at_s * 1000)))))));
+      html('span', { class: 'tx' }, html('b', {}, jump.title), html('span', { class: 'sub' }, ...textNodes(jump.text))),
+      html('span', { class: 'lasts' }, html('span', {}, ...textNodes(lengthOfJump(jump, line?.is_done ?? false))), html('span', { class: 'n sub' }, timeOfDay(this.#start_ms + jump.at_s * 1000)))))));
     if (focused >= 0) this.#keys()[focused]?.focus();
   }
 

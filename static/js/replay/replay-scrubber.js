@@ -1,6 +1,6 @@
 // In the place of the rail: the time line under the thumb, keys to the events before and after, play, rate, leave.
 
-import { html, icon, listen, setAttribute, setIcon, setText, setWords, svg } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setIcon, setText, setSentence, svg } from '../core/dom.js';
 import { BASE, HEIGHT, RATES, atByKey, atOf, clockOf, eventsOf, flagPath, gapBands, manualBands, markBeside, markPath, placed, rateWords, speedPath, spoken, xOf } from './replay-layout.js';
 
 /**
@@ -91,7 +91,7 @@ export class Scrubber {
     if (notes !== this.#notes) {
       this.#notes = notes;
       setAttribute(this.note, 'hidden', notes === '');
-      setWords(this.note, notes);
+      setSentence(this.note, notes);
     }
   }
 
@@ -109,7 +109,7 @@ export class Scrubber {
     setAttribute(this.clip, 'width', Math.max(0, x + 4).toFixed(1));
     setText(this.clock, clockOf(this.#at_s));
     const slower = replay.reached_rate !== null && replay.is_playing ? `runs at ${rateWords(replay.reached_rate)}` : `of ${clockOf(this.#length_s)}`;
-    setWords(this.of, slower);
+    setSentence(this.of, slower);
     setAttribute(this.slider, 'aria-valuemax', this.#length_s.toFixed(1));
     setAttribute(this.slider, 'aria-valuenow', this.#at_s.toFixed(1));
     setAttribute(this.slider, 'aria-valuetext', spoken(this.#at_s, this.#length_s));

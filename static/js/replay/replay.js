@@ -1,7 +1,7 @@
 // Replay: the page turned to a recording, and back. Whatever draws live draws this; here are its band, its ways in and out,
 // and the alarms of the live car meanwhile.
 
-import { field, html, icon, listen, need, setAttribute, setText, setWords } from '../core/dom.js';
+import { field, html, icon, listen, need, setAttribute, setText, setSentence } from '../core/dom.js';
 import { ReplayBand, liveSheet } from './replay-band.js';
 import { JumpList } from './replay-jumps.js';
 import { joinedChoices, sketchOf, summaryOf, tapeWords } from './replay-layout.js';
@@ -331,8 +331,8 @@ class Replay {
       this.#seen = '';
       return;
     }
-    setWords(field(sheet, 'title'), `Live: ${asking.title}`);
-    setWords(field(sheet, 'text'), asking.text);
+    setSentence(field(sheet, 'title'), `Live: ${asking.title}`);
+    setSentence(field(sheet, 'text'), asking.text);
     if (key === this.#seen) return;
     this.#seen = key;
     if (!sheet.open) sheet.showModal();

@@ -1,6 +1,6 @@
 // The texts of the scan's tab: age of the scan, the nearest return in the corridor, the marked return, the plot for screen readers.
 
-import { field, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { field, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { ABSENT, isAbsent, write } from '../core/ink.js';
 import { bearingOf } from './scan-frame.js';
 import { beamWords, sectorSentences, sectorsOf, unseenOf } from './scan-layout.js';
@@ -37,17 +37,17 @@ export class ScanReadout {
     const missing = isThere ? `STALE ${age(age_s)} s` : isAbsent(ink) ? ABSENT[ink] : ink === 'stale' ? 'no scan' : 'waiting for a scan';
     if (!isNow) setText(at('none-words'), missing);
     this.#drawNearest(isNow ? scan : null, isNow ? ink : 'fresh');
-    setWords(at('beams'), isThere && scan ? [beamWords(scan), store.signal('scan')?.value?.mounting].filter(Boolean).join(' · ') : '');
+    setSentence(at('beams'), isThere && scan ? [beamWords(scan), store.signal('scan')?.value?.mounting].filter(Boolean).join(' · ') : '');
     // The marked return takes the place of the count of beams: the keys below must not move.
     show(at('marked'), mark.at !== null);
     show(at('beams'), mark.at === null);
     show(at('hint'), isNow && mark.at === null);
-    setWords(at('marked'), this.#markedWords());
+    setSentence(at('marked'), this.#markedWords());
     show(at('straight'), isThere && !isSteeringKnown(store));
     const note = isThere ? (store.signal('scan')?.note ?? '') : '';
     show(at('note'), note !== '');
     setAttribute(at('note'), 'title', note);
-    setWords(at('note-words'), note);
+    setSentence(at('note-words'), note);
     setText(at('note-short'), isOfMounting(note) ? 'Mounting' : lacksBumper(note) ? 'No bumper' : 'Note');
     this.#describe(isNow ? scan : null, missing);
   }

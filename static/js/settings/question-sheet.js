@@ -1,6 +1,6 @@
 // The sheet of a question: its text, its options as large keys, and for lasers what each of them sees now.
 
-import { html, setText, setWords, show } from '../core/dom.js';
+import { html, setText, setSentence, show } from '../core/dom.js';
 import { Meant } from '../core/meant.js';
 import { styled } from '../core/style-sheet.js';
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
@@ -64,7 +64,7 @@ class QuestionSheet {
     this.bad = html('p', { class: 'bad', role: 'alert' });
     this.rest = html('p', { class: 'sub' });
     const effect = html('p', { class: 'sub', id: 'question-words' });
-    setWords(effect, meanwhileWords(question, this.label));
+    setSentence(effect, meanwhileWords(question, this.label));
     const close = html('button', { type: 'button', class: 'key', 'data-f': 'no' }, does.later ? 'Later' : 'Close');
     const next = html('button', { type: 'button', class: 'key', 'data-f': 'next' }, 'Next question');
     this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed pick-sheet question-sheet', id: 'sheet-question', 'aria-labelledby': 'question-title', 'aria-describedby': 'question-words' },
@@ -104,8 +104,8 @@ class QuestionSheet {
     if (key === this.#drawn) return;
     this.#drawn = key;
     this.question = question;
-    setWords(this.text, question.words);
-    setWords(this.rest, restWords(question));
+    setSentence(this.text, question.words);
+    setSentence(this.rest, restWords(question));
     this.#options.clear();
     this.list.replaceChildren(...question.options.map((option) => html('li', {}, this.#key(option))));
     this.meant.moved();
@@ -114,7 +114,7 @@ class QuestionSheet {
   /** @param {import('./question-layout.js').Option} option */
   #key({ value, label, why }) {
     const text = html('small', {});
-    setWords(text, why);
+    setSentence(text, why);
     const key = html('button', { type: 'button', 'data-value': value, 'data-operator': '' }, html('span', { class: 'tx' }, html('b', {}, label), text));
     this.#options.set(value, { sketch: new ScanSketch(), key });
     key.addEventListener('click', (event) => this.meant.by(event) && void this.#answer(value, label));
@@ -133,7 +133,7 @@ class QuestionSheet {
       this.does.answered();
       this.close();
       this.does.say(`${this.label}: ${label}.${replaying ? ' This replay is judged by it.' : ''}`, 'Chosen');
-    } else setWords(this.bad, `Not chosen. ${outcome.reason}`);
+    } else setSentence(this.bad, `Not chosen. ${outcome.reason}`);
   }
 
   /** Into the settings of the car, or for this replay. @param {string} value @returns {Promise<Outcome>} */

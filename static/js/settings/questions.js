@@ -1,7 +1,7 @@
 // The questions to the operator in control: a card under the strip until it is answered or put off, then a line that stays.
 // It stands in the flow of the page, so that it covers neither a value nor an alarm nor the slow-down.
 
-import { html, icon, need, setAttribute, setWords, show } from '../core/dom.js';
+import { html, icon, need, setAttribute, setSentence, show } from '../core/dom.js';
 import { Meant } from '../core/meant.js';
 import { styled } from '../core/style-sheet.js';
 import { dealt, keyOf, mayAnswer, placeOf, meanwhileWords, waitingWords } from './question-layout.js';
@@ -70,11 +70,11 @@ class Questions {
       const key = keyOf(placeOf(store), first);
       if (key !== this.#shown) this.meant.moved();
       this.#shown = key;
-      setWords(this.title, first.words);
-      setWords(this.more, `${meanwhileWords(first, label(first.signal))}${open.length > 1 ? ` ${open.length} questions.` : ''}`);
+      setSentence(this.title, first.words);
+      setSentence(this.more, `${meanwhileWords(first, label(first.signal))}${open.length > 1 ? ` ${open.length} questions.` : ''}`);
     } else this.#shown = '';
-    if (may) setWords(this.lineWords, waitingWords(waiting, label));
-    else setWords(this.others, `${questions.map(({ words }) => words).join(' ')} The operator in control answers.`);
+    if (may) setSentence(this.lineWords, waitingWords(waiting, label));
+    else setSentence(this.others, `${questions.map(({ words }) => words).join(' ')} The operator in control answers.`);
     setAttribute(document.documentElement, 'data-asks', may && first !== undefined);
   }
 

@@ -1,6 +1,6 @@
 // The kind of car, and all settings as one file: kept on this phone, taken from it, or given up for the defaults.
 
-import { field, html, icon, listen, need, setAttribute, setText, setWords, show, words } from '../core/dom.js';
+import { field, html, icon, listen, need, setAttribute, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { found } from './settings-layout.js';
 import { closeSheet, openSheet } from '../shell/sheet.js';
 import { counted } from '../core/format.js';
@@ -73,7 +73,7 @@ export class SettingsFileKeys {
     const { body } = this.model;
     const sheet = this.sheets.profile;
     if (!body) return;
-    setWords(field(sheet, 'refused'), '');
+    setSentence(field(sheet, 'refused'), '');
     const options = [
       { name: 'auto', title: 'As recognised', detail: `now ${body.profile.recognised}` },
       ...body.profiles.map(({ name, title }) => ({ name, title, detail: '' })),
@@ -86,7 +86,7 @@ export class SettingsFileKeys {
       key.addEventListener('click', async () => {
         const outcome = await this.model.set({ profile: name });
         if (outcome.ok) closeSheet(sheet);
-        else setWords(field(sheet, 'refused'), `Not changed. ${outcome.reason}`);
+        else setSentence(field(sheet, 'refused'), `Not changed. ${outcome.reason}`);
       });
       return html('li', {}, key);
     }));
@@ -122,15 +122,15 @@ export class SettingsFileKeys {
 
   #openReset() {
     const sheet = this.sheets.reset;
-    setWords(field(sheet, 'refused'), '');
-    field(sheet, 'list').replaceChildren(...this.model.resetLines.map((line) => html('li', {}, ...words(line))));
+    setSentence(field(sheet, 'refused'), '');
+    field(sheet, 'list').replaceChildren(...this.model.resetLines.map((line) => html('li', {}, ...textNodes(line))));
     openSheet(sheet);
   }
 
   async #reset() {
     const outcome = await this.model.reset();
     if (outcome.ok) closeSheet(this.sheets.reset);
-    else setWords(field(this.sheets.reset, 'refused'), `Not changed. ${outcome.reason}`);
+    else setSentence(field(this.sheets.reset, 'refused'), `Not changed. ${outcome.reason}`);
   }
 }
 

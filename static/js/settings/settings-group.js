@@ -1,6 +1,6 @@
 // The thresholds under one heading, folded away until they are wanted.
 
-import { html, icon, setText, setWords, show } from '../core/dom.js';
+import { html, icon, setText, setSentence, show } from '../core/dom.js';
 import { found } from './settings-layout.js';
 import { SettingsRow } from './settings-row.js';
 import { counted } from '../core/format.js';
@@ -44,7 +44,7 @@ export class SettingsGroup {
 
   draw() {
     const own = this.rows.filter((row) => this.model.body?.changed.includes(row.name)).length;
-    setWords(this.count, own ? `${own} of ${this.rows.length} changed` : String(this.rows.length));
+    setSentence(this.count, own ? `${own} of ${this.rows.length} changed` : String(this.rows.length));
     if (this.element.open) for (const row of this.rows) row.draw();
   }
 

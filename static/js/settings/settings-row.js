@@ -1,6 +1,6 @@
 // One threshold: its name, its number to type into, its slider with the default's tick; or a switch where it is on or off.
 
-import { html, listen, setAttribute, setText, setWords, show, words } from '../core/dom.js';
+import { html, listen, setAttribute, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { POSITIONS, SWITCH, endText, readNumber, scaleOf, shareOf, stepped, textOf, valueAt } from './settings-layout.js';
 import { SettingsTrace } from './settings-trace.js';
 import { speedUnit } from '../core/units.js';
@@ -44,7 +44,7 @@ export class SettingsRow {
     this.message = html('p', { class: 'says', role: 'status', hidden: true });
     this.yet = html('p', { class: 'yet', hidden: true }, 'Not confirmed by the server yet.');
     this.isSwitch = field.unit === SWITCH;
-    const help = field.description ? html('p', { class: 'help', id: `${id}-help` }, ...words(field.description)) : '';
+    const help = field.description ? html('p', { class: 'help', id: `${id}-help` }, ...textNodes(field.description)) : '';
     const described = field.description ? `${id}-help` : null;
     this.number = /** @type {HTMLInputElement} */ (html('input', {
       class: 'n v', id, type: 'text', inputmode: field.minimum < 0 ? 'text' : 'decimal', autocomplete: 'off', enterkeyhint: 'done', size: 4, maxlength: 24,
@@ -142,7 +142,7 @@ export class SettingsRow {
 
   /** @param {string} sentence */
   #say(sentence) {
-    setWords(this.message, sentence);
+    setSentence(this.message, sentence);
     show(this.message, sentence !== '');
     setAttribute(this.element, 'data-refused', sentence !== '');
   }
@@ -187,7 +187,7 @@ export class SettingsRow {
     this.range.style.setProperty('--at', share.toFixed(4));
     this.range.style.setProperty('--usual', at.toFixed(4));
     setAttribute(this.range, 'data-usual', at < 0.17 ? 'low' : at > 0.83 ? 'high' : 'middle');
-    setWords(/** @type {HTMLElement} */ (this.usual.lastChild), `default ${endText(usual, field)}`);
+    setSentence(/** @type {HTMLElement} */ (this.usual.lastChild), `default ${endText(usual, field)}`);
     setAttribute(this.usual, 'aria-label', `${field.title}: default ${endText(usual, field)} ${unit}, press to reset`);
   }
 

@@ -1,6 +1,6 @@
 // The topics of the signals in Settings: which carries what, how fast, and what is wrong with it; a press lets another be picked.
 
-import { html, icon, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
+import { html, icon, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
 import { missingWords } from '../files/missing-topics.js';
 import { openScreen } from '../core/open-screen.js';
 import { found } from './settings-layout.js';
@@ -90,14 +90,14 @@ export class SettingsTopics {
       this.rows.set(name, at);
       const shown = topicWords(signal, this.model.body?.topics[name], isLive, this.store.ink(name).ink === 'not_chosen');
       setText(at.topic, shown.topic);
-      setWords(at.detail, shown.detail);
+      setSentence(at.detail, shown.detail);
       setIcon(at.mark, shown.icon);
       setAttribute(at.mark, 'class', shown.icon === 'warn' ? 'i c-warn' : shown.icon === 'unknown' ? 'i dashed' : 'i');
       setText(at.rate, shown.rate);
       show(at.unit, shown.rate !== NOTHING);
     }
     const missing = isLive ? missingWords(frame.recording) : '';
-    setWords(this.missing, missing);
+    setSentence(this.missing, missing);
     show(this.missing, missing !== '');
     this.filter(this.#query);
     this.#countThem(frame, isLive);
@@ -124,7 +124,7 @@ export class SettingsTopics {
       this.model.candidates().then(({ candidates, unmapped }) => { this.#unmapped = candidates === null ? null : unmapped; }, () => { this.#unmapped = null; });
     }
     const mapped = new Set(Object.values(frame.signals).flatMap(({ topic }) => (topic ? [topic] : []))).size;
-    setWords(this.count, this.#unmapped === null || !isLive ? `${mapped} used` : `${mapped + this.#unmapped} found, ${mapped} used`);
+    setSentence(this.count, this.#unmapped === null || !isLive ? `${mapped} used` : `${mapped + this.#unmapped} found, ${mapped} used`);
   }
 
   stop() {

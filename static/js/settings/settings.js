@@ -8,7 +8,7 @@ import { settingsOf } from './settings-model.js';
 import { SettingsTopics } from './settings-topics.js';
 import { takeWanted } from '../core/open-screen.js';
 import { openPreferences } from '../shell/preferences.js';
-import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { counted, timeOfDay } from '../core/format.js';
 import { styled } from '../core/style-sheet.js';
 
@@ -105,7 +105,7 @@ class SettingsTab {
     this.#drawGroups();
     const { isOpen } = model;
     setAttribute(all, 'disabled', !isOpen);
-    setWords(state, stateWords(this.store, model));
+    setSentence(state, stateWords(this.store, model));
     setAttribute(state, 'data-bad', !isOpen);
     this.#filter();
     for (const group of this.#groups) group.draw();

@@ -1,6 +1,6 @@
 // The sheet in which another topic is picked for a signal: those of the car whose type can be read as it, or the server's own choice.
 
-import { field, html, icon, need, setText, setWords, show } from '../core/dom.js';
+import { field, html, icon, need, setText, setSentence, show } from '../core/dom.js';
 import { closeSheet, openSheet } from '../shell/sheet.js';
 import { counted } from '../core/format.js';
 
@@ -40,8 +40,8 @@ export async function openTopicPicker(store, model, signal) {
   const label = store.signal(signal)?.label ?? signal;
   const list = field(sheet, 'list');
   setText(field(sheet, 'title'), `Topic of ${label}`);
-  setWords(field(sheet, 'words'), 'Loading the car’s topics…');
-  setWords(field(sheet, 'refused'), '');
+  setSentence(field(sheet, 'words'), 'Loading the car’s topics…');
+  setSentence(field(sheet, 'refused'), '');
   sheet.dataset['signal'] = signal;
   list.replaceChildren();
   openSheet(sheet);
@@ -58,7 +58,7 @@ export async function openTopicPicker(store, model, signal) {
     text = 'The topics could not be loaded: the server does not answer.';
   }
   if (sheet.dataset['signal'] !== signal) return; // another signal was requested meanwhile
-  setWords(field(sheet, 'words'), text);
+  setSentence(field(sheet, 'words'), text);
   const options = optionsOf(candidates, store.signal(signal)?.topic ?? null, model.chosen.topics[signal]);
   list.replaceChildren(...options.map((option) => html('li', {}, key(option))));
 
@@ -68,10 +68,10 @@ export async function openTopicPicker(store, model, signal) {
     show(mark, isChosen);
     const button = html('button', { type: 'button', 'aria-pressed': String(isChosen) }, html('span', { class: 'tx' }, html('b', {}, title), html('small', {}, detail)), mark);
     button.addEventListener('click', async () => {
-      setWords(field(sheet, 'refused'), '');
+      setSentence(field(sheet, 'refused'), '');
       const outcome = await model.set({ topics: { [signal]: topic } });
       if (outcome.ok) closeSheet(sheet);
-      else setWords(field(sheet, 'refused'), `Not changed. ${outcome.reason}`);
+      else setSentence(field(sheet, 'refused'), `Not changed. ${outcome.reason}`);
     });
     return button;
   }

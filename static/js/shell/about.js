@@ -1,6 +1,6 @@
 // License and About: what this is, which versions run, and whose work is in it.
 
-import { html, setText, words } from '../core/dom.js';
+import { html, setText, textNodes } from '../core/dom.js';
 import { fixed } from '../core/format.js';
 
 /**
@@ -97,7 +97,7 @@ export function mountAbout(root, store) {
     const key = JSON.stringify(rows);
     if (facts.dataset['key'] === key) return;
     facts.dataset['key'] = key;
-    facts.replaceChildren(...rows.flatMap(([term = '', value = '']) => [html('dt', {}, term), html('dd', {}, ...words(value))]));
+    facts.replaceChildren(...rows.flatMap(([term = '', value = '']) => [html('dt', {}, term), html('dd', {}, ...textNodes(value))]));
   }
 
   draw();

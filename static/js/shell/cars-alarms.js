@@ -1,7 +1,7 @@
 // The alarms of the other cars, on the page of one: on the strip, on a card over the rail, aloud and by name.
 
 import { announcedOf, askingOf, keyOf, louder } from './cars-layout.js';
-import { field, html, icon, listen, need, setAttribute, setIcon, setText, setWords } from '../core/dom.js';
+import { field, html, icon, listen, need, setAttribute, setIcon, setText, setSentence } from '../core/dom.js';
 import { age, counted } from '../core/format.js';
 import { Meant } from '../core/meant.js';
 
@@ -96,8 +96,8 @@ export class CarsAlarms {
     setAttribute(strip, 'data-known', false);
     setAttribute(strip, 'data-opens', 'cars');
     setIcon(need(strip, '.i'), first.icon);
-    setWords(field(strip, 'strip-text'), `${this.cars.shortOf(first.name)}: ${first.worst?.title ?? ''}`);
-    setWords(field(strip, 'strip-end'), asking.length > 1 ? counted(asking.length, 'car') : '');
+    setSentence(field(strip, 'strip-text'), `${this.cars.shortOf(first.name)}: ${first.worst?.title ?? ''}`);
+    setSentence(field(strip, 'strip-end'), asking.length > 1 ? counted(asking.length, 'car') : '');
   }
 
   /** @param {CarRow | null} row */
@@ -115,9 +115,9 @@ export class CarsAlarms {
     this.#shown = row;
     const short = this.cars.shortOf(row.name); // whole in the list of cars
     const { title, text } = row.worst;
-    setWords(this.title, text || title);
+    setSentence(this.title, text || title);
     const for_s = ((this.store.cars?.time_ms ?? 0) - row.worst.raised_ms) / 1000 + this.store.carsLag_s;
-    setWords(this.text, `${short}: ${title}, for ${age(Math.max(0, for_s))} s. In control: ${row.operator}.`);
+    setSentence(this.text, `${short}: ${title}, for ${age(Math.max(0, for_s))} s. In control: ${row.operator}.`);
     setText(this.open, `Open ${short}`);
     if (!card.isConnected) warning.after(card); // where there is room for one, this car's comes first
   }

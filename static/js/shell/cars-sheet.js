@@ -4,7 +4,7 @@ import { drawChain } from './chain.js';
 import { addSheet, closeSheet, openSheet } from './sheet.js';
 import { chipOf, controlWords } from '../control/control-layout.js';
 import { dutyWords } from '../control/duty-layout.js';
-import { html, icon, setAttribute, setIcon, setText, setWords, show, svg } from '../core/dom.js';
+import { html, icon, setAttribute, setIcon, setText, setSentence, show, svg } from '../core/dom.js';
 import { write } from '../core/ink.js';
 import { speedWords } from '../core/units.js';
 
@@ -58,7 +58,7 @@ export function openCars(store, { rows, open, openControl, openDuty }) {
     setText(/** @type {Element} */ (duty.lastElementChild), dutyWords(store.duty));
     show(duty, store.duty !== null && !store.isViewer);
     show(fleet, now.length > 1);
-    setWords(effect, now.length > 1 ? `Opening another car moves the slide to it and arms nothing. Control of ${store.vehicle} is given up.` : 'The server watches one car.');
+    setSentence(effect, now.length > 1 ? `Opening another car moves the slide to it and arms nothing. Control of ${store.vehicle} is given up.` : 'The server watches one car.');
   }
 
   control.addEventListener('click', () => {
@@ -108,7 +108,7 @@ class CarItem {
     setAttribute(this.key, 'aria-current', isShown ? 'true' : null);
     setIcon(this.mark, row.icon);
     setText(this.open, isShown ? 'open now' : '');
-    setWords(this.text, row.text);
+    setSentence(this.text, row.text);
     setText(this.operator, row.operator);
     drawSpeed(this.value, this.unit, row.speed);
     drawChain(this.chain, row.chain ?? NOTHING);

@@ -4,7 +4,7 @@ import { openPreferences } from './preferences.js';
 import { FoundVehicles } from './found-vehicles.js';
 import { addresses, armWords, bare, dialled, heldWords, isSameCar, keep } from './connect-layout.js';
 import { closeSheet, openSheet } from './sheet.js';
-import { field, html, icon, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { field, html, icon, listen, need, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { connectRow } from '../slowdown/slow-layout.js';
 import { age } from '../core/format.js';
 
@@ -117,7 +117,7 @@ class ConnectScreen {
   #drawComplaint() {
     const message = field(this.root, 'says');
     const sentence = this.#complaint || heldWords(this.store.frame?.session.held ?? null);
-    setWords(message, sentence);
+    setSentence(message, sentence);
     show(message, sentence !== '');
   }
 
@@ -157,7 +157,7 @@ class ConnectScreen {
   #drawDialled() {
     const url = dialled(this.input.value);
     const at = field(this.root, 'dials');
-    setWords(at, url && `Dials ${url}`);
+    setSentence(at, url && `Dials ${url}`);
     show(at, url !== '');
   }
 
@@ -168,7 +168,7 @@ class ConnectScreen {
     const isSame = session?.address ? isSameCar(session.address, input.value) : false;
     const isDialling = this.#isBusy || (session?.phase === 'connecting' && isSame);
     setAttribute(go, 'data-busy', isDialling);
-    setWords(go, isDialling ? `Connecting ${age(frame?.link.trying_for_s ?? 0)} s` : this.#isBack ? 'Back to monitoring' : this.#isConfigured ? `Connect to ${frame?.vehicle}` : 'Connect and arm alarms');
+    setSentence(go, isDialling ? `Connecting ${age(frame?.link.trying_for_s ?? 0)} s` : this.#isBack ? 'Back to monitoring' : this.#isConfigured ? `Connect to ${frame?.vehicle}` : 'Connect and arm alarms');
   }
 
   #drawArming() {

@@ -2,7 +2,7 @@
 
 import { isAboutLink, layOut, titleOf } from '../alarms/alarm-layout.js';
 import { drawBigChain } from './chain.js';
-import { field, html, listen, need, setAttribute, setIcon, setText, setWords, show, words } from '../core/dom.js';
+import { field, html, listen, need, setAttribute, setIcon, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { areAlarmsInSight } from './layout.js';
 import { Meant } from '../core/meant.js';
 import { isAsked } from './sheet.js';
@@ -183,7 +183,7 @@ class Dialogs {
     }
     else fillLink(wanted, standing.kind, this.store);
     if (standing.kind === 'lost') setText(field(wanted, 'title'), standing.alarm?.title ?? 'Connection lost');
-    if (standing.kind === 'failed') setWords(field(wanted, 'change'), this.router.suggestion ? `Use ${this.router.suggestion}` : 'Change the address');
+    if (standing.kind === 'failed') setSentence(field(wanted, 'change'), this.router.suggestion ? `Use ${this.router.suggestion}` : 'Change the address');
     const key = standing.kind === 'alarm' ? headKey(standing.alarm) : standing.kind;
     if (!wanted.open || key !== this.#shown) this.meant(wanted).moved();
     this.#shown = key;
@@ -246,7 +246,7 @@ function fillAlarm(sheet, alarm, { isPane, mayAct }) {
       setText(field(sheet, `${name}-unit`), unit);
     }
   }
-  setWords(field(sheet, 'text'), [dialogWords(alarm), isPane ? silentWords(alarm) : ''].filter(Boolean).join(' '));
+  setSentence(field(sheet, 'text'), [dialogWords(alarm), isPane ? silentWords(alarm) : ''].filter(Boolean).join(' '));
 }
 
 /**
@@ -261,10 +261,10 @@ function fillLink(sheet, kind, store) {
   const text = field(sheet, 'words');
   const key = `${bold}|${plain}`;
   if (text.dataset['shown'] !== key) {
-    text.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
+    text.replaceChildren(html('b', {}, ...textNodes(bold)), ' ', ...textNodes(plain));
     text.dataset['shown'] = key;
   }
-  setWords(field(sheet, 'more'), kind === 'lost' ? more + lastKnown(store) : more);
+  setSentence(field(sheet, 'more'), kind === 'lost' ? more + lastKnown(store) : more);
 }
 
 /**

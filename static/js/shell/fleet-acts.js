@@ -3,7 +3,7 @@
 import { WHY } from '../control/viewer.js';
 import { openHandover, peopleOf } from './fleet-handover.js';
 import { addressOf } from './fleet-rows.js';
-import { html, icon, setAttribute, words } from '../core/dom.js';
+import { html, icon, setAttribute, textNodes } from '../core/dom.js';
 import { counted } from '../core/format.js';
 import { isMaybe, laterWords } from '../core/outcome.js';
 
@@ -142,7 +142,7 @@ export class FleetActs {
     const title = isMaybe(sentence) ? 'Not known' : given; // whoever tells it takes it for refused
     const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close' }, icon('close'));
     const note = html('div', { class: 'snack note', role: 'status' }, html('div', { class: 'side' }, icon('info')),
-      html('div', { class: 'tx' }, html('b', {}, ...words(title)), html('span', {}, ...words(sentence))), close);
+      html('div', { class: 'tx' }, html('b', {}, ...textNodes(title)), html('span', {}, ...textNodes(sentence))), close);
     close.addEventListener('click', () => {
       note.remove();
       onClosed?.();

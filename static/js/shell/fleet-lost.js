@@ -4,7 +4,7 @@
 import { drawBigChain } from './chain.js';
 import { addressOf } from './fleet-rows.js';
 import { rewinder } from '../core/draw-proof.js';
-import { field, html, setText, setWords, show } from '../core/dom.js';
+import { field, html, setText, setSentence, show } from '../core/dom.js';
 import { age, counted, timeOfDay } from '../core/format.js';
 
 /**
@@ -55,8 +55,8 @@ export class LostPanel {
     setText(this.age, view.silence_s === Infinity ? '' : `${age(view.silence_s)} s`);
     drawBigChain(this.chain, lostChain(view));
     const [text, what] = lostWords(view);
-    setWords(this.text, text);
-    setWords(this.what, what);
+    setSentence(this.text, text);
+    setSentence(this.what, what);
     show(this.ownWords, names.length > 0);
     const may = view.lost === 'cars' ? silent : [];
     const own = [...names, '', ...may].join('\n');

@@ -1,6 +1,6 @@
 // The map of all cars: an SVG of our own, north up, a grid of round lengths; each car is moved, never made anew.
 
-import { field, need, setAttribute, setText, setWords, show, svg } from '../core/dom.js';
+import { field, need, setAttribute, setText, setSentence, show, svg } from '../core/dom.js';
 import { dotsOf, lengthWords, mapWords, namesAt, stepOf, viewOf } from './fleet-map-layout.js';
 
 /** From so many cars on only those that need a person are named. */
@@ -53,7 +53,7 @@ export class FleetMap {
     const { dots, far, without, from } = dotsOf(seen, kinds, floods, this.#from);
     this.#from = from;
     const text = mapWords(seen.cars?.cars.length ?? 0, dots, without, far);
-    setWords(this.head, then || text);
+    setSentence(this.head, then || text);
     setAttribute(this.root, 'aria-label', `Map of all cars: ${then || text}`);
     const { width, height } = this;
     if (width < 40 || height < 40) return; // out of sight

@@ -1,7 +1,7 @@
 // The attention queue: one element for each item, kept as long as the item is, so that a finger and the focus stay where they are.
 
 import { PagedList } from '../alarms/pager.js';
-import { field, html, icon, setAttribute, setIcon, setText, setWords, show, svg } from '../core/dom.js';
+import { field, html, icon, setAttribute, setIcon, setText, setSentence, show, svg } from '../core/dom.js';
 import { duration } from '../core/format.js';
 import { Meant } from '../core/meant.js';
 
@@ -53,7 +53,7 @@ export class Queue {
 
   /** @param {Item[]} items @param {string} head @param {boolean} isViewer */
   draw(items, head, isViewer) {
-    setWords(this.head, head);
+    setSentence(this.head, head);
     const had = this.#focused();
     const views = items.map((item, i) => {
       const view = this.#views.get(item.key) ?? new ItemView((act, key) => this.act(act, view.item, key));
@@ -141,10 +141,10 @@ class ItemView {
     setIcon(this.mark, item.icon);
     setText(this.name, item.name);
     setText(this.since, item.since_s === null ? '–' : duration(item.since_s));
-    setWords(this.title, item.title);
-    setWords(this.detail, item.detail);
+    setSentence(this.title, item.title);
+    setSentence(this.detail, item.detail);
     setText(this.who, item.who.text);
-    setWords(this.next, item.next);
+    setSentence(this.next, item.next);
     show(this.timer, item.timer !== null);
     if (item.timer) setAttribute(this.bar, 'width', (100 * item.timer.share).toFixed(1));
     this.#drawKeys(item, isViewer);

@@ -2,7 +2,7 @@
 
 import { drawChain } from './chain.js';
 import { arrange } from './fleet-queue.js';
-import { field, html, icon, listen, setAttribute, setIcon, setText, setWords, show, svg } from '../core/dom.js';
+import { field, html, icon, listen, setAttribute, setIcon, setText, setSentence, show, svg } from '../core/dom.js';
 import { write } from '../core/ink.js';
 import { Meant } from '../core/meant.js';
 import { speedUnit, speedWords } from '../core/units.js';
@@ -57,7 +57,7 @@ export class Rows {
     const known = new Set(rows.map(({ key }) => key));
     for (const key of this.#views.keys()) if (!known.has(key)) this.#views.delete(key);
     show(this.pager, last > 0);
-    setWords(this.pages, `${from + 1}–${from + shown.length} of ${rows.length}`);
+    setSentence(this.pages, `${from + 1}–${from + shown.length} of ${rows.length}`);
     setAttribute(this.before, 'aria-disabled', this.#page === 0 ? 'true' : null);
     setAttribute(this.after, 'aria-disabled', this.#page === last ? 'true' : null);
   }
@@ -126,7 +126,7 @@ class RowView {
     setText(this.markWords, row.kind === 'crit' ? 'critical' : row.kind === 'warn' ? 'warning' : '');
     setText(link, row.name);
     setAttribute(link, 'href', row.cars.length === 1 ? addressOf(row.name) : '#cars');
-    setWords(this.text, row.text);
+    setSentence(this.text, row.text);
     drawChain(this.chain, row.chain);
     setAttribute(this.chain, 'aria-label', row.chain.cut === null ? 'whole' : 'cut');
     const isKnown = row.speed.value_mps !== null && row.speed.ink !== 'never' && row.speed.ink !== 'not_published';

@@ -9,7 +9,7 @@ import { FleetMap } from './fleet-map.js';
 import { Queue, arrange } from './fleet-queue.js';
 import { Places, Rows } from './fleet-rows.js';
 import { MANY, carRows, foldedRows, lineOf, lostLine, placesOf, rowsAPage } from './fleet-rows-layout.js';
-import { field, html, listen, need, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
+import { field, html, listen, need, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
 import { age, timeOfDay } from '../core/format.js';
 
 /**
@@ -128,12 +128,12 @@ export class FleetView {
     this.rows.draw(folding, this.#aPage(rows.length));
     show(need(this.root, '[data-f="table"]'), rows.length > 0);
     show(this.none, seen.cars !== null && rows.length === 0);
-    setWords(this.none, NONE);
+    setSentence(this.none, NONE);
     if (rows.length >= MANY) this.places.draw(placesOf(rows));
     const then = !lost ? '' : view.heard_ms === null ? 'not known' : `then, not now: ${timeOfDay(view.heard_ms)}`;
     const kinds = new Map(rows.map((row) => [row.name, row.isQuiet ? /** @type {const} */ ('') : row.kind]));
     this.map.draw(seen, kinds, new Set([...folded.values()].filter(({ icon }) => icon === 'link-off').flatMap(({ cars }) => cars)), then);
-    setWords(this.over, then);
+    setSentence(this.over, then);
     this.#drawLog();
     this.press.draw();
   }
@@ -168,9 +168,9 @@ export class FleetView {
     setAttribute(strip, 'data-kind', line?.kind || null);
     setAttribute(strip, 'data-known', line !== null && !line.isFilled && line.kind !== '');
     setIcon(need(strip, '.i'), line?.icon ?? 'unknown');
-    setWords(text, line?.text ?? 'Waiting for the server');
-    setWords(end, line?.end ?? '');
-    setWords(more, line?.more ?? '');
+    setSentence(text, line?.text ?? 'Waiting for the server');
+    setSentence(end, line?.end ?? '');
+    setSentence(more, line?.more ?? '');
     const isAsking = line !== null && line.kind !== '';
     const title = isAsking ? `${this.items.length ? `(${this.items.length}) ` : ''}${line.text} · ${this.title}` : this.title;
     if (document.title !== title && !this.store.painter.drawing.isFailed) document.title = title; // else undrawn.js writes it

@@ -1,10 +1,10 @@
 // How an iPhone installs the page: no browser of it offers to.
 
-import { html, words } from '../core/dom.js';
+import { html, textNodes } from '../core/dom.js';
 
 /** @returns {HTMLDialogElement} */
 export function appleSheet() {
-  const step = (/** @type {string} */ sentence) => html('li', {}, ...words(sentence));
+  const step = (/** @type {string} */ sentence) => html('li', {}, ...textNodes(sentence));
   return /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-install', 'aria-labelledby': 'install-title' },
     html('div', { class: 'bd' }, html('h2', { id: 'install-title' }, 'Install on this device'),
       html('ol', { class: 'steps' }, step('Press Share: the square with the arrow.'), step('Choose “Add to Home Screen”.'), step('Press Add.')),

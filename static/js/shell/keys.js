@@ -1,7 +1,7 @@
 // The keys of the page: declared once, obeyed and shown from here. None of them orders a slow-down.
 
 import { addSheet, closeSheet, openSheet } from './sheet.js';
-import { field, html, listen, need, setText, words } from '../core/dom.js';
+import { field, html, listen, need, setText, textNodes } from '../core/dom.js';
 import { isFloor } from './layout.js';
 import { styled } from '../core/style-sheet.js';
 
@@ -132,8 +132,8 @@ class PageKeys {
     const label = () => setText(toggle, this.#isOn ? 'Turn these keys off' : 'Turn these keys on');
     label();
     const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-keys', 'aria-labelledby': 'keys-title' },
-      html('div', { class: 'bd' }, html('h2', { id: 'keys-title' }, 'Keys'), html('p', { class: 'sub small' }, ...words('No key orders a slow-down. Saved on this device only.'))),
-      html('dl', { class: 'key-list' }, ...KEYS.flatMap(({ shown, does }) => [html('dt', {}, html('kbd', {}, shown)), html('dd', {}, ...words(does))])),
+      html('div', { class: 'bd' }, html('h2', { id: 'keys-title' }, 'Keys'), html('p', { class: 'sub small' }, ...textNodes('No key orders a slow-down. Saved on this device only.'))),
+      html('dl', { class: 'key-list' }, ...KEYS.flatMap(({ shown, does }) => [html('dt', {}, html('kbd', {}, shown)), html('dd', {}, ...textNodes(does))])),
       html('div', { class: 'keys' }, toggle, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
     const take = addSheet(sheet);
     listen(sheet, 'close', take);

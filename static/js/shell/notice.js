@@ -1,6 +1,6 @@
 // A notice of the page itself: something was refused, a blind time is over. It closes by itself, and takes no place of an alarm.
 
-import { html, icon, mirror, need, words } from '../core/dom.js';
+import { html, icon, mirror, need, textNodes } from '../core/dom.js';
 import { isMaybe } from '../core/outcome.js';
 
 const STAYS_MS = 8000;
@@ -37,7 +37,7 @@ export function notices(root) {
   return (sentence, given = '', way = undefined) => {
     const title = isMaybe(sentence) && !given.includes('Not known') ? 'Not known' : given; // whoever tells it takes it for refused
     const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close' }, icon('close'));
-    const text = html('div', { class: 'tx' }, ...(title ? [html('b', {}, ...words(title))] : []), html('span', {}, ...words(sentence)));
+    const text = html('div', { class: 'tx' }, ...(title ? [html('b', {}, ...textNodes(title))] : []), html('span', {}, ...textNodes(sentence)));
     const note = html('div', { class: 'snack note', role: 'status' }, html('div', { class: 'side' }, icon('info')), text, close);
     const take = () => note.remove();
     if (way) {

@@ -1,7 +1,7 @@
 // The panes of a wide screen: their heads, the list of alarms and the log, mounted only while there is a place for them.
 
 import { countWords, rowsOf } from '../alarms/alarms-layout.js';
-import { field, html, icon, listen, setAttribute, setText, setWords, words } from '../core/dom.js';
+import { field, html, icon, listen, setAttribute, setText, setSentence, textNodes } from '../core/dom.js';
 import { eventWords, gapLine } from '../alarms/log-layout.js';
 import { fixed, timeOfDay } from '../core/format.js';
 import { alarmInHead } from './dialogs.js';
@@ -74,11 +74,11 @@ class Panes {
     if (innerWidth >= 1800 * scale()) this.dress ??= styled('wall'); // as in wall.css
     const heads = headsOf(frame);
     const covered = veilOf(this.store);
-    for (const { name, element } of this.heads) setWords(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // a covered pane has no text
+    for (const { name, element } of this.heads) setSentence(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // a covered pane has no text
     this.log.draw();
     this.signals.draw(() => signalLines(frame.signals));
     const { head, lines } = peopleLines(store.isSilent ? null : frame.replay ? frame.live?.reach : frame.reach, store.control, store.page);
-    setWords(field(this.monitor, 'head-people'), (frame.replay ? 'live: ' : '') + head);
+    setSentence(field(this.monitor, 'head-people'), (frame.replay ? 'live: ' : '') + head);
     this.people.draw(() => lines);
   }
 
@@ -164,7 +164,7 @@ function liveOf({ event, gap }) {
 
 /** @param {{at_ms: number | null, icon: string, kind: string, title: string, text: string, priority: string | null}} shown */
 function lineOf({ at_ms, icon: glyph, kind, title, text, priority }) {
-  const line = html('li', {}, html('span', { class: 'n' }, timeOfDay(at_ms)), icon(glyph, `s ${kind}`), html('span', { class: 't' }, ...words(title)), html('span', { class: 'm' }, ...words(text)));
+  const line = html('li', {}, html('span', { class: 'n' }, timeOfDay(at_ms)), icon(glyph, `s ${kind}`), html('span', { class: 't' }, ...textNodes(title)), html('span', { class: 'm' }, ...textNodes(text)));
   setAttribute(line, 'data-kind', priority);
   return line;
 }

@@ -1,7 +1,7 @@
 // Starting and ending the recording by hand. While the car moves, or may move, ending it needs a confirmation.
 
 import { addSheet, closeSheet, openSheet } from './sheet.js';
-import { html, icon, listen, words } from '../core/dom.js';
+import { html, icon, listen, textNodes } from '../core/dom.js';
 import { speedWords } from '../core/units.js';
 
 /** As the checks have it [m/s]: slower, the car stands. */
@@ -29,7 +29,7 @@ export function record(on, store, say) {
   const yes = html('button', { type: 'button', class: 'main', 'data-f': 'yes' }, 'End the recording');
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-record', role: 'alertdialog', 'aria-labelledby': 'record-title', 'aria-describedby': 'record-words' },
     html('div', { class: 'bd' }, html('h2', {}, icon('rec'), html('span', { id: 'record-title' }, 'End the recording?')),
-      html('p', { id: 'record-words' }, ...words(`${why} What it does from now on would not be recorded.`))),
+      html('p', { id: 'record-words' }, ...textNodes(`${why} What it does from now on would not be recorded.`))),
     html('div', { class: 'keys' }, yes, html('button', { type: 'button', class: 'key', 'data-f': 'no', autofocus: true }, 'Keep recording'))));
   const take = addSheet(sheet);
   const offSwitch = store.on('switch', () => closeSheet(sheet)); // it was about the car before

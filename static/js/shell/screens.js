@@ -4,7 +4,7 @@ import { areAlarmsInSight, floorQuery, isFloor } from './layout.js';
 import { mountHeadSpeed } from './head-speed.js';
 import { openPreferences } from './preferences.js';
 import { closeSheet, leaveSheet, openSheet } from './sheet.js';
-import { field, html, listen, need, setAttribute, setText, show, words } from '../core/dom.js';
+import { field, html, listen, need, setAttribute, setText, show, textNodes } from '../core/dom.js';
 import { styled } from '../core/style-sheet.js';
 
 /**
@@ -194,7 +194,7 @@ export class Screens {
  */
 function still(sentences) {
   return (root) => {
-    root.replaceChildren(html('div', { class: 'prose' }, ...sentences.map((sentence) => html('p', {}, ...words(sentence)))));
+    root.replaceChildren(html('div', { class: 'prose' }, ...sentences.map((sentence) => html('p', {}, ...textNodes(sentence)))));
     return () => root.replaceChildren();
   };
 }

@@ -1,7 +1,7 @@
 // What a sheet over the values carries in its head: the speed, its age, and the worst alarm.
 
 import { stripOf } from '../alarms/alarm-layout.js';
-import { html, icon, need, setAttribute, setIcon, setText, setWords } from '../core/dom.js';
+import { html, icon, need, setAttribute, setIcon, setText, setSentence } from '../core/dom.js';
 import { age } from '../core/format.js';
 import { mountHeadSpeed } from './head-speed.js';
 import { styled } from '../core/style-sheet.js';
@@ -29,7 +29,7 @@ export function mount(monitor, store) {
     const seen = stripOf(store.frame, { isSilent: store.isSilent, chain: store.chain, paused_s: (store.frame?.session.paused_for_s ?? 0) + store.lag_s });
     setAttribute(head, 'data-kind', seen.kind || null);
     setIcon(mark, seen.icon);
-    setWords(worst, seen.text);
+    setSentence(worst, seen.text);
   }
 
   function place() {

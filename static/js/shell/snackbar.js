@@ -1,7 +1,7 @@
 // Warnings: one snackbar at a time over the rail, until it is acknowledged, shelved or over. The list of alarms needs none.
 
 import { layOut } from '../alarms/alarm-layout.js';
-import { html, icon, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
+import { html, icon, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
 import { areAlarmsInSight } from './layout.js';
 import { Meant } from '../core/meant.js';
 import { openShelve } from '../alarms/shelve.js';
@@ -44,8 +44,8 @@ export function mount(root, store, say) {
     if (!shown) return;
     setAttribute(bar, 'data-priority', shown.priority);
     setIcon(mark, shown.priority === 'advisory' ? 'info' : 'warn');
-    setWords(title, waiting.length > 1 ? `${shown.title} (${waiting.length} alarms)` : shown.title);
-    setWords(text, [snackWords(shown), markWords(shown)].filter(Boolean).join(' · '));
+    setSentence(title, waiting.length > 1 ? `${shown.title} (${waiting.length} alarms)` : shown.title);
+    setSentence(text, [snackWords(shown), markWords(shown)].filter(Boolean).join(' · '));
     show(shelve, shown.active && shown.priority !== 'critical' && shown.actions.includes('shelve'));
     setText(acknowledge, 'Acknowledge');
   }

@@ -1,7 +1,7 @@
 // The one line under the tabs that never moves: the worst of what stands.
 
 import { stripOf } from '../alarms/alarm-layout.js';
-import { field, need, setAttribute, setIcon, setWords } from '../core/dom.js';
+import { field, need, setAttribute, setIcon, setSentence } from '../core/dom.js';
 
 /**
  * @param {HTMLElement} root
@@ -24,8 +24,8 @@ export function mount(root, store) {
     setAttribute(strip, 'data-known', seen.isKnown);
     setAttribute(strip, 'data-opens', seen.opens);
     setIcon(mark, seen.icon);
-    setWords(text, seen.text);
-    setWords(end, seen.end);
+    setSentence(text, seen.text);
+    setSentence(end, seen.end);
     const mode = modeOf(store);
     setAttribute(frame, 'data-mode', mode);
     setAttribute(document.documentElement, 'data-framed', mode !== 'none');

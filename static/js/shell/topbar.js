@@ -1,7 +1,7 @@
 // The top bar: the chain with its state and age, the recorder and its key in the menu. Which car, and who is in control: cars.js, control.js.
 
 import { drawChain } from './chain.js';
-import { field, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { field, listen, need, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { closeSheet } from './sheet.js';
 import { age, duration, timeOfDay } from '../core/format.js';
 import { write } from '../core/ink.js';
@@ -45,7 +45,7 @@ export function mount(root, store, say) {
     const name = view.word === 'Live' && view.isWeak ? 'Weak' : view.word; // a narrow bar has no place for more
     setText(word, name);
     const since = view.age_s === null ? '' : ` ${age(view.age_s)} s`;
-    setWords(wordAge, since.trim());
+    setSentence(wordAge, since.trim());
     setAttribute(link, 'aria-label', `${name}${since}: the link to the car. ${view.sentence}${view.isWeak ? ` ${view.detail}` : ''}`); // begins with what is seen
     setText(clock, timeOfDay(Date.now()));
     const speed_mps = store.signal('speed')?.value?.speed_mps;
@@ -56,7 +56,7 @@ export function mount(root, store, say) {
     const recording = recordingWords((store.heeded ?? frame).recording, store.isSilent); // of the car now, whatever is replayed
     setAttribute(rec, 'data-on', recording.isOn);
     setAttribute(rec, 'title', recording.title);
-    setWords(recFor, recording.text);
+    setSentence(recFor, recording.text);
     order = frame.replay || !store.isMonitoring ? null : recording.order;
     show(key, order !== null);
     setText(keyWords, order === false ? 'End the recording' : 'Start recording');

@@ -3,7 +3,7 @@
 
 import { drawBigChain } from './chain.js';
 import { rewinder } from '../core/draw-proof.js';
-import { field, html, mirror, need, setAttribute, setText, setWords, show, words } from '../core/dom.js';
+import { field, html, mirror, need, setAttribute, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { speedWords } from '../core/units.js';
 import { unseenOf, unseenWords } from '../core/unseen.js';
 import { age, fixed, timeOfDay } from '../core/format.js';
@@ -67,13 +67,13 @@ export function mount(root, store) {
     const isUnsaid = kind === null || store.painter.drawing.isFailed;
     show(chain, !isUnsaid);
     drawBigChain(chain, view);
-    setWords(title, isUnsaid || view.age_s === null ? 'Stale' : `${view.word === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);
+    setSentence(title, isUnsaid || view.age_s === null ? 'Stale' : `${view.word === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);
     const [bold, plain] = isUnsaid ? ['The display is not updating.', 'The page or the server has stopped. Watch the car.'] : [view.sentence, detailOf(view)];
     if (written !== `${bold}|${plain}`) {
-      sentence.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
+      sentence.replaceChildren(html('b', {}, ...textNodes(bold)), ' ', ...textNodes(plain));
       written = `${bold}|${plain}`;
     }
-    setWords(then, [thenWords(store.frame) || 'nothing', store.frame ? unseenWords(unseenOf(store)) : ''].filter(Boolean).join(', '));
+    setSentence(then, [thenWords(store.frame) || 'nothing', store.frame ? unseenWords(unseenOf(store)) : ''].filter(Boolean).join(', '));
     const recording = RECORDED[store.frame?.recording.state ?? 'off'] ?? '';
     setText(rec, recording);
     for (const part of [recName, rec]) show(part, recording !== '');

@@ -1,6 +1,6 @@
 // The panes that only the widest screens have: rate and age of each signal, and who watches this car.
 
-import { html, setAttribute, setWords } from '../core/dom.js';
+import { html, setAttribute, setSentence } from '../core/dom.js';
 import { age, counted, fixed, NOTHING } from '../core/format.js';
 import { ABSENT, isAbsent } from '../core/ink.js';
 import { scale } from '../core/scale.js';
@@ -74,7 +74,7 @@ export class Lines {
       if (!line) return;
       setAttribute(line, 'data-ink', ink ?? null);
       setAttribute(line, 'data-age-of', of ?? null);
-      cells.forEach((text, n) => setWords(/** @type {HTMLElement} */ (line.children[n]), text));
+      cells.forEach((text, n) => setSentence(/** @type {HTMLElement} */ (line.children[n]), text));
     });
   }
 

@@ -1,7 +1,7 @@
 // The banner of a slow-down that starts automatically: over everything, with a key that vetoes it.
 
 import { fixed } from '../core/format.js';
-import { field, listen, need, setText, setWords, show } from '../core/dom.js';
+import { field, listen, need, setText, setSentence, show } from '../core/dom.js';
 import { Meant } from '../core/meant.js';
 import { countdownOf, nameOf } from './slow-layout.js';
 import { ANSWER_MS } from './slow-slides.js';
@@ -42,8 +42,8 @@ export class Countdown {
       this.#meant.moved();
       setText(at('says'), '');
     }
-    setWords(at('title'), coming.title);
-    setWords(at('text'), coming.text);
+    setSentence(at('title'), coming.title);
+    setSentence(at('text'), coming.text);
     setText(at('left'), fixed(coming.left_s));
     at('bar').style.transform = `scaleX(${Math.min(1, coming.left_s / Math.max(0.1, this.#from_s)).toFixed(3)})`;
     this.veto.dataset['trigger'] = coming.trigger;
@@ -71,6 +71,6 @@ export class Countdown {
     if (answer.ok) {
       this.#vetoed = trigger;
       this.banner.close();
-    } else setWords(field(this.banner, 'says'), `${answer.outcome === 'unknown' ? 'Not known whether vetoed' : 'Not vetoed'}: ${answer.reason ?? 'refused.'}`);
+    } else setSentence(field(this.banner, 'says'), `${answer.outcome === 'unknown' ? 'Not known whether vetoed' : 'Not vetoed'}: ${answer.reason ?? 'refused.'}`);
   }
 }

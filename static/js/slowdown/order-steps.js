@@ -1,6 +1,6 @@
 // The steps of a slow-down order on the page, also announced to screen readers.
 
-import { field, html, icon, need, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
+import { field, html, icon, need, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
 import { orderWords, stepsOf } from './slow-layout.js';
 
 /** @typedef {import('../core/protocol-types.js').SlowDownOrder} SlowOrder */
@@ -35,11 +35,11 @@ export class OrderSteps {
       setAttribute(row.item, 'data-mark', mark);
       setIcon(row.mark, MARKS[mark]);
       setText(row.label, label);
-      setWords(row.value, value);
+      setSentence(row.value, value);
     });
     const line = orderWords(order, this.store.isSilent ? 0 : this.store.lag_s);
     setAttribute(this.steps, 'data-kind', line.kind || null);
-    setWords(this.line, this.store.vehicles.length > 1 ? `${this.store.vehicle}: ${line.text}` : line.text);
+    setSentence(this.line, this.store.vehicles.length > 1 ? `${this.store.vehicle}: ${line.text}` : line.text);
   }
 
   /** Announces each change of the order once. @param {SlowOrder | null} order */

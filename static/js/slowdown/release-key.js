@@ -1,6 +1,6 @@
 // The key that releases the car from a slow-down, and the sheet that confirms it.
 
-import { field, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { field, listen, need, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { openSheet } from '../shell/sheet.js';
 import { holdOf, keepWords, nameOf, releaseOf, seenOf } from './slow-layout.js';
 
@@ -45,7 +45,7 @@ export class ReleaseKey {
     setText(field(this.sheet, 'no'), keepWords(seen.now?.state));
     setText(field(this.sheet, 'release-title'), `Release ${nameOf(this.store.vehicle) || 'the car'}?`);
     const standing = this.store.frame?.alarms.filter((alarm) => alarm.priority === 'critical' && alarm.active) ?? [];
-    setWords(field(this.sheet, 'alarms'), standing.length ? `Still active: ${standing.map(({ title }) => title).join(', ')}.` : '');
+    setSentence(field(this.sheet, 'alarms'), standing.length ? `Still active: ${standing.map(({ title }) => title).join(', ')}.` : '');
     openSheet(this.sheet);
   }
 

@@ -1,6 +1,6 @@
 // One slide of the slow-down: the one in the action bar, or the one at the same pixels in an alarm's sheet.
 
-import { field, listen, need, setAttribute, setText, setWords } from '../core/dom.js';
+import { field, listen, need, setAttribute, setText, setSentence } from '../core/dom.js';
 import { scale } from '../core/scale.js';
 import { FAR_ENOUGH, KNOB_PX, Slide } from './slide-layout.js';
 
@@ -49,7 +49,7 @@ export class SlideKey {
     setAttribute(this.slide, 'data-kind', view.kind);
     setAttribute(this.slide, 'aria-label', view.label);
     setText(this.title, this.#hint ? this.#hint[0] : view.title);
-    setWords(this.why, this.#hint ? this.#hint[1] : view.why);
+    setSentence(this.why, this.#hint ? this.#hint[1] : view.why);
   }
 
   get #isMirrored() {

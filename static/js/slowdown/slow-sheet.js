@@ -1,6 +1,6 @@
 // The sheet behind the slow-down's slide: why it is off, what it would command, and the key that arms it. Made when it is wanted.
 
-import { html, icon, setText, setWords, show, words } from '../core/dom.js';
+import { html, icon, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { addSheet, openSheet } from '../shell/sheet.js';
 import { seenOf, sheetOf } from './slow-layout.js';
 
@@ -40,17 +40,17 @@ export function openSlow(store, control) {
   function draw() {
     const seen = sheetOf(seenOf(store), store.lag_s);
     setText(title, seen.title);
-    setWords(text, seen.text);
-    setWords(guard, seen.guard);
+    setSentence(text, seen.text);
+    setSentence(guard, seen.guard);
     guard.toggleAttribute('data-bad', !seen.isGuarded);
     setText(aid, seen.aid);
-    setWords(message, refused || seen.message);
+    setSentence(message, refused || seen.message);
     const key = JSON.stringify([seen.facts, seen.act]);
     if (key === shown) return;
     shown = key;
     show(facts, seen.facts.length > 0);
     facts.replaceChildren(...seen.facts.flatMap(([name, value, isBad]) => [
-      html('dt', {}, name), html('dd', isBad ? { class: 'bad' } : {}, ...(isBad ? [icon('warn', 's'), ' '] : []), html('span', {}, ...words(value))),
+      html('dt', {}, name), html('dd', isBad ? { class: 'bad' } : {}, ...(isBad ? [icon('warn', 's'), ' '] : []), html('span', {}, ...textNodes(value))),
     ]));
     show(keys, seen.act !== null);
     const { act } = seen;

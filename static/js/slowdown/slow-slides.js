@@ -1,6 +1,6 @@
 // The slides that order a slow-down: the one in the action bar and those in the sheets of alarms.
 
-import { field, setWords, show } from '../core/dom.js';
+import { field, setSentence, show } from '../core/dom.js';
 import { SlideKey } from './slide.js';
 import { orderOf, seenOf, slideOf } from './slow-layout.js';
 
@@ -28,7 +28,7 @@ export class SlowSlides {
       const explain = (sentence, title) => {
         if (!message || !sheet?.open) return say(sentence, title);
         show(message, true);
-        setWords(message, `${title}: ${sentence}`);
+        setSentence(message, `${title}: ${sentence}`);
       };
       if (message) sheet.addEventListener('close', () => show(message, false));
       return new SlideKey(slide, {

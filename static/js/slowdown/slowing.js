@@ -1,7 +1,7 @@
 // The slow-down on the page: its slides, the steps of an order, the key that releases the car, its row on Home and its count-down.
 // The texts are in slow-layout.js.
 
-import { field, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { field, listen, need, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { Countdown } from './countdown.js';
 import { OrderSteps } from './order-steps.js';
 import { ReleaseKey } from './release-key.js';
@@ -44,9 +44,9 @@ export function mount(root, store, control, say, shortOf) {
     release.draw(seen, hold);
     steps.draw(orderOf(now));
     const guard = guardWords(now?.guard, store.lag_s);
-    setWords(field(root, 'rail-guard'), seen.isReplay || seen.isSilent ? '' : `${guard.text}.`);
+    setSentence(field(root, 'rail-guard'), seen.isReplay || seen.isSilent ? '' : `${guard.text}.`);
     setText(field(home, 'slow-state'), `Slow-down: ${state}`);
-    setWords(field(home, 'slow-guard'), now?.state === 'not_available' && now.why && !seen.isSilent ? `${now.why} ${guard.text}.` : `${guard.text}.`);
+    setSentence(field(home, 'slow-guard'), now?.state === 'not_available' && now.why && !seen.isSilent ? `${now.why} ${guard.text}.` : `${guard.text}.`);
     setAttribute(home, 'data-state', state);
     show(home, !seen.isReplay); // in a recording it would describe no car
   }
