@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="[NAME=]ws://CAR:9090",
         help="a car to connect to at the start, foxglove://CAR:8765 for a Foxglove server; can be repeated; "
-        "without it the page requests an address",
+        "without it the page prompts for an address",
     )
     parser.add_argument(
         "--only",

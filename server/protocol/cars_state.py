@@ -75,7 +75,7 @@ class ItemHolder(TypedDict):
 
 
 class ItemOffer(TypedDict):
-    """Who is requested to take the item over; it stays where it is until they accept."""
+    """To whom the item is offered; it stays where it is until they accept."""
 
     by: str
     name: str

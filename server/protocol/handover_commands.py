@@ -20,7 +20,7 @@ class OfHandover(OfCar):
     """Part of a hand-over of control; only pages send it."""
 
     needs: ClassVar[Needs] = "operator"
-    passes_replay: ClassVar[bool] = True  # a page that is requested to take over answers
+    passes_replay: ClassVar[bool] = True  # a page that is offered control answers
 
 
 class OfferControl(OfHandover):
@@ -71,7 +71,7 @@ class OfItem(OfCar):
     """Assigns a person to a car that needs one. It arms nothing, and is no control of the car."""
 
     needs: ClassVar[Needs] = "operator"
-    passes_replay: ClassVar[bool] = True  # a page that is requested to take an item over answers
+    passes_replay: ClassVar[bool] = True  # a page that is offered an item answers
     from_fleet: ClassVar[bool] = True
 
 

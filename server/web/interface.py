@@ -27,7 +27,7 @@ PROBLEMS: dict[int, str] = {  # status → when a route answers with it
     415: "The body is of a kind that is not taken",
     416: "The file has no such range",
     422: "A parameter or a field is wrong, as `errors` or `field` names it",
-    429: "Too many requests: the header Retry-After has the time to wait",
+    429: "Too many requests: the header Retry-After has the seconds to wait",
     500: "An error of this server, which its log describes",
     502: "Another server failed: of mail, of the store, or the agent of a car",
     503: "The car, its agent or a disk does not answer",

@@ -558,8 +558,10 @@ async def test_a_fetched_map_is_drawn_named_and_there_without_internet(phone: Ph
             async with looking(phone, car, data=tmp_path / "data", map_upstream=upstream) as it:
                 await it.until("() => document.querySelectorAll('.leaflet-tile-loaded').length >= 2")
                 await expect(it.f("by")).to_have_text("© Testers of maps")
-                fetched = len(source.asked)
-                assert {int(one["path"].split("/")[1]) for one in source.asked} == {18}, "no level but the one in sight"
+                fetched = len(source.requests)
+                assert {int(one["path"].split("/")[1]) for one in source.requests} == {18}, (
+                    "no level but the one in sight"
+                )
             source.kill()
             async with looking(phone, car, data=tmp_path / "data", map_upstream=upstream) as it:
                 await it.until("() => document.querySelectorAll('.leaflet-tile-loaded').length >= 2")
@@ -573,6 +575,6 @@ async def test_a_fetched_map_is_drawn_named_and_there_without_internet(phone: Ph
                 # It comes back by itself: nobody has to move the map.
                 await expect(it.f("by")).to_have_text("© Testers of maps", timeout=45_000)
                 await it.until("() => document.querySelectorAll('.leaflet-tile-loaded').length >= 6")
-                assert len(source.asked) > fetched
+                assert len(source.requests) > fetched
     finally:
         source.kill()

@@ -55,7 +55,7 @@ def of_string(message: Any) -> DriveMode:
         return of_autoware(message)
     if not isinstance(value, str):
         raise Rejected("data is not a string")
-    name = text(message, "data").strip()[:LONGEST_NAME] or "empty"
+    name = text(message, "data").strip()[:LONGEST_NAME] or "(empty)"
     return DriveMode(mode=MODES.get(name.casefold(), "unknown"), text=name)
 
 

@@ -126,7 +126,7 @@ _TABLES: Mapping[str, Table] = {
     "diagnostics": Table(columns=("component", "level", "message"), rows=_components),
     "command": _table(speed_mps="speed [m/s]", tyre_angle_rad="tyre angle [rad]"),
     "fuel": _table(value="level", unit="unit"),
-    "mode": _table(mode="mode", said="as sent"),
+    "mode": _table(mode="mode", text="as sent"),
 }
 TABLES: Mapping[str, Table] = {name: _TABLES.get(name) or _number(signal) for name, signal in SIGNALS.items()}
 

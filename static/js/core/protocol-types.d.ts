@@ -954,7 +954,7 @@ export interface ItemHolder {
   since_ms: number;
 }
 
-/** Who is requested to take the item over; it stays where it is until they accept. */
+/** To whom the item is offered; it stays where it is until they accept. */
 export interface ItemOffer {
   by: string;
   name: string;

@@ -116,7 +116,7 @@ def test_axes_that_cannot_be_known_are_no_value() -> None:
         frames=by,
     )
     assert changed == ()
-    assert "also below mast" in state.snapshot(1.0).unusable["acceleration"].words
+    assert "also below mast" in state.snapshot(1.0).unusable["acceleration"].text
     assert reception.rejected == 1
 
 

@@ -99,7 +99,7 @@ ELSEWHERE = {
     "speed_sources": "tests/monitor/checks/test_speed_sources.py::test_a_drive_whose_sources_disagree_is_one_alarm",
     "position_receiver": "tests/monitor/checks/test_position_sources.py::test_the_sentences",
     "position_sources": "tests/monitor/checks/test_position_sources.py::test_positions_that_part_are_noticed",
-    "phone_missing": "tests/monitor/checks/test_phone.py::test_each_reason_is_said_after_10_s",
+    "phone_missing": "tests/monitor/checks/test_phone.py::test_each_reason_is_reported_after_10_s",
     "phone_tracks": "tests/monitor/checks/test_phone.py::test_the_correlation_has_a_deadband_and_a_setting",
 }
 

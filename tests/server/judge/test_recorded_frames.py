@@ -299,7 +299,7 @@ def test_what_moves_and_contradicts_a_static_transform_is_noticed(tmp_path: Path
     with open_recording([written(tmp_path / "drive", 2, rows)]) as recording:
         run = OfflineRun(recording, judged_drive(recording))
         run.advance(1.0)
-        assert "also below mast" in run.run_state.state.snapshot(run.at_s).unusable["acceleration"].words
+        assert "also below mast" in run.run_state.state.snapshot(run.at_s).unusable["acceleration"].text
 
 
 def test_what_is_not_measured_on_the_car_needs_no_transforms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

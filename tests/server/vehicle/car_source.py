@@ -82,7 +82,7 @@ class CarSource:
 
     def send_now(self, operation: Mapping[str, Any]) -> None:
         if operation["op"] == "publish":
-            self.car.obey(operation["msg"])
+            self.car.follow(operation["msg"])
 
     def beside(self, listener: LinkListener) -> CarSource:
         return self

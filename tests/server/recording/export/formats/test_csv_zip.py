@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from monitor.signals import SIGNALS
+from monitor.values import DriveMode
 from server.bus.event_table import COLUMNS
 from server.recording.export.columns import TABLES
 from server.recording.export.export_format import ExportRefused, Outcome
@@ -67,6 +68,10 @@ def test_every_signal_has_a_table_with_its_units() -> None:
             assert column.isascii(), (name, column)
             assert "[" in column or column in (*without, "message", "unit", "mode", "as sent"), (name, column)
         assert SIGNALS[name].about.endswith(".")
+
+
+def test_a_mode_is_a_row_as_the_car_sent_it() -> None:
+    assert list(TABLES["mode"].rows(DriveMode(mode="manual", text="AUTO_OFF"))) == [("manual", "AUTO_OFF")]
 
 
 ROWS: list[Row] = [
