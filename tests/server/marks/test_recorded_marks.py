@@ -41,7 +41,7 @@ async def test_marks_and_their_media_are_in_the_file_of_the_drive(bridge: RosBri
         assert first["timestamp"] == {"sec": marked_ms // 1000, "nsec": marked_ms % 1000 * 1_000_000}
         assert (first["message"], first["level"]) == (f"Planner: {SHOWN}", 2)
         voice, photo = files["mark-m-1.voice.webm"], files["mark-m-1.photo.jpg"]
-        assert (voice.media_type, voice.data, voice.log_time) == ("audio/webm", VOICE, at_ms * 1_000_000)
+        assert (voice.media_type, voice.data, voice.log_time) == ("audio/webm", VOICE, marked_ms * 1_000_000)
         assert (photo.media_type, photo.data) == ("image/jpeg", PHOTO)
         assert verify(path).state == "intact"
 
