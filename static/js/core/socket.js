@@ -79,9 +79,10 @@ export class PageSocket {
     return asked_ms;
   }
 
-  /** The phone slept: states that were under way look young, for its clock may have stood still. */
+  /** The phone slept: states that were under way look young, for its clock may have stood still; a connection that was being dialled would bring such states too. */
   slept() {
-    if (!this.#takes.areNamed) return; // a former server sends no state before it is taken
+    this.#forsake();
+    if (this.#takes.areNamed === false) return; // a former server sends no state before it is taken
     this.#takes.distrust();
     this.send({ kind: 'take', seq: 0 });
   }

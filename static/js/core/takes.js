@@ -16,7 +16,7 @@ export class Takes {
   #trustedFrom = 0;
   /** States come without an offer: so many may be under way. */
   ahead = 0;
-  /** The server names the take that an offer answers. */
+  /** The server names the take that an offer answers; undefined: nothing is known of it yet. @type {boolean | undefined} */
   areNamed;
   /** When the last frame was requested, or this connection; and whether it is still to come. */
   asked_ms;
@@ -24,8 +24,8 @@ export class Takes {
   /** What waits for its turn: an offer, a state that came ahead. @type {Set<string>} */
   waiting = new Set();
 
-  /** @param {number} dialled_ms @param {number} opened_ms how long a round trip took to connect @param {number} most how many states may come ahead at most @param {boolean} areNamed as over the connection before */
-  constructor(dialled_ms = -Infinity, opened_ms = Infinity, most = 0, areNamed = false) {
+  /** @param {number} dialled_ms @param {number} opened_ms how long a round trip took to connect @param {number} most how many states may come ahead at most @param {boolean} [areNamed] as over the connection before */
+  constructor(dialled_ms = -Infinity, opened_ms = Infinity, most = 0, areNamed = undefined) {
     this.#sent = new Map([[0, dialled_ms]]);
     this.asked_ms = dialled_ms;
     this.#window = new AheadWindow(opened_ms);
