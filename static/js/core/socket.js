@@ -66,7 +66,8 @@ export class PageSocket {
    * @param {import('./protocol-types.js').Offer} offer
    * @param {number} at_ms when it came
    */
-  offered({ took, of }, at_ms) {
+  offered({ seq, took, of }, at_ms) {
+    if (of.includes('state')) this.#takes.stateSeq = seq;
     if (took === undefined) return this.#takes.unnamed();
     const asked_ms = this.#takes.sent_ms(took);
     const isEcho = of.length === 0 && asked_ms > -Infinity;
