@@ -184,6 +184,21 @@ test('a page that knew a fast radio connects over one on which a connection take
   assert.ok(pageSocket.isOpen);
 });
 
+test('one dial in nine is of 16 s where others are of 8 s: a page connects over a radio on which a connection takes 12 s', () => {
+  const { pageSocket, sockets, at } = set();
+  /** @type {number[]} */
+  const began = [];
+  for (let ms = 0; ms < 120_000 && !pageSocket.isOpen; ms += 100) {
+    at(ms);
+    pageSocket.look(ms);
+    if (sockets.length > began.length) began.push(ms);
+    if (ms - Number(began.at(-1)) >= 12_000) sockets.at(-1)?.onopen?.();
+  }
+  assert.ok(pageSocket.isOpen);
+  const gaps = began.slice(1).map((ms, i) => Math.floor((ms - Number(began[i])) / 1000));
+  assert.deepEqual(gaps, [5, 5, 8, 5, 5, 8, 5, 5]);
+});
+
 /** Opens at 0.3 s, as over a radio with a round trip of 0.15 s; a server that sends states ahead. */
 function slow() {
   const one = set();
