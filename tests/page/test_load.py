@@ -115,7 +115,9 @@ async def test_no_script_forces_a_style_or_layout_before_the_first_values(
         await page.close()
     events = json.loads(trace.read_text(encoding="utf-8"))["traceEvents"]
     begun = max(event["ts"] for event in events if event["name"] == "navigationStart")
-    shown = [event for event in events if begun <= event["ts"] < begun + there_us + PAINTED_US and event["name"] in LAID]
+    shown = [
+        event for event in events if begun <= event["ts"] < begun + there_us + PAINTED_US and event["name"] in LAID
+    ]
     assert {event["name"] for event in shown} == LAID, "the trace has what is looked for"
     forced = {
         (event["name"], frames[0]["functionName"], frames[0]["url"].rpartition("/")[2], frames[0]["lineNumber"])
