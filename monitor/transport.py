@@ -33,6 +33,7 @@ OLDEST_S = 30 * 86_400.0  # a stamp that is further behind is of another clock
 PLACE_PERIODS = 2.0  # a mean of a burst is too short
 KEPT_S = 10.0  # the offset of a clock is the least of the last one to two of these: ±200 ppm are 4 ms
 RECENT_S = 3.0  # a topic that was silent for longer shows nothing of the link now …
+LONG_QUEUE = 10  # a longer one bounds the age of its own topic only: a second of messages may have waited in it
 FAST_S = 0.5  # … nor does one that comes less often than this, where others come more often
 USUAL_S = 30.0  # what a link needs when nothing waits is the least round trip of one to two of these …
 USUAL_AT_MOST_S = 1.0
@@ -303,13 +304,10 @@ class TransportDelay:
 
     def late_s(self, now_s: float) -> float:
         """How late is what comes now: the most of the topics that come often."""
-        recent = [
-            (topic.delay_s, topic.period_s is not None and topic.period_s <= FAST_S)
-            for topic in self._topics.values()
-            if topic.at_s is not None and now_s - topic.at_s <= RECENT_S
-        ]
-        fast = [delay_s for delay_s, is_fast in recent if is_fast]
-        return max(fast or [delay_s for delay_s, _ in recent], default=self._trip_s)
+        recent = [topic for topic in self._topics.values() if topic.at_s is not None and now_s - topic.at_s <= RECENT_S]
+        fast = [topic for topic in recent if topic.period_s is not None and topic.period_s <= FAST_S]
+        short = [topic for topic in fast if topic.queue_length <= LONG_QUEUE]
+        return max((topic.delay_s for topic in short or fast or recent), default=self._trip_s)
 
     def delays(self) -> dict[str, float]:
         """How old the newest message of each topic was when it came."""

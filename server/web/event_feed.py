@@ -68,8 +68,11 @@ class EventFeed:
         if self._sent_s == NEVER_S:
             return False
         late_s = max(0.0, self._now() - self._sent_s - trip_s)
-        # A loss makes one batch late, a radio that carries little all of them; it is twice as many at most.
+        # A loss makes one batch late, a radio that carries little all of them; it is twice as many at most, and no more
+        # after a late one: of a radio that has become slow, the next one is late as well, and an alarm waits behind it.
         factor = BATCH_S / max(min(late_s, self._late_s), BATCH_S / 2)
+        if late_s > BATCH_S:
+            factor = min(factor, 1.0)
         is_catching_up = self._is_catching_up
         self._late_s, self._sent_s, self._is_catching_up = late_s, NEVER_S, False
         if is_catching_up or factor < 1:

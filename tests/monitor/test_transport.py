@@ -8,6 +8,7 @@ from monitor.transport import (
     EXCESS_S,
     FAST_S,
     KEPT_S,
+    LONG_QUEUE,
     PLACE_PERIODS,
     RECENT_S,
     SHUT_BYTES,
@@ -253,6 +254,25 @@ def test_the_link_is_as_late_as_the_latest_of_the_frequent_topics() -> None:
     assert link.late_s(10.5) == pytest.approx(0.02)
     assert link.late_s(10.02 + RECENT_S) == pytest.approx(0.02)
     assert link.late_s(10.1 + RECENT_S) == pytest.approx(0.4)  # no frequent one came of late: the others tell
+
+
+def test_a_long_queue_makes_its_own_messages_old_and_the_link_only_where_no_other_topic_comes_often() -> None:
+    def late_s(lengths: dict[str, int]) -> tuple[float, dict[str, float]]:
+        link = opened()
+        for topic, length in lengths.items():
+            link.subscribe(topic, length)
+        for n in range(100):
+            if n % 5 == 0:
+                ping(link, n / 20 - (0.2 if n == 95 else 0.01), n / 20)
+            for topic in lengths:
+                link.receive(topic, n / 20)
+        return link.late_s(4.95), link.delays()
+
+    late, delays = late_s({"/vel": 2, "/mode": LONG_QUEUE + 1})
+    assert late == delays["/vel"] < 0.7
+    assert delays["/mode"] > late + 0.1
+    assert late_s({"/mode": LONG_QUEUE + 1})[0] == pytest.approx(delays["/mode"])
+    assert late_s({"/vel": 2, "/mode": LONG_QUEUE})[0] > late + 0.1
 
 
 def test_without_messages_the_round_trip_tells() -> None:

@@ -83,6 +83,7 @@ test('a connection of a weak radio gets more time, and what was measured holds f
   sockets[0]?.onopen();
   for (const [took_ms, came_ms] of [[2000, 2800], [3000, 4500], [5000, 5700]]) {
     at(Number(took_ms));
+    pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'] }), Number(took_ms));
     pageSocket.send({ kind: 'take', seq: 1 });
     pageSocket.answered(Number(came_ms), 'state');
     pageSocket.answered(Number(came_ms) + 500, 'state'); // a frame that nobody requested has no information about the round trip
@@ -102,12 +103,35 @@ test('a requested message proves the connection, whatever is known of the clocks
   at(40);
   sockets[0]?.onopen();
   at(2400);
+  pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['state'] }), 2400);
   pageSocket.send({ kind: 'take', seq: 1 });
   pageSocket.answered(2450, 'state');
   look(2500, 4900);
   assert.equal(sockets[0]?.isClosed, false);
   look(5000, 5100);
   assert.equal(sockets[0]?.isClosed, true);
+});
+
+test('only what was requested measures the round trip: one of the states that a connection begins with does not answer a take of another kind', () => {
+  const { pageSocket, at, look, sockets } = set();
+  pageSocket.look(0);
+  at(20);
+  sockets[0]?.onopen();
+  const before = pageSocket.trip;
+  pageSocket.offered(/** @type {any} */ ({ seq: 1, of: ['cars'], took: 0 }), 80);
+  at(2400);
+  pageSocket.send({ kind: 'take', seq: 1 });
+  pageSocket.answered(2402, 'state');
+  assert.deepEqual(pageSocket.trip, before);
+  pageSocket.answered(2480, 'cars');
+  assert.deepEqual(pageSocket.trip, { mean_ms: 10 + (80 - 10) / 8, spread_ms: 5 + (70 - 5) / 4 });
+  pageSocket.offered(/** @type {any} */ ({ seq: 2, of: ['cars', 'state'], took: 1 }), 2480);
+  at(2500);
+  pageSocket.send({ kind: 'take', seq: 2 });
+  pageSocket.answered(2580, 'state');
+  assert.equal(pageSocket.trip?.mean_ms, 18.75 + (80 - 18.75) / 8);
+  look(2600, 5000);
+  assert.equal(sockets[0]?.isClosed, false, 'both answers prove the connection');
 });
 
 test('over a good radio that was cut a dial comes every two or three seconds, now and then a longer one', () => {
@@ -158,6 +182,21 @@ test('a page that knew a fast radio connects over one on which a connection take
     if (newest && ms - began.get(newest) >= 4200) newest.onopen?.();
   }
   assert.ok(pageSocket.isOpen);
+});
+
+test('one dial in nine is of 16 s where others are of 8 s: a page connects over a radio on which a connection takes 12 s', () => {
+  const { pageSocket, sockets, at } = set();
+  /** @type {number[]} */
+  const began = [];
+  for (let ms = 0; ms < 120_000 && !pageSocket.isOpen; ms += 100) {
+    at(ms);
+    pageSocket.look(ms);
+    if (sockets.length > began.length) began.push(ms);
+    if (ms - Number(began.at(-1)) >= 12_000) sockets.at(-1)?.onopen?.();
+  }
+  assert.ok(pageSocket.isOpen);
+  const gaps = began.slice(1).map((ms, i) => Math.floor((ms - Number(began[i])) / 1000));
+  assert.deepEqual(gaps, [5, 5, 8, 5, 5, 8, 5, 5]);
 });
 
 /** Opens at 0.3 s, as over a radio with a round trip of 0.15 s; a server that sends states ahead. */

@@ -25,6 +25,7 @@ TRACED = [
     "blink.user_timing",
     *(f"disabled-by-default-devtools.timeline{of}" for of in ("", ".stack")),
 ]
+LAID = {"UpdateLayoutTree", "Layout"}
 PAINTED_US = 50_000  # the picture with the first values is complete by then
 # Live values stand on Home: the time of the page's own clock when they first did.
 WATCH = """() => {
@@ -114,10 +115,13 @@ async def test_no_script_forces_a_style_or_layout_before_the_first_values(
         await page.close()
     events = json.loads(trace.read_text(encoding="utf-8"))["traceEvents"]
     begun = max(event["ts"] for event in events if event["name"] == "navigationStart")
+    shown = [
+        event for event in events if begun <= event["ts"] < begun + there_us + PAINTED_US and event["name"] in LAID
+    ]
+    assert {event["name"] for event in shown} == LAID, "the trace has what is looked for"
     forced = {
         (event["name"], frames[0]["functionName"], frames[0]["url"].rpartition("/")[2], frames[0]["lineNumber"])
-        for event in events
-        if event["name"] in ("UpdateLayoutTree", "Layout") and begun <= event["ts"] < begun + there_us + PAINTED_US
+        for event in shown
         if (frames := stack_of(event)) and watch.address in frames[0]["url"]
     }
     assert not forced

@@ -262,9 +262,16 @@ def test_a_minute_of_a_fair_radio_is_no_alarm() -> None:
     assert seen.steps == [(0.0, 0)]
 
 
+def test_a_change_of_the_mode_is_not_lost_while_the_link_takes_nothing_for_more_than_a_second() -> None:
+    link = even(lambda at_s: 1.0 if 5.0 <= at_s < 6.3 else 250_000.0)
+    sent_s = [one.at_s - one.true_s for one in run(link, queued_car(), lasts_s=8.0, seed=1) if one.topic == "/mode"]
+    assert len(sent_s) > 100
+    assert max(b - a for a, b in pairwise(sent_s)) == pytest.approx(0.05)
+
+
 @pytest.mark.parametrize(("seed", "jitter_s", "loss"), [(1, 0.08, 0.06), (3, 0.04, 0.02)])
 def test_a_link_that_becomes_a_fair_radio_is_no_alarm(seed: int, jitter_s: float, loss: float) -> None:
-    """With queues of up to ten messages, before round trips that vary."""
+    """With queues as they are subscribed to, before round trips that vary."""
     rng = random.Random(seed)
 
     def way_s(at_s: float) -> float:

@@ -84,6 +84,6 @@ TOPICS = (
             **dict.fromkeys(REPORTS, of_autoware),
         },
         by_type=REPORTS,
-        queue_length=10,
+        queue_length=20,
     ),
 )

@@ -2,8 +2,10 @@
 
 /** Of so many dials in a row one gets twice the time, and that of an unknown radio at least: it may be another one than was measured. */
 const DIALS_A_LONG_ONE = 3;
-/** No dial takes longer: the system repeats its request after 4, 6 and 10 s, or after 3, 7 and 15 s, and each dial makes one at once [ms]. */
+/** No other dial takes longer: the system repeats its request after 4, 6 and 10 s, or after 3, 7 and 15 s, and each dial makes one at once [ms]. */
 const LONGEST_DIAL_MS = 8000;
+/** Where dials take as long, one of so many in a row gets twice that: a connection, TLS and upgrade may need it. */
+const DIALS_A_LONGEST_ONE = 9;
 /** Least time from one dial to the next [ms]. */
 const FIRST_WAIT_MS = 300;
 const LAST_WAIT_MS = 2000;
@@ -57,7 +59,10 @@ export class Dials {
 
   /** After so long one that does not open is given up. @param {number} dial_ms @param {number} longest_ms */
   limit_ms(dial_ms, longest_ms) {
-    return this.#failed % DIALS_A_LONG_ONE === DIALS_A_LONG_ONE - 1 ? Math.min(LONGEST_DIAL_MS, Math.max(2 * dial_ms, longest_ms)) : dial_ms;
+    const dials = this.#failed + 1;
+    if (dials % DIALS_A_LONG_ONE) return dial_ms;
+    const limit_ms = Math.min(LONGEST_DIAL_MS, Math.max(2 * dial_ms, longest_ms));
+    return limit_ms === LONGEST_DIAL_MS && dials % DIALS_A_LONGEST_ONE === 0 ? 2 * limit_ms : limit_ms;
   }
 
   /** @param {number} now_ms */

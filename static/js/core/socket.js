@@ -66,7 +66,8 @@ export class PageSocket {
    * @param {import('./protocol-types.js').Offer} offer
    * @param {number} at_ms when it came
    */
-  offered({ took, of }, at_ms) {
+  offered({ seq, took, of }, at_ms) {
+    if (of.includes('state')) this.#takes.stateSeq = seq;
     if (took === undefined) return this.#takes.unnamed();
     const asked_ms = this.#takes.sent_ms(took);
     const isEcho = of.length === 0 && asked_ms > -Infinity;
@@ -79,9 +80,10 @@ export class PageSocket {
     return asked_ms;
   }
 
-  /** The phone slept: states that were under way look young, for its clock may have stood still. */
+  /** The phone slept: states that were under way look young, for its clock may have stood still; a connection that was being dialled would bring such states too. */
   slept() {
-    if (!this.#takes.areNamed) return; // a former server sends no state before it is taken
+    this.#forsake();
+    if (this.#takes.areNamed === false) return; // a former server sends no state before it is taken
     this.#takes.distrust();
     this.send({ kind: 'take', seq: 0 });
   }

@@ -270,8 +270,8 @@ export class Store extends Known {
     this.#emitter.emit('tick');
   }
 
-  #woke = () => void (this.#watch.slept_ms(this.now()) > 2000 && this.frame && this.#cover());
-  #cover = () => void [this.deadMan.cover(), this.socket.slept()];
+  #woke = () => void (this.#watch.slept_ms(this.now()) > 2000 && this.#cover());
+  #cover = () => void [this.frame && this.deadMan.cover(), this.socket.slept()]; // before the first frame there is nothing to cover
 
   /** Hidden, frozen or back: the veil comes first, whatever the clocks say. @param {boolean} isBack @param {boolean} isRestored */
   #slept(isBack, isRestored) {

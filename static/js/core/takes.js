@@ -16,16 +16,19 @@ export class Takes {
   #trustedFrom = 0;
   /** States come without an offer: so many may be under way. */
   ahead = 0;
-  /** The server names the take that an offer answers. */
+  /** The server names the take that an offer answers; undefined: nothing is known of it yet. @type {boolean | undefined} */
   areNamed;
   /** When the last frame was requested, or this connection; and whether it is still to come. */
   asked_ms;
   isOwed = false;
+  /** The newest offer of a state; and whether that is what was requested: others come unasked. */
+  stateSeq = NaN;
+  #isStateOwed = false;
   /** What waits for its turn: an offer, a state that came ahead. @type {Set<string>} */
   waiting = new Set();
 
-  /** @param {number} dialled_ms @param {number} opened_ms how long a round trip took to connect @param {number} most how many states may come ahead at most @param {boolean} areNamed as over the connection before */
-  constructor(dialled_ms = -Infinity, opened_ms = Infinity, most = 0, areNamed = false) {
+  /** @param {number} dialled_ms @param {number} opened_ms how long a round trip took to connect @param {number} most how many states may come ahead at most @param {boolean} [areNamed] as over the connection before */
+  constructor(dialled_ms = -Infinity, opened_ms = Infinity, most = 0, areNamed = undefined) {
     this.#sent = new Map([[0, dialled_ms]]);
     this.asked_ms = dialled_ms;
     this.#window = new AheadWindow(opened_ms);
@@ -70,15 +73,15 @@ export class Takes {
 
   /** A frame came; whether that was requested. @param {boolean} isState */
   got(isState) {
-    const { isOwed } = this;
     if (isState) this.#got += 1;
-    this.isOwed = false;
-    return isOwed;
+    const isAnswer = this.isOwed && (!isState || this.#isStateOwed);
+    if (isAnswer) this.isOwed = false;
+    return isAnswer;
   }
 
-  /** A take with its number, and how many states may be under way, after so many. @param {object} take @param {number} at_ms */
+  /** A take with its number, and how many states may be under way, after so many. @param {{seq?: number}} take @param {number} at_ms */
   counted(take, at_ms) {
-    [this.asked_ms, this.isOwed] = [at_ms, true];
+    [this.asked_ms, this.isOwed, this.#isStateOwed] = [at_ms, true, take.seq === this.stateSeq];
     this.#count += 1;
     this.#sent.set(this.#count, at_ms);
     this.#sent.delete(this.#count - KEPT_TAKES);

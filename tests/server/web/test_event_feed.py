@@ -90,8 +90,8 @@ async def test_batches_grow_while_a_page_has_them_quickly_and_a_slow_one_gets_wh
 
 
 async def test_one_late_answer_is_a_loss_and_two_are_a_radio_that_carries_little() -> None:
-    assert await sizes_of((0.1, 2.0, 0.1, 1.4, 0.1)) == [10, 20, 40, 80, 160, 320]
-    assert await sizes_of((0.1, 0.1, 0.1, 2.0, 2.0)) == [10, 20, 40, 80, 160, 40]
+    assert await sizes_of((0.1, 2.0, 0.1, 1.4, 0.1)) == [10, 20, 20, 40, 40, 80], "after a late one, none is longer"
+    assert await sizes_of((0.1, 0.1, 0.1, 2.0, 2.0)) == [10, 20, 40, 80, 80, 20]
 
 
 async def test_what_counts_is_the_time_beyond_the_round_trip() -> None:
