@@ -103,7 +103,7 @@ def _people(board: DutyBoard) -> dict[str, Any]:
 def _row(one: Person) -> dict[str, Any]:
     row: dict[str, Any] = {"id": one.id, "name": one.name, "role": one.role, "changed_ms": one.changed_ms}
     row |= {name: at_ms for name in ("last_ms", "off_ms") if (at_ms := getattr(one, name)) is not None}
-    return row | ({"former": list(one.former)} if one.former else {})
+    return row | ({"former": list(one.former)} if one.former else {}) | ({"was": one.was} if one.was else {})
 
 
 def _duties(board: DutyBoard) -> dict[str, Any]:
@@ -137,7 +137,7 @@ def _take_duties(board: DutyBoard, found: Mapping[str, Any]) -> None:
 
 def person_of(id: str, row: Mapping[str, Any]) -> Person:
     """Raises Refused, ValueError, TypeError, KeyError where it is none."""
-    last_ms, off_ms = row.get("last_ms"), row.get("off_ms")
+    last_ms, off_ms, was = row.get("last_ms"), row.get("off_ms"), row.get("was")
     return Person(
         id=entry_id(id),
         name=person_name(row["name"]),
@@ -146,6 +146,7 @@ def person_of(id: str, row: Mapping[str, Any]) -> Person:
         off_ms=None if off_ms is None else time_ms(off_ms),
         former=tuple(person_name(one) for one in row.get("former", ())[:MOST_FORMER]),
         changed_ms=time_ms(row.get("changed_ms", 0)),
+        was=None if was is None else entry_id(was),
     )
 
 

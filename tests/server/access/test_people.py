@@ -189,6 +189,20 @@ async def test_former_names_and_who_was_removed_survive_a_restart(tmp_path: Path
     assert again.sent(None)["duties"] == {"Anna K.": None, "A. K.": None, "B. K.": clock()}
 
 
+async def test_who_was_removed_is_added_again_by_a_request_that_says_so(tmp_path: Path) -> None:
+    async with paired_server(keyed(tmp_path)) as served, served.paired(Role.OPERATOR) as phone:
+        ann = await add(phone, "A. K.")
+        await phone.post("/api/duty", json={"person": ann})
+        await phone.delete("/api/duty")
+        await phone.delete(f"/api/people/{ann}")
+        refused = await phone.post("/api/people", json={"name": "A. K."})
+        assert refused.status_code == 409
+        assert "Repeat it if it is the same person." in refused.json()["detail"]
+        again = (await phone.post("/api/people", json={"name": "A. K.", "returns": True})).json()["added"]
+        stated = People(tmp_path, wall_ms=lambda: 0)  # as after a restart
+        assert (stated.board.people[again].was, list(stated.sent(None)["duties"])) == (ann, ["A. K."])
+
+
 @pytest.mark.parametrize("name", ["people.toml", "duty.toml"])
 @pytest.mark.parametrize(
     "content",

@@ -93,6 +93,24 @@ async def test_who_is_removed_at_one_node_while_on_duty_at_the_other_is_off_duty
     assert "was removed from the list" in ended["text"]
 
 
+async def test_who_is_added_again_is_the_same_person_at_each_node() -> None:
+    one, two = Node(), Node()
+    ann = await one.people.add("A. K.", "operator")
+    await one.people.sign_on("phone", "Pixel", ann, None, moves=False)
+    two.hear(one)
+    one.ms = two.ms = 2000
+    await one.people.sign_off("phone")
+    await one.people.remove(ann)
+    two.hear(one)
+    again = await one.people.add("A. K.", "operator", returns=True)
+    await one.people.change(again, name="Anna", role=None)
+    one.ms = two.ms = 3000
+    await one.people.sign_on("phone", "Pixel", again, None, moves=False)
+    two.hear(one)
+    for node in (one, two):
+        assert node.people.sent("phone")["duties"] == {"Anna": None, "A. K.": None}
+
+
 @pytest.mark.parametrize(
     ("key", "value"),
     [
