@@ -119,12 +119,13 @@ class DutyBoard:
 
     def forget(self, id: str, at_ms: int) -> None:
         """This person is not in the list any more, nor on duty, and nobody brings them back; of the removed so many
-        are kept."""
+        are kept, and those whose duty ended lately as they were."""
         if (entry := self.duty_of(id)) is not None:  # as another web node removed them
             why = "Who was on duty here was removed from the list of people: nobody is on duty here now."
             self._end(entry, why, max(at_ms, entry.changed_ms + 1))
         if (person := self.people.pop(id, None)) is not None:
-            self.gone = dict([*self.gone.items(), (id, person)][-2 * MOST_PEOPLE :])
+            gone = [one for one in (*self.gone.values(), person) if one.is_lately_off(at_ms)]
+            self.gone = {one.id: one for one in gone[-MOST_PEOPLE:]}
         self.removed = dict([*self.removed.items(), (id, at_ms)][-2 * MOST_PEOPLE :])
 
     def person(self, id: str) -> Person:

@@ -249,3 +249,16 @@ def test_of_former_names_the_last_ones_are_known(board: DutyBoard) -> None:
     for number, name in enumerate(("B", "C", "A. K.", "D", "E")):
         board.change("ak", name=name, role=None, now_ms=1000 + number)
     assert board.people["ak"].former == ("D", "A. K.", "C")
+
+
+def test_of_the_removed_those_are_kept_whose_duty_ended_lately(board: DutyBoard) -> None:
+    for number in range(MOST_PEOPLE + 2):
+        board.people[f"p{number}"] = Person(id=f"p{number}", name=f"P {number}", off_ms=1000)
+        board.forget(f"p{number}", 2000)
+    assert list(board.gone) == [f"p{number}" for number in range(2, MOST_PEOPLE + 2)]
+    board.remove("mr", 3000)  # never on duty: nothing bears the name
+    assert "mr" not in board.gone
+    board.sign_on("phone", "Pixel 7", "ak", None, 4000)
+    board.sign_off("phone", 1000 + OFF_STATED_MS)
+    board.remove("ak", 1000 + OFF_STATED_MS)
+    assert list(board.gone) == ["ak"]
