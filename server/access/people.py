@@ -58,6 +58,7 @@ class People:
             "person": None if found is None else {"name": found.name, "role": found.role, "device": device},
             "supervisors": names[:MOST_LISTED],
             "duties": self.board.stated(self._wall_ms()),
+            "listed": len(self.board.people),
         }
 
     def duty_of(self, device: str | None, device_name: str) -> Duty:

@@ -128,6 +128,16 @@ async def test_only_who_is_on_duty_takes_it_while_people_sign_on(who: dict[str, 
     assert listed(car)[2] is None
 
 
+async def test_once_the_list_is_emptied_who_never_signed_on_takes_it() -> None:
+    """Who was removed is still stated as off duty, and nobody can sign on."""
+    car = await left()
+    await car.obeyed(SEEN | BEN | {"duties": {"A. K.": OFF_MS}, "listed": 1}, "present")
+    assert "Sign on first" in await car.refused(BEN, "take_alarm", **TAKE)
+    await car.obeyed(SEEN | BEN | {"duties": {"A. K.": OFF_MS}, "listed": 0}, "present")
+    await car.obeyed(BEN, "take_alarm", **TAKE)
+    assert listed(car)[:2] == ("ACKED", "Ben")
+
+
 async def test_nobody_takes_what_has_an_owner_or_was_raised_again() -> None:
     car = await acknowledged()
     assert "is not off duty" in await car.refused(BEN | MR, "take_alarm", **TAKE)
