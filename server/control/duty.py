@@ -21,9 +21,10 @@ MOST_FORMER = 3  # names of a person who was renamed
 LONGEST_NAME = 30
 ENDS_AFTER_H = 12.0
 ENDS_WITHIN_H = (1.0, 24.0)
-NOTE_LASTS_MS = 86_400_000  # that a duty ended is shown for a day
+DAY_MS = 86_400_000
+NOTE_LASTS_MS = DAY_MS  # that a duty ended is shown for a day
 MOST_DUTIES = 100
-OFF_STATED_MS = 7 * 86_400_000  # for so long each request to a car states that a duty ended
+OFF_STATED_MS = 7 * DAY_MS  # for so long each request to a car states that a duty ended
 HOUR_MS = 3_600_000
 
 
@@ -104,8 +105,13 @@ class DutyBoard:
         person = self.person(id)
         new_name = person.name if name is None else self._free_name(name, now_ms, but=id)
         new_role = person.role if role is None else role_of(role)
-        former = tuple(one for one in dict.fromkeys((person.name, *person.former)) if one != new_name)[:MOST_FORMER]
-        changed = replace(person, name=new_name, role=new_role, former=former, changed_ms=now_ms)
+        former = tuple(one for one in dict.fromkeys(person.names) if one != new_name)
+        if len(former) > MOST_FORMER and (self.duty_of(id) is not None or person.is_lately_off(now_ms)):
+            raise Refused(
+                f"{person.name} had {MOST_FORMER} other names, and {former[-1]} names what they acknowledged: another "
+                f"name is possible {OFF_STATED_MS // DAY_MS} days after their last duty."
+            )
+        changed = replace(person, name=new_name, role=new_role, former=former[:MOST_FORMER], changed_ms=now_ms)
         self.people[id] = changed
         return changed
 

@@ -262,3 +262,17 @@ def test_of_the_removed_those_are_kept_whose_duty_ended_lately(board: DutyBoard)
     board.sign_off("phone", 1000 + OFF_STATED_MS)
     board.remove("ak", 1000 + OFF_STATED_MS)
     assert list(board.gone) == ["ak"]
+
+
+def test_a_name_that_is_stated_is_not_dropped_by_a_rename(board: DutyBoard) -> None:
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    for name in ("B", "C", "D"):
+        board.change("ak", name=name, role=None, now_ms=2000)
+    for now_ms in (3000, 4000 + OFF_STATED_MS - 1):
+        with pytest.raises(Refused, match=r"D had 3 other names, and A\. K\. names what they acknowledged"):
+            board.change("ak", name="E", role=None, now_ms=now_ms)
+        board.sign_off("phone", 4000)
+    board.change("ak", name="B", role="supervisor", now_ms=5000)  # a former name is none more
+    assert board.stated(5000) == {"A. K.": 4000, "B": 4000, "C": 4000, "D": 4000}
+    board.change("ak", name="E", role=None, now_ms=4000 + OFF_STATED_MS)
+    assert board.people["ak"].former == ("B", "D", "C")
