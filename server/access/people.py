@@ -58,6 +58,7 @@ class People:
             "person": None if found is None else {"name": found.name, "role": found.role, "device": device},
             "supervisors": names[:MOST_LISTED],
             "duties": self.board.stated(self._wall_ms()),
+            "listed": len(self.board.people),
         }
 
     def duty_of(self, device: str | None, device_name: str) -> Duty:
@@ -105,9 +106,9 @@ class People:
 
     # -- changes: each counts at once, and returns once the disk has it ------------------------------------------------
 
-    async def add(self, name: object, role: object) -> str:
-        """The id of the new person. Raises Refused, OSError."""
-        person = self.board.add(secrets.token_hex(4), name, role, self._wall_ms())
+    async def add(self, name: object, role: object, *, returns: bool = False) -> str:
+        """The id of the new person; `returns`: who was removed under this name. Raises Refused, OSError."""
+        person = self.board.add(secrets.token_hex(4), name, role, self._wall_ms(), returns=returns)
         await self._keep(PEOPLE_FILE)
         return person.id
 

@@ -36,6 +36,8 @@ FOLDER = "people"
 PEOPLE_FILE = "people.toml"
 DUTY_FILE = "duty.toml"
 _TIMES = 2**53
+_BAD = (Refused, ValueError, TypeError, KeyError, AttributeError)  # what a row that cannot be used raises
+_MAX_BYTES = 2 * bounded_toml.MAX_BYTES  # full lists of long names, each letter of four bytes
 
 
 class PeopleFiles:
@@ -54,13 +56,13 @@ class PeopleFiles:
             path = self._folder / name
             try:
                 with open(path, "rb") as file:
-                    content = file.read(bounded_toml.MAX_BYTES + 1)
-                take(board, bounded_toml.loads(content))
+                    content = file.read(_MAX_BYTES + 1)
+                take(board, bounded_toml.loads(content, max_bytes=_MAX_BYTES))
             except FileNotFoundError:
                 continue
             except OSError as why:
                 self._complain(f"{name} cannot be read ({why.strerror or why}){self._set_aside(path)}.")
-            except (bounded_toml.BadToml, Refused, ValueError, TypeError, KeyError, AttributeError) as why:
+            except (bounded_toml.BadToml, *_BAD) as why:
                 sentence = why.reason if isinstance(why, Refused) else str(why)
                 self._complain(f"{name} cannot be used{self._set_aside(path)}: {sentence[:200]}")
 
@@ -103,7 +105,7 @@ def _people(board: DutyBoard) -> dict[str, Any]:
 def _row(one: Person) -> dict[str, Any]:
     row: dict[str, Any] = {"id": one.id, "name": one.name, "role": one.role, "changed_ms": one.changed_ms}
     row |= {name: at_ms for name in ("last_ms", "off_ms") if (at_ms := getattr(one, name)) is not None}
-    return row | ({"former": list(one.former)} if one.former else {})
+    return row | ({"former": list(one.former)} if one.former else {}) | ({"was": one.was} if one.was else {})
 
 
 def _duties(board: DutyBoard) -> dict[str, Any]:
@@ -120,12 +122,16 @@ def _duties(board: DutyBoard) -> dict[str, Any]:
 
 def _take_people(board: DutyBoard, found: Mapping[str, Any]) -> None:
     board.set_hours(float(found.get("ends_after_h", board.ends_after_h)), time_ms(found.get("changed_ms", 0)))
-    board.removed = {str(id)[:40]: time_ms(at_ms) for id, at_ms in found.get("removed", {}).items()}
+    board.removed = {str(id)[:60]: time_ms(at_ms) for id, at_ms in found.get("removed", {}).items()}
     for row in found.get("people", [])[:MOST_PEOPLE]:
         person = person_of(str(row.get("id") or secrets.token_hex(4)), row)
         board.people[person.id] = person
-    for row in found.get("gone", [])[: 2 * MOST_PEOPLE]:
-        person = person_of(row["id"], row)
+    for row in found.get("gone", [])[-MOST_PEOPLE:]:
+        try:
+            person = person_of(row["id"], row)
+        except _BAD as why:  # the list itself can be used
+            log.error("removed_person_not_read why=%r", str(why)[:200])
+            continue
         board.gone[person.id] = person
 
 
@@ -137,7 +143,7 @@ def _take_duties(board: DutyBoard, found: Mapping[str, Any]) -> None:
 
 def person_of(id: str, row: Mapping[str, Any]) -> Person:
     """Raises Refused, ValueError, TypeError, KeyError where it is none."""
-    last_ms, off_ms = row.get("last_ms"), row.get("off_ms")
+    last_ms, off_ms, was = row.get("last_ms"), row.get("off_ms"), row.get("was")
     return Person(
         id=entry_id(id),
         name=person_name(row["name"]),
@@ -146,6 +152,7 @@ def person_of(id: str, row: Mapping[str, Any]) -> Person:
         off_ms=None if off_ms is None else time_ms(off_ms),
         former=tuple(person_name(one) for one in row.get("former", ())[:MOST_FORMER]),
         changed_ms=time_ms(row.get("changed_ms", 0)),
+        was=None if was is None else entry_id(was),
     )
 
 

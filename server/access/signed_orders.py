@@ -41,7 +41,9 @@ TOO_OLD = "This order was signed too long ago, and was not carried out. Give it 
 REPLAYED = "This order was carried out before: it was sent a second time, and refused."
 TOO_MANY = "Too many orders came at once: wait some seconds."
 FULL = "Too many devices have given orders to this car: no new one is taken."
-_SENDER = frozenset({"by", "who", "page", "person", "supervisors", "duties", "replaying", "console", "signed"})
+_SENDER = frozenset(
+    {"by", "who", "page", "person", "supervisors", "duties", "listed", "replaying", "console", "signed"}
+)
 
 
 class Challenges:
@@ -156,6 +158,7 @@ class SignedOrders:
             "person": _person(message, text),
             "supervisors": message.get("supervisors"),  # as the node states; it grants no right
             "duties": message.get("duties"),
+            "listed": message.get("listed"),
             "console": False,
             "replaying": message.get("replaying"),
         }

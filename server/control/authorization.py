@@ -41,18 +41,20 @@ class Caller:
     person: OnDuty | None = None  # who is on duty at the device that sends
     supervisors: tuple[str, ...] | None = None  # who is on duty as such, anywhere; None: not known
     duties: Mapping[Any, Any] | None = None  # name → when their duty ended, None: on duty; not checked so far
+    listed: int | None = None  # how many are in the list of people; None: not known
 
     @classmethod
     def of(cls, message: Mapping[str, Any]) -> Caller:
         page, fence = message.get("page"), message.get("fence")
         device = display_name.clean(message.get("by")) or display_name.NAMELESS
-        person, duties = on_duty(message.get("person")), message.get("duties")
+        person, duties, listed = on_duty(message.get("person")), message.get("duties"), message.get("listed")
         return cls(
             name=device if person is None else display_name.with_person(person.name, device),
             device=device,
             person=person,
             supervisors=_supervisors(message.get("supervisors")),
             duties=duties if isinstance(duties, Mapping) else None,
+            listed=listed if type(listed) is int else None,
             who=str(message.get("who") or ""),
             page=page if isinstance(page, str) else None,
             fence=fence if type(fence) is int and 0 <= fence <= MAX_FENCE else None,
@@ -97,6 +99,7 @@ class Authorization:
         self._on_duty: dict[tuple[str, str], OnDuty | None] = {}  # by page, as logged last
         self._supervisors: tuple[tuple[str, ...], float] | None = None  # and when it was stated
         self._duties: Mapping[Any, Any] = {}  # as stated last
+        self._listed: int | None = None  # people, as stated last
         self._off_ms: dict[str, int] = {}  # by name, when their duty ended; who was removed since stays
 
     def tick(self, now_s: float) -> bool:
@@ -189,6 +192,8 @@ class Authorization:
     def _take_duties(self, caller: Caller, now_s: float) -> None:
         if caller.supervisors is not None:
             self._supervisors = caller.supervisors, now_s
+        if caller.listed is not None:
+            self._listed = caller.listed
         if caller.duties is None or caller.duties == self._duties:
             return
         self._duties = caller.duties
@@ -205,8 +210,8 @@ class Authorization:
 
     @property
     def has_people(self) -> bool:
-        """Whether anybody is on duty or was lately, as last stated."""
-        return bool(self._duties)
+        """Whether anybody is on duty or was lately, and somebody can sign on, as last stated."""
+        return bool(self._duties) and self._listed != 0
 
     def supervisors(self, now_s: float) -> tuple[str, ...] | None:
         """Who is on duty as supervisor; None: no page states it now."""

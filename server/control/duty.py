@@ -21,9 +21,10 @@ MOST_FORMER = 3  # names of a person who was renamed
 LONGEST_NAME = 30
 ENDS_AFTER_H = 12.0
 ENDS_WITHIN_H = (1.0, 24.0)
-NOTE_LASTS_MS = 86_400_000  # that a duty ended is shown for a day
+DAY_MS = 86_400_000
+NOTE_LASTS_MS = DAY_MS  # that a duty ended is shown for a day
 MOST_DUTIES = 100
-OFF_STATED_MS = 7 * 86_400_000  # for so long each request to a car states that a duty ended
+OFF_STATED_MS = 7 * DAY_MS  # for so long each request to a car states that a duty ended
 HOUR_MS = 3_600_000
 
 
@@ -51,6 +52,15 @@ class Person:
     off_ms: int | None = None  # when their last duty ended
     former: tuple[str, ...] = ()  # names before, the newest first: what they signed bears them
     changed_ms: int = 0
+    was: str | None = None  # id under which they were removed, before they were added again
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (self.name, *self.former)
+
+    def is_lately_off(self, now_ms: int) -> bool:
+        """Whether their last duty ended so lately that it is stated."""
+        return self.off_ms is not None and now_ms - self.off_ms < OFF_STATED_MS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,19 +89,29 @@ class DutyBoard:
 
     # -- the list ----------------------------------------------------------------------------------------------------
 
-    def add(self, id: str, name: object, role: object, now_ms: int) -> Person:
+    def add(self, id: str, name: object, role: object, now_ms: int, *, returns: bool = False) -> Person:
+        """`returns`: who was removed from the list under this name is the same person."""
         if len(self.people) >= MOST_PEOPLE:
             raise Refused(f"The list has at most {MOST_PEOPLE} people: remove one first.")
-        person = Person(id=id, name=self._free_name(name), role=role_of(role), changed_ms=now_ms)
+        new_name = self._free_name(name, now_ms, returns=returns)
+        person = Person(id=id, name=new_name, role=role_of(role), changed_ms=now_ms)
+        if (before := self._removed_as(new_name, now_ms)) is not None:
+            former = tuple(one for one in before.names if one != new_name)
+            person = replace(person, last_ms=before.last_ms, off_ms=before.off_ms, former=former, was=before.id)
         self.people[id] = person
         return person
 
     def change(self, id: str, *, name: object, role: object, now_ms: int) -> Person:
         person = self.person(id)
-        new_name = person.name if name is None else self._free_name(name, but=id)
+        new_name = person.name if name is None else self._free_name(name, now_ms, but=id)
         new_role = person.role if role is None else role_of(role)
-        former = tuple(one for one in dict.fromkeys((person.name, *person.former)) if one != new_name)[:MOST_FORMER]
-        changed = replace(person, name=new_name, role=new_role, former=former, changed_ms=now_ms)
+        former = tuple(one for one in dict.fromkeys(person.names) if one != new_name)
+        if len(former) > MOST_FORMER and (self.duty_of(id) is not None or person.is_lately_off(now_ms)):
+            raise Refused(
+                f"{person.name} had {MOST_FORMER} other names, and {former[-1]} names what they acknowledged: another "
+                f"name is possible {OFF_STATED_MS // DAY_MS} days after their last duty."
+            )
+        changed = replace(person, name=new_name, role=new_role, former=former[:MOST_FORMER], changed_ms=now_ms)
         self.people[id] = changed
         return changed
 
@@ -105,12 +125,13 @@ class DutyBoard:
 
     def forget(self, id: str, at_ms: int) -> None:
         """This person is not in the list any more, nor on duty, and nobody brings them back; of the removed so many
-        are kept."""
+        are kept, and those whose duty ended lately as they were."""
         if (entry := self.duty_of(id)) is not None:  # as another web node removed them
             why = "Who was on duty here was removed from the list of people: nobody is on duty here now."
             self._end(entry, why, max(at_ms, entry.changed_ms + 1))
         if (person := self.people.pop(id, None)) is not None:
-            self.gone = dict([*self.gone.items(), (id, person)][-2 * MOST_PEOPLE :])
+            gone = [one for one in (*self.gone.values(), person) if one.is_lately_off(at_ms)]
+            self.gone = {one.id: one for one in gone[-MOST_PEOPLE:]}
         self.removed = dict([*self.removed.items(), (id, at_ms)][-2 * MOST_PEOPLE :])
 
     def person(self, id: str) -> Person:
@@ -125,13 +146,29 @@ class DutyBoard:
             raise Refused(f"A duty ends after {low:.0f} to {high:.0f} h.")
         self.ends_after_h, self.hours_changed_ms = hours, now_ms
 
-    def _free_name(self, name: object, but: str | None = None) -> str:
+    def _free_name(self, name: object, now_ms: int, *, but: str | None = None, returns: bool = False) -> str:
+        """A name under which nobody else has acknowledged anything lately."""
         cleaned = person_name(name)
-        same = unicodedata.normalize("NFKC", cleaned).casefold()
         for one in self.people.values():
-            if one.id != but and unicodedata.normalize("NFKC", one.name).casefold() == same:
+            if one.id == but:
+                continue
+            if _is_same(cleaned, one.name):
                 raise Refused(f"{one.name} is in the list already.")
+            if one.last_ms is not None and any(_is_same(cleaned, former) for former in one.former):
+                raise Refused(f"{cleaned} is a former name of {one.name}, and names what they acknowledged.")
+        if not returns and self._removed_as(cleaned, now_ms) is not None:
+            same = "" if but else " Repeat it if it is the same person."
+            raise Refused(f"{cleaned} was removed lately, and names what they acknowledged.{same}")
         return cleaned
+
+    def _removed(self, now_ms: int) -> list[Person]:
+        """Who was removed, was on duty lately, and was not added again; the newest first."""
+        again = {one.was for one in (*self.people.values(), *self.gone.values())}
+        return [one for one in reversed(self.gone.values()) if one.id not in again and one.is_lately_off(now_ms)]
+
+    def _removed_as(self, name: str, now_ms: int) -> Person | None:
+        """Who of them had this name."""
+        return next((one for one in self._removed(now_ms) if any(_is_same(name, had) for had in one.names)), None)
 
     # -- duty --------------------------------------------------------------------------------------------------------
 
@@ -207,17 +244,19 @@ class DutyBoard:
 
     def stated(self, now_ms: int) -> dict[str, int | None]:
         """By name: who is on duty (None), and when the duty of others ended lately; of people who were renamed by each
-        of their names, and of people who were removed too. A name counts for who bears it now."""
+        of their names, and of people who were removed too. A name counts for who bears it now, where that person was on
+        duty at all; of others who had it, off duty counts before on duty."""
         on = {one.person for one in self.duties()}
-        people = [*self.people.values(), *reversed(self.gone.values())]
-        borne = {one.name for one in self.people.values()}
-        stated: dict[str, int | None] = {}
-        for one in people:
-            if one.id in on or (one.off_ms is not None and now_ms - one.off_ms < OFF_STATED_MS):
-                own = (name for name in (one.name, *one.former) if name not in borne or self.people.get(one.id) is one)
-                for name in own:
-                    stated.setdefault(name, None if one.id in on else one.off_ms)
-        return stated
+        borne: dict[str, int | None] = {}
+        left: dict[str, int | None] = {}
+        for one in (*self.people.values(), *self._removed(now_ms)):
+            if one.id not in on and not one.is_lately_off(now_ms):
+                continue
+            for name in one.names:
+                names = borne if name == one.name and one.id in self.people else left
+                known = (None if one.id in on else one.off_ms, names.get(name))
+                names[name] = max((at_ms for at_ms in known if at_ms is not None), default=None)
+        return left | borne
 
     def next_ms(self) -> int | None:
         """When the next duty ends by itself; None: nobody is on duty."""
@@ -230,6 +269,12 @@ class DutyBoard:
         self.entries[entry.device] = DutyEntry(
             device=entry.device, device_name=entry.device_name, changed_ms=now_ms, ended=why
         )
+
+
+def _is_same(name: str, other: str) -> bool:
+    """Whether two names look alike."""
+    one, two = (unicodedata.normalize("NFKC", found).casefold() for found in (name, other))
+    return one == two
 
 
 def person_name(name: object) -> str:

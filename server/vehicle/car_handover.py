@@ -79,7 +79,7 @@ class CarHandover:
             off_ms, logged_ms = self._authorization.off_duty_ms(owner), self._owners_off.pop(owner, None)
             if off_ms is not None:
                 self._owners_off = dict([*self._owners_off.items(), (owner, off_ms)][-MOST_OWNERS:])
-            if off_ms != logged_ms:
+            if (off_ms is None) != (logged_ms is None):  # web nodes may state another moment each
                 titles = ", ".join(one.spec.title for one in acknowledged if one.acknowledged_by == owner)
                 does = "is off duty and" if off_ms is not None else "is on duty again, and"
                 self._note("owner", f"{owner} {does} has acknowledged: {titles}.", owner=owner, off_duty_ms=off_ms)

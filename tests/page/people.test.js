@@ -3,6 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
+import { AddPerson } from '../../static/js/control/add-person.js';
 import { chipOf } from '../../static/js/control/control-layout.js';
 import { LeftNotice, dutyWords, initialsOf, partOf } from '../../static/js/control/duty-layout.js';
 import { endWords, leftLines, lineWords, markOf } from '../../static/js/control/handover-layout.js';
@@ -95,4 +96,34 @@ test('what others left is shown once in a duty, where it is known within 10 s of
   assert.equal(found(true, 61_000), false);
   assert.deepEqual([found(false, 70_000, AT + 1), found(true, 80_001, AT + 1)], [false, false]); // left later
   assert.equal(found(true, 90_000, AT + 2), true);
+});
+
+test('a name of who was removed is added by a second press that was meant', async (t) => {
+  let now_ms = 1000;
+  /** @type {unknown[]} */
+  const sent = [];
+  let status = 409;
+  t.mock.method(performance, 'now', () => now_ms);
+  t.mock.method(globalThis, 'fetch', async (/** @type {string} */ _, /** @type {{body: string}} */ { body }) => {
+    sent.push(JSON.parse(body));
+    if (!status) throw new TypeError('no network');
+    return { ok: status === 200, status, json: async () => (status === 200 ? { people: [] } : { detail: 'A. K. was removed lately.' }) };
+  });
+  const adding = new AddPerson(/** @type {any} */ ({ dataset: {} }));
+  const press = (/** @type {string} */ name) => adding.add({ name }, /** @type {any} */ ({ timeStamp: now_ms })).catch(({ message }) => message);
+  status = 0;
+  await press('A. K.');
+  now_ms += 1000;
+  status = 409;
+  assert.equal(await press('A. K.'), 'A. K. was removed lately.', 'what never arrived was not refused');
+  now_ms += 399;
+  await press('A. K.'); // a second press of the same tap
+  now_ms += 1000;
+  await press('B. K.');
+  now_ms += 1000;
+  await press('A. K.'); // another name was refused last
+  now_ms += 1000;
+  status = 200;
+  assert.deepEqual(await press('A. K.'), { people: [] });
+  assert.deepEqual(sent, ['A. K.', 'A. K.', 'A. K.', 'B. K.', 'A. K.', 'A. K.'].map((name, i) => ({ name, returns: i === 5 })));
 });

@@ -94,6 +94,26 @@ async def test_who_signs_on_is_named_on_both_phones(browser: Browser, car: Proce
         assert {person["name"] for person in people if person["duty"]} == {"A. K.", "M. R."}
 
 
+async def test_who_was_removed_by_mistake_is_added_again_by_a_second_press(
+    browser: Browser, car: Process, tmp_path: Path
+) -> None:
+    async with shift(browser, tmp_path, car) as one:
+        added = next(who for who in (await one.client.get("/api/people")).json()["people"] if who["name"] == "A. K.")
+        page = {"x-catgraph-page": "page-of-before"}
+        assert (await one.console.post("/api/duty", json={"person": added["id"]}, headers=page)).is_success
+        assert (await one.console.delete("/api/duty", headers=page)).is_success
+        assert (await one.console.delete(f"/api/people/{added['id']}")).is_success
+        sheet = one.ann.page.locator("#sheet-duty")
+        await sheet.locator("[data-person=' new']").tap()
+        await sheet.get_by_label("Name or initials").fill("A. K.")
+        await sheet.locator('[data-f="sign-on"]').tap()
+        await expect(sheet.get_by_role("alert")).to_contain_text("A. K. was removed lately")
+        await expect(sheet.locator(".duty-keys")).not_to_have_attribute("data-moved", "")
+        await sheet.locator('[data-f="sign-on"]').tap()
+        await expect(one.ann.f("who-name")).to_have_text("AK on duty")
+        one.ann.complaints[:] = [line for line in one.ann.complaints if "409" not in line]  # the refusal
+
+
 @pytest.mark.timeout(150)
 async def test_people_sign_on_act_and_hand_over(browser: Browser, car: Process, tmp_path: Path) -> None:
     async with shift(browser, tmp_path, car) as one:

@@ -29,6 +29,7 @@ class NewPerson(BaseModel):
     model_config = ConfigDict(extra="forbid")
     name: PersonName
     role: DutyRole = "operator"
+    returns: Annotated[bool, Field(description="true: the same person as who was removed under this name")] = False
 
 
 class PersonChange(BaseModel):
@@ -67,7 +68,7 @@ async def add(request: Request, body: Annotated[NewPerson, Body()]) -> PeopleLis
 
     async def add_person() -> None:
         nonlocal added
-        added = await services(request).people.add(body.name, body.role)
+        added = await services(request).people.add(body.name, body.role, returns=body.returns)
 
     listed = await _done(request, add_person())
     return {**listed, "added": added}

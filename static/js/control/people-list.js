@@ -1,5 +1,6 @@
 // The list of people in Settings: add, rename, remove; the role of each; and after how long a duty ends by itself.
 
+import { AddPerson } from './add-person.js';
 import { lastWords } from './people-layout.js';
 import { styled } from '../core/style-sheet.js';
 import { request, sentenceOf } from './request.js';
@@ -40,15 +41,16 @@ class PeopleGroup {
     this.list = html('ul', { class: 'people-list', 'aria-label': 'People' });
     this.name = /** @type {HTMLInputElement} */ (html('input', { type: 'text', maxlength: 30, autocomplete: 'off', autocapitalize: 'words', spellcheck: 'false', 'aria-label': 'Name or initials of one more person', placeholder: 'Name or initials' }));
     const add = html('button', { type: 'submit', class: 'key wide', 'data-f': 'person-add' }, icon('plus'), 'Add');
+    const adding = new AddPerson(add);
     const form = html('form', { class: 'keys' }, html('div', { class: 'field' }, this.name), add);
     this.hours = /** @type {HTMLInputElement} */ (html('input', { type: 'number', min: 1, max: 24, step: 1, inputmode: 'numeric', 'aria-label': 'A duty ends by itself after so many hours' }));
     const hours = html('label', { class: 'hours' }, html('span', {}, 'A duty ends by itself after, hours'), html('span', { class: 'field' }, this.hours));
     place.replaceChildren(this.bad, this.list, form, hours);
     listen(form, 'submit', (event) => {
       event.preventDefault();
-      void this.#send('/api/people', 'POST', { name: this.name.value }, 'Not added').then((isDone) => { if (isDone) this.name.value = ''; });
+      void this.#send(() => adding.add({ name: this.name.value }, event), 'Not added').then((isDone) => { if (isDone) this.name.value = ''; });
     });
-    listen(this.hours, 'change', () => void this.#send('/api/people', 'PATCH', { ends_after_h: Number(this.hours.value) }, 'Not changed'));
+    listen(this.hours, 'change', () => void this.#send(() => request('/api/people', { method: 'PATCH', body: { ends_after_h: Number(this.hours.value) } }), 'Not changed'));
     listen(group, 'toggle', () => group.open && void this.#ask());
     store.on('duty', () => group.open && void this.#ask());
     void this.#ask();
@@ -83,17 +85,17 @@ class PeopleGroup {
     const remove = html('button', { type: 'button', class: 'key', 'aria-label': `Remove ${row.name}`, 'data-f': 'person-remove' }, icon('trash'));
     const about = html('span', { class: 'm' });
     setSentence(about, lastWords(row, Date.now()));
-    name.addEventListener('change', () => void this.#send(path, 'PATCH', { name: name.value }, 'Not renamed'));
-    role.addEventListener('change', () => void this.#send(path, 'PATCH', { role: role.value }, 'Not changed'));
-    remove.addEventListener('click', () => void this.#send(path, 'DELETE', null, 'Not removed'));
+    name.addEventListener('change', () => void this.#send(() => request(path, { method: 'PATCH', body: { name: name.value } }), 'Not renamed'));
+    role.addEventListener('change', () => void this.#send(() => request(path, { method: 'PATCH', body: { role: role.value } }), 'Not changed'));
+    remove.addEventListener('click', () => void this.#send(() => request(path, { method: 'DELETE' }), 'Not removed'));
     return html('li', { 'data-id': row.id }, html('span', { class: 'field' }, name), html('span', { class: 'field' }, role), remove, about);
   }
 
-  /** @param {string} path @param {string} method @param {object | null} body @param {string} title of a refusal */
-  async #send(path, method, body, title) {
+  /** @param {() => Promise<PeopleShown>} doing @param {string} title of a refusal */
+  async #send(doing, title) {
     let isDone = true;
     try {
-      const shown = await request(path, { method, ...(body ? { body } : {}) });
+      const shown = await doing();
       if (document.activeElement instanceof HTMLElement && this.list.contains(document.activeElement)) document.activeElement.blur();
       this.#take(shown);
       setText(this.bad, '');

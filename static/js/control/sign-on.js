@@ -1,5 +1,6 @@
 // "Who is on duty?": the list of people. The first tap chooses, with the role of the last time; the second signs on.
 
+import { AddPerson } from './add-person.js';
 import { initialsOf } from './duty-layout.js';
 import { lastWords } from './people-layout.js';
 import { styled } from '../core/style-sheet.js';
@@ -54,20 +55,22 @@ class SignOn {
     this.off = html('button', { type: 'button', class: 'key wide', 'data-f': 'sign-off' }, 'Sign off');
     this.departure = html('button', { type: 'button', class: 'key wide', 'data-f': 'duty-departure', hidden: true });
     const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close', 'data-f': 'no' }, icon('close'));
+    const keys = html('div', { class: 'duty-keys' }, this.bad, this.key, this.departure, this.off);
+    this.adding = new AddPerson(keys);
     this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed duty-sheet', id: 'sheet-duty', 'aria-labelledby': 'duty-title', 'aria-describedby': 'duty-words' },
       html('div', { class: 'duty-head' }, this.title, close),
       html('div', { class: 'duty-body', tabindex: '0', role: 'group', 'aria-label': 'List of people' }, this.text, this.rows, this.field),
-      this.role, html('div', { class: 'duty-keys' }, this.bad, this.key, this.departure, this.off)));
+      this.role, keys));
     const stops = [store.on('duty', () => void this.#ask()), addSheet(this.sheet)];
     this.sheet.addEventListener('close', () => stops.forEach((stop) => stop()), { once: true });
-    this.key.addEventListener('click', () => void this.#sign());
+    this.key.addEventListener('click', (event) => void this.#sign(event));
     this.off.addEventListener('click', () => void this.#signOff());
     this.departure.addEventListener('click', () => {
       closeSheet(this.sheet);
       openScreen('departure');
     });
     this.name.addEventListener('input', () => this.#draw());
-    this.name.addEventListener('keydown', (event) => event.key === 'Enter' && void this.#sign());
+    this.name.addEventListener('keydown', (event) => event.key === 'Enter' && void this.#sign(event));
     this.#draw();
     openSheet(this.sheet);
     this.title.tabIndex = -1;
@@ -157,7 +160,8 @@ class SignOn {
     setAttribute(this.key, 'aria-disabled', isReady ? null : 'true');
   }
 
-  async #sign() {
+  /** @param {Event} event */
+  async #sign(event) {
     const row = this.#list?.people.find((one) => one.id === this.#chosen);
     const name = this.name.value.trim();
     if (this.#isBusy || (!row && !(this.#chosen === NEW && name))) return;
@@ -165,7 +169,7 @@ class SignOn {
       let id = row?.id;
       if (!id) {
         /** @type {PeopleList} */
-        const list = await request('/api/people', { method: 'POST', body: { name, role: this.#role } });
+        const list = await this.adding.add({ name, role: this.#role }, event);
         id = list.added; // two devices may add people at once
         this.#chosen = id ?? '';
         this.#take(list);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from server.access import people_files
 from server.access.identity import LOCAL, Principal, Role
 from server.access.people import People, device_key
 from server.app.config import Config
-from server.control.duty import HOUR_MS
+from server.control.duty import HOUR_MS, LONGEST_NAME, MOST_DUTIES, MOST_FORMER, MOST_PEOPLE, DutyEntry, Person
 from server.vehicle.vehicle import Vehicle
 from server.web.page_sender import PageSender
 from tests.http import http_client
@@ -187,6 +188,73 @@ async def test_former_names_and_who_was_removed_survive_a_restart(tmp_path: Path
     again = People(tmp_path, wall_ms=clock)
     assert again.complaint is None
     assert again.sent(None)["duties"] == {"Anna K.": None, "A. K.": None, "B. K.": clock()}
+
+
+async def test_who_was_removed_is_added_again_by_a_request_that_says_so(tmp_path: Path) -> None:
+    async with paired_server(keyed(tmp_path)) as served, served.paired(Role.OPERATOR) as phone:
+        ann = await add(phone, "A. K.")
+        await phone.post("/api/duty", json={"person": ann})
+        await phone.delete("/api/duty")
+        await phone.delete(f"/api/people/{ann}")
+        refused = await phone.post("/api/people", json={"name": "A. K."})
+        assert refused.status_code == 409
+        assert "Repeat it if it is the same person." in refused.json()["detail"]
+        again = (await phone.post("/api/people", json={"name": "A. K.", "returns": True})).json()["added"]
+        stated = People(tmp_path, wall_ms=lambda: 0)  # as after a restart
+        assert (stated.board.people[again].was, list(stated.sent(None)["duties"])) == (ann, ["A. K."])
+
+
+def test_full_lists_of_long_names_are_read_again(tmp_path: Path) -> None:
+    clock = Clock()
+    people = People(tmp_path, wall_ms=clock)
+    board = people.board
+
+    def somebody(number: int, id_letter: str) -> Person:
+        names = [(chr(0x20000 + 4 * number + n)) * LONGEST_NAME for n in range(1 + MOST_FORMER)]  # four bytes a letter
+        id = id_letter * 50 + str(number)
+        return Person(
+            id=id,
+            name=names[0],
+            role="safety_driver",
+            last_ms=clock() - 1,
+            off_ms=clock(),
+            former=tuple(names[1:]),
+            changed_ms=clock(),
+            was=id[::-1],
+        )
+
+    for number in range(3 * MOST_PEOPLE):
+        one = somebody(number, "g")
+        board.people[one.id] = one
+        board.forget(one.id, clock())
+    for number in range(MOST_PEOPLE):
+        one = somebody(1000 + number, "p")
+        board.people[one.id] = one
+    for number in range(2 * MOST_DUTIES):
+        entry = DutyEntry(
+            device=f"{number:060}", device_name="\U00020000" * 40, changed_ms=clock(), ended="\U00020000" * 200
+        )
+        if number < MOST_PEOPLE:
+            on_duty = list(board.people)[number]
+            entry = replace(entry, person=on_duty, role="safety_driver", since_ms=clock(), ended=None)
+        board.entries[entry.device] = entry
+    board.advance(clock())
+    people.keep_soon()
+    again = People(tmp_path, wall_ms=clock)
+    assert again.complaint is None
+    for kept in ("people", "gone", "removed", "entries"):
+        assert getattr(again.board, kept) == getattr(board, kept)
+    assert len(board.gone) == MOST_PEOPLE
+
+
+def test_a_removed_person_that_cannot_be_read_costs_only_itself(tmp_path: Path) -> None:
+    path = tmp_path / "people/people.toml"
+    path.parent.mkdir()
+    rows = ['name = "B."', 'id = "b"', 'id = "../b"\nname = "B."', 'id = "b"\nname = "..."', 'id = "good"\nname = "G."']
+    path.write_text("\n".join(['[[people]]\nid = "a"\nname = "A. K."', *(f"[[gone]]\n{row}" for row in rows)]))
+    found = People(tmp_path, wall_ms=Clock())
+    assert found.complaint is None
+    assert (list(found.board.people), list(found.board.gone)) == (["a"], ["good"])
 
 
 @pytest.mark.parametrize("name", ["people.toml", "duty.toml"])

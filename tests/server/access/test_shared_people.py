@@ -29,12 +29,17 @@ async def test_what_is_changed_at_one_node_holds_at_the_other() -> None:
     two.hear(one)
     assert two.people.duty_of("phone", "Pixel")["me"] == one.people.duty_of("phone", "Pixel")["me"]
     person = {"name": "A. K.", "role": "supervisor", "device": "phone"}
-    assert two.people.sent("phone") == {"person": person, "supervisors": ["A. K."], "duties": {"A. K.": None}}
+    assert two.people.sent("phone") == {
+        "person": person,
+        "supervisors": ["A. K."],
+        "duties": {"A. K.": None},
+        "listed": 1,
+    }
     assert one.shared.due() == {} == two.shared.due()
     two.ms = 3000
     await two.people.sign_off("phone", "It was handed over.")
     one.hear(two)
-    assert one.people.sent("phone") == {"person": None, "supervisors": [], "duties": {"A. K.": 3000}}
+    assert one.people.sent("phone") == {"person": None, "supervisors": [], "duties": {"A. K.": 3000}, "listed": 1}
     two.ms = 4000
     await two.people.remove(ann)
     await two.people.set_hours(8)
@@ -87,10 +92,29 @@ async def test_who_is_removed_at_one_node_while_on_duty_at_the_other_is_off_duty
         "person": None,
         "supervisors": [],
         "duties": {"Anna K.": 4000, "A. K.": 4000},
+        "listed": 0,
     }
     ended = two.people.duty_of("phone", "Pixel")["ended"]
     assert ended is not None
     assert "was removed from the list" in ended["text"]
+
+
+async def test_who_is_added_again_is_the_same_person_at_each_node() -> None:
+    one, two = Node(), Node()
+    ann = await one.people.add("A. K.", "operator")
+    await one.people.sign_on("phone", "Pixel", ann, None, moves=False)
+    two.hear(one)
+    one.ms = two.ms = 2000
+    await one.people.sign_off("phone")
+    await one.people.remove(ann)
+    two.hear(one)
+    again = await one.people.add("A. K.", "operator", returns=True)
+    await one.people.change(again, name="Anna", role=None)
+    one.ms = two.ms = 3000
+    await one.people.sign_on("phone", "Pixel", again, None, moves=False)
+    two.hear(one)
+    for node in (one, two):
+        assert node.people.sent("phone")["duties"] == {"Anna": None, "A. K.": None}
 
 
 @pytest.mark.parametrize(

@@ -85,6 +85,7 @@ async def test_the_signer_gave_it_whatever_the_node_states() -> None:
         "person": None,
         "supervisors": None,
         "duties": None,
+        "listed": None,
         "console": False,
         "replaying": None,
     }
@@ -104,11 +105,13 @@ async def test_who_is_on_duty_is_who_was_signed_and_not_who_the_node_or_the_comm
         "person": {"name": "M. R.", "role": "supervisor", "device": "d1"},
         "supervisors": ["J. D."],
         "duties": {"J. D.": None},
+        "listed": 1,
     }
     found = await agent.orders.admit("ocelot", message | stated)
     assert found["person"] == {"name": "A. K.", "role": "operator", "device": "d1"}
     assert found["supervisors"] == ["J. D."]
     assert found["duties"] == {"J. D.": None}, "as the node states; it grants no right"
+    assert found["listed"] == 1
     message = agent.signed() | stated  # signed where nobody is on duty
     assert (await agent.orders.admit("ocelot", message))["person"] is None
 

@@ -16,6 +16,7 @@ from server.control.duty import (
     OFF_STATED_MS,
     DutyBoard,
     OnDuty,
+    Person,
     person_name,
 )
 
@@ -176,12 +177,102 @@ def test_who_was_renamed_or_removed_is_off_duty_under_each_name(board: DutyBoard
     board.remove("ak", 4000)
     assert board.stated(4000) == {"Anna K.": 3000, "A. K.": 3000}
     assert board.stated(3000 + OFF_STATED_MS) == {}
-    board.add("other", "A. K.", "operator", 5000)
+
+
+@pytest.mark.parametrize("name", ["A. K.", "a. k.", "Anna K."])
+@pytest.mark.parametrize("is_removed", [False, True])
+def test_a_name_in_acknowledgements_is_given_to_nobody_else(board: DutyBoard, name: str, is_removed: bool) -> None:
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    board.change("ak", name="Anna K.", role=None, now_ms=2000)
+    board.sign_off("phone", 3000)
+    if is_removed:
+        board.remove("ak", 4000)
+    with pytest.raises(Refused, match="removed lately" if is_removed else "in the list|is a former name of"):
+        board.add("other", name, "operator", 5000)
+    with pytest.raises(Refused, match="removed lately" if is_removed else "in the list|is a former name of"):
+        board.change("mr", name=name, role=None, now_ms=5000)
+    assert board.stated(5000) == {"Anna K.": 3000, "A. K.": 3000}
+    if is_removed:  # nobody states it any more
+        board.add("other", name, "operator", 3000 + OFF_STATED_MS)
+
+
+def test_a_former_name_of_who_never_was_on_duty_is_free(board: DutyBoard) -> None:
+    board.change("ak", name="Anna K.", role=None, now_ms=2000)
+    board.add("other", "A. K.", "operator", 3000)
+    board.change("ak", name="M. K.", role=None, now_ms=4000)
+    board.remove("ak", 5000)
+    board.add("again", "M. K.", "operator", 6000)
+
+
+@pytest.mark.parametrize("name", ["A. K.", "Anna K."])
+def test_who_was_removed_by_mistake_is_added_again_as_the_same_person(board: DutyBoard, name: str) -> None:
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    board.change("ak", name="Anna K.", role=None, now_ms=2000)
+    board.sign_off("phone", 3000)
+    board.remove("ak", 4000)
+    board.add("again", name, "operator", 5000, returns=True)
+    assert board.stated(5000) == {"Anna K.": 3000, "A. K.": 3000}
+    board.sign_on("phone", "Pixel 7", "again", None, 6000)
+    board.change("again", name="A. Kay", role=None, now_ms=7000)
+    assert board.stated(7000) == {"A. Kay": None, "Anna K.": None, "A. K.": None}
+    board.sign_off("phone", 8000)
+    board.remove("again", 9000)
+    board.add("third", "A. Kay", "operator", 10_000, returns=True)
+    board.sign_on("phone", "Pixel 7", "third", None, 11_000)
+    assert board.stated(11_000) == {"A. Kay": None, "Anna K.": None, "A. K.": None}
+
+
+def test_who_has_the_name_of_another_and_was_never_on_duty_hides_nothing(board: DutyBoard) -> None:
+    """As two web nodes may bring it about that are apart for a time."""
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    board.sign_off("phone", 3000)
+    board.remove("ak", 4000)
+    board.people["other"] = Person(id="other", name="A. K.")
+    assert board.stated(5000) == {"A. K.": 3000}
     board.sign_on("desk", "Desk", "other", None, 6000)
-    assert board.stated(6000) == {"A. K.": None, "Anna K.": 3000}  # a name is that of who bears it now
+    assert board.stated(6000) == {"A. K.": None}  # a name is that of who bears it now
+
+
+@pytest.mark.parametrize("order", [("ak", "mr"), ("mr", "ak")])
+def test_of_two_with_the_same_former_name_the_one_off_duty_counts(order: tuple[str, str]) -> None:
+    board = DutyBoard()
+    for id in order:
+        board.people[id] = Person(id=id, name=id, former=("A.",))
+        board.sign_on(id, id, id, None, 1000)
+    board.sign_off("ak", 2000)
+    assert board.stated(2000) == {"ak": 2000, "mr": None, "A.": 2000}
+    board.sign_off("mr", 3000)
+    assert board.stated(3000)["A."] == 3000
 
 
 def test_of_former_names_the_last_ones_are_known(board: DutyBoard) -> None:
     for number, name in enumerate(("B", "C", "A. K.", "D", "E")):
         board.change("ak", name=name, role=None, now_ms=1000 + number)
     assert board.people["ak"].former == ("D", "A. K.", "C")
+
+
+def test_of_the_removed_those_are_kept_whose_duty_ended_lately(board: DutyBoard) -> None:
+    for number in range(MOST_PEOPLE + 2):
+        board.people[f"p{number}"] = Person(id=f"p{number}", name=f"P {number}", off_ms=1000)
+        board.forget(f"p{number}", 2000)
+    assert list(board.gone) == [f"p{number}" for number in range(2, MOST_PEOPLE + 2)]
+    board.remove("mr", 3000)  # never on duty: nothing bears the name
+    assert "mr" not in board.gone
+    board.sign_on("phone", "Pixel 7", "ak", None, 4000)
+    board.sign_off("phone", 1000 + OFF_STATED_MS)
+    board.remove("ak", 1000 + OFF_STATED_MS)
+    assert list(board.gone) == ["ak"]
+
+
+def test_a_name_that_is_stated_is_not_dropped_by_a_rename(board: DutyBoard) -> None:
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    for name in ("B", "C", "D"):
+        board.change("ak", name=name, role=None, now_ms=2000)
+    for now_ms in (3000, 4000 + OFF_STATED_MS - 1):
+        with pytest.raises(Refused, match=r"D had 3 other names, and A\. K\. names what they acknowledged"):
+            board.change("ak", name="E", role=None, now_ms=now_ms)
+        board.sign_off("phone", 4000)
+    board.change("ak", name="B", role="supervisor", now_ms=5000)  # a former name is none more
+    assert board.stated(5000) == {"A. K.": 4000, "B": 4000, "C": 4000, "D": 4000}
+    board.change("ak", name="E", role=None, now_ms=4000 + OFF_STATED_MS)
+    assert board.people["ak"].former == ("B", "D", "C")

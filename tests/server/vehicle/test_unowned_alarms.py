@@ -128,6 +128,16 @@ async def test_only_who_is_on_duty_takes_it_while_people_sign_on(who: dict[str, 
     assert listed(car)[2] is None
 
 
+async def test_once_the_list_is_emptied_who_never_signed_on_takes_it() -> None:
+    """Who was removed is still stated as off duty, and nobody can sign on."""
+    car = await left()
+    await car.obeyed(SEEN | BEN | {"duties": {"A. K.": OFF_MS}, "listed": 1}, "present")
+    assert "Sign on first" in await car.refused(BEN, "take_alarm", **TAKE)
+    await car.obeyed(SEEN | BEN | {"duties": {"A. K.": OFF_MS}, "listed": 0}, "present")
+    await car.obeyed(BEN, "take_alarm", **TAKE)
+    assert listed(car)[:2] == ("ACKED", "Ben")
+
+
 async def test_nobody_takes_what_has_an_owner_or_was_raised_again() -> None:
     car = await acknowledged()
     assert "is not off duty" in await car.refused(BEN | MR, "take_alarm", **TAKE)
@@ -140,3 +150,13 @@ async def test_nobody_takes_what_has_an_owner_or_was_raised_again() -> None:
     assert await car.refused(BEN | MR, "take_alarm", alarm="unknown", occurrence=1) == gone
     assert "meant for serval" in await car.refused(BEN | MR, "take_alarm", vehicle="serval", **TAKE)
     assert BY_KIND["take_alarm"].needs == "operator"
+
+
+async def test_another_moment_of_the_same_end_is_not_logged_again() -> None:
+    """Two web nodes whose clocks or lists differ state it in turn."""
+    car = await left()
+    for off_ms in (OFF_MS + 2000, OFF_MS, OFF_MS + 2000):
+        await car.obeyed(SEEN | BEN | MR | {"duties": {"A. K.": off_ms, "M. R.": None}}, "present")
+        car.tick(0.5)
+        assert listed(car)[2] == off_ms
+    assert len(car.bus.past_events("ocelot", change="owner")) == 1
