@@ -38,6 +38,7 @@ FAST_S = 0.5  # … nor does one that comes less often than this, where others c
 USUAL_S = 30.0  # what a link needs when nothing waits is the least round trip of one to two of these …
 USUAL_AT_MOST_S = 1.0
 EXCESS_S = 0.1
+TOGETHER_S = 0.3  # what came so long before the newest message shows nothing of the link now
 NEIGHBOURS, NEIGHBOUR_S = 2, 1.0
 PERIOD_WEIGHT = 0.1
 MOST_UNANSWERED = 600
@@ -77,6 +78,7 @@ class _Topic:
         "first",
         "former_length",
         "is_given",
+        "is_own",
         "marks",
         "older_s",
         "period_s",
@@ -95,6 +97,7 @@ class _Topic:
         self.by_clock = StampedDelay()
         self.at_s: float | None = None
         self.delay_s = 0.0
+        self.is_own = False  # that delay is of this topic only: its queue was long when the message came
         self.excess_s: float | None = None  # later by the clock of ROS than by the pings; None: it is not known
         self.first: tuple[float, float | None] | None = None  # when the only message came, and its stamp
         self.older_s = 0.0  # how old the newest message was when it came, where that is not due to its transport
@@ -220,6 +223,7 @@ class TransportDelay:
         known.first = (at_s, stamp_s) if known.at_s is None else None
         known.stamped += stamp_s is not None
         known.at_s, known.delay_s, known.older_s = at_s, delay_s, 0.0
+        known.is_own = known.queue_length > LONG_QUEUE
         if known.first is not None:
             self._find_older(topic, known)
         return max(delay_s, known.older_s)
@@ -303,11 +307,13 @@ class TransportDelay:
                 yield topic.excess_s
 
     def late_s(self, now_s: float) -> float:
-        """How late is what comes now: the most of the topics that come often."""
+        """How late is what comes now: the most of the topics that come often, by those that came last."""
         recent = [topic for topic in self._topics.values() if topic.at_s is not None and now_s - topic.at_s <= RECENT_S]
         fast = [topic for topic in recent if topic.period_s is not None and topic.period_s <= FAST_S]
-        short = [topic for topic in fast if topic.queue_length <= LONG_QUEUE]
-        return max((topic.delay_s for topic in short or fast or recent), default=self._trip_s)
+        shared = [topic for topic in fast if not topic.is_own]
+        came = [(topic.at_s, topic.delay_s) for topic in shared or fast or recent if topic.at_s is not None]
+        since_s = max((at_s for at_s, _ in came), default=0.0) - TOGETHER_S
+        return max((delay_s for at_s, delay_s in came if at_s >= since_s), default=self._trip_s)
 
     def delays(self) -> dict[str, float]:
         """How old the newest message of each topic was when it came."""

@@ -90,7 +90,9 @@ def _judge(snapshot: Snapshot, limit_s: float, was_active: bool) -> Finding:
     )
 
 
-def _alarm(priority: Priority, place: Place, sound: Sound, advice: str, *, by: tuple[str, ...]) -> AlarmSpec:
+def _alarm(
+    priority: Priority, place: Place, sound: Sound, advice: str, *, on_delay_s: float, by: tuple[str, ...]
+) -> AlarmSpec:
     return AlarmSpec(
         title="The link is too slow",
         ended="The link was too slow",
@@ -98,7 +100,7 @@ def _alarm(priority: Priority, place: Place, sound: Sound, advice: str, *, by: t
         place=place,
         sound=sound,
         needs_ack=True,
-        on_delay_s=0.5,  # a hiccup of the radio is over by then
+        on_delay_s=on_delay_s,
         off_delay_s=3.0,
         actions=(Action.ACKNOWLEDGE,),
         advice=advice,
@@ -120,6 +122,7 @@ CHECKS = (
             Place.SNACKBAR,
             Sound.MEDIUM,
             "Values are as old as shown: wait, or reduce the distance between car and server.",
+            on_delay_s=1.0,  # packets that a fair radio loses twice are repeated by then
             by=("link_late_moving", "link_lost"),
         ),
         limits=LateLimits,
@@ -139,6 +142,7 @@ CHECKS = (
             Place.DIALOG,
             Sound.HIGH,
             "The car is not where it is shown: watch the car.",
+            on_delay_s=0.5,  # a hiccup of the radio is over by then
             by=("link_lost",),
         ),
         limits=LateLimits,

@@ -12,6 +12,7 @@ from monitor.transport import (
     PLACE_PERIODS,
     RECENT_S,
     SHUT_BYTES,
+    TOGETHER_S,
     TRIM_S,
     USUAL_S,
     TransportDelay,
@@ -256,6 +257,27 @@ def test_the_link_is_as_late_as_the_latest_of_the_frequent_topics() -> None:
     assert link.late_s(10.1 + RECENT_S) == pytest.approx(0.4)  # no frequent one came of late: the others tell
 
 
+def test_a_topic_that_came_late_and_is_throttled_since_is_not_how_late_the_link_is_now() -> None:
+    link = opened()
+    for topic in ("/vel", "/cmd"):
+        link.subscribe(topic, 0)
+    for n in range(20):
+        ping(link, n / 20, n / 20 + 0.01)
+        for topic in ("/vel", "/cmd"):
+            link.receive(topic, n / 20 + 0.01)
+    link.receive("/cmd", 2.0)  # nothing came for a second, then both
+    link.receive("/vel", 2.0)
+    late_s = link.late_s(2.0)
+    assert late_s > 1.0
+    ping(link, 2.0, 2.02)
+    link.receive("/vel", 2.0 + TOGETHER_S)
+    assert link.late_s(2.31) == late_s
+    ping(link, 2.3, 2.32)
+    link.receive("/vel", 2.33)
+    assert link.late_s(2.33) == link.delays()["/vel"] < 0.1
+    assert link.delays()["/cmd"] == late_s
+
+
 def test_a_long_queue_makes_its_own_messages_old_and_the_link_only_where_no_other_topic_comes_often() -> None:
     def late_s(lengths: dict[str, int]) -> tuple[float, dict[str, float]]:
         link = opened()
@@ -273,6 +295,24 @@ def test_a_long_queue_makes_its_own_messages_old_and_the_link_only_where_no_othe
     assert delays["/mode"] > late + 0.1
     assert late_s({"/mode": LONG_QUEUE + 1})[0] == pytest.approx(delays["/mode"])
     assert late_s({"/vel": 2, "/mode": LONG_QUEUE})[0] > late + 0.1
+
+
+def test_a_message_from_a_long_queue_makes_its_own_topic_old_also_after_the_queue_is_shortened() -> None:
+    link = opened()
+    lengths = {"/vel": 2, "/mode": 2 * LONG_QUEUE}
+    for topic, length in lengths.items():
+        link.subscribe(topic, length)
+    for n in range(100):
+        if n % 5 == 0:
+            ping(link, n / 20 - (0.2 if n == 95 else 0.01), n / 20)
+        for topic in lengths:
+            link.receive(topic, n / 20)
+    link.subscribe("/mode", 1, throttle_s=0.2)
+    assert link.delays()["/mode"] > link.delays()["/vel"] + 0.1
+    assert link.late_s(4.96) == link.delays()["/vel"]
+    link.receive("/mode", 5.0)
+    link.receive("/vel", 5.0)
+    assert link.late_s(5.0) == max(link.delays().values())  # it came through the short one
 
 
 def test_without_messages_the_round_trip_tells() -> None:

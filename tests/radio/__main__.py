@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import statistics
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from tests.radio.rig import IS_POSSIBLE, ROOT, WHY_NOT, Air, on_air, page, serving
-from tests.radio.seen import at
 
 
 async def steady(air: Air, host: str, key: str, tree: Path, lasts_s: float, profile: str) -> str:
@@ -34,7 +34,7 @@ async def cold(air: Air, host: str, key: str, tree: Path, lasts_s: float) -> str
                 await asyncio.sleep(0.1)
         times.append(seen.live_s(seen.begins_ms))
     within = sum(one <= 10 for one in times)
-    return f"live within 10 s: {within} of {len(times)}, median {at(sorted(times), 0.5):.1f} s"
+    return f"live within 10 s: {within} of {len(times)}, median {statistics.median(times):.1f} s"
 
 
 async def gap(air: Air, host: str, key: str, tree: Path, off: str, off_s: float, every_s: float, times: int) -> str:
@@ -56,8 +56,7 @@ async def gap(air: Air, host: str, key: str, tree: Path, off: str, off_s: float,
 
 
 def shown(values: list[float]) -> str:
-    ordered = sorted(values)
-    return f"{at(ordered, 0.5):.2f} (≤ {at(ordered, 1.0):.2f})"
+    return f"{statistics.median(values):.2f} (≤ {max(values):.2f})"
 
 
 async def car_steady(air: Air, host: str, key: str, tree: Path, lasts_s: float, profile: str) -> str:
