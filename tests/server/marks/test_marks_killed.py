@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -98,7 +98,7 @@ async def mark_from_page(base: str, prefix: str, answered: Answered) -> None:
             await asyncio.sleep(PAUSE_S)
 
 
-async def kill_often(bridge: RosBridge, data: Path, kills: int) -> None:
+async def kill_often(bridge: RosBridge, data: Path, kills: int) -> Answered:
     answered, chance = Answered(), random.Random(kills)
     car = str(bridge.address)  # type: ignore[attr-defined]
     async with driving(bridge):
@@ -122,6 +122,7 @@ async def kill_often(bridge: RosBridge, data: Path, kills: int) -> None:
                     assert isinstance(ended, gone), ended
         async with served(data, car) as (_, base):
             await check(base, answered, within_s=60.0 + 2.0 * kills)
+    return answered
 
 
 async def check(base: str, answered: Answered, within_s: float) -> None:
@@ -178,5 +179,9 @@ async def test_what_was_answered_survives(bridge: RosBridge, tmp_path: Path) -> 
 
 @pytest.mark.soak
 @pytest.mark.timeout(5400)
-async def test_what_was_answered_survives_a_hundred_kills(bridge: RosBridge, tmp_path: Path) -> None:
-    await kill_often(bridge, tmp_path / "data", 100)
+async def test_what_was_answered_survives_a_hundred_kills(
+    bridge: RosBridge, tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    answered = await kill_often(bridge, tmp_path / "data", 100)
+    record_property("marks that were answered", len(answered.marks))
+    record_property("of them with a voice", len(answered.voices))
