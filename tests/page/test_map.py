@@ -116,7 +116,7 @@ async def test_car_and_phone_with_distance_bearing_and_their_errors(phone: Phone
     async with roaming() as car, lying(phone, car, 6.0, -8.0), looking(phone, car) as it:
         await expect(it.f("apart")).to_have_text(re.compile(r"^(9\.9|10\.0|10\.1)$"))
         await expect(it.f("bearing")).to_have_text(re.compile(r"^car at 32[234]° NW$"))
-        await expect(it.f("verdict-word")).to_have_text("OK", timeout=15_000)
+        await expect(it.f("verdict-text")).to_have_text("OK", timeout=15_000)
         assert float(await it.f("allowed").text_content()) >= 10.0
         await expect(it.f("says")).to_be_hidden()
         assert await it.f("car-lat").text_content() == "32.231900"

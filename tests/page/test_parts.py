@@ -58,7 +58,7 @@ async def test_home_shows_each_value_and_none_of_them_as_live_once_the_car_is_si
     await expect(phone.f("veil")).to_have_attribute("data-on", "values")
     await expect(phone.f("veil-words")).to_contain_text("The car fell silent.")
     await is_cut(phone.page.locator("#monitor .veil"), "Bridge", "Car")
-    await expect(phone.f("word")).to_have_text("Silent")
+    await expect(phone.f("link-state")).to_have_text("Silent")
     await expect(phone.page.locator(".checks li.ok")).to_have_count(0)
     canned.state = live()
     await phone.live()
@@ -219,7 +219,7 @@ async def test_a_server_that_falls_silent_covers_everything_and_its_return_uncov
     canned.silent = True
     await expect(phone.f("veil")).to_have_attribute("data-on", "all")
     await expect(phone.f("veil-words")).to_contain_text("The server fell silent.")
-    await expect(phone.f("word")).to_have_text("Lost")
+    await expect(phone.f("link-state")).to_have_text("Lost")
     await expect(phone.page.locator(".gauge")).to_have_attribute("data-speed", "stale")
     sheet = phone.page.locator("#sheet-lost")
     await expect(sheet).to_be_visible()

@@ -383,7 +383,7 @@ async def test_without_a_worker_the_page_is_the_same(browser: Browser, project: 
             };"""
         )
         await page.goto(one.address)
-        await expect(page.locator('#monitor [data-f="word"]')).to_have_text(LIVE, timeout=12_000)
+        await expect(page.locator('#monitor [data-f="link-state"]')).to_have_text(LIVE, timeout=12_000)
         await asyncio.sleep(5.0)  # by then it would have been registered
         await page.evaluate("document.querySelector('[data-screen=about]').click()")
         await expect(page.locator("#monitor .facts")).to_contain_text("because it does not trust the certificate")

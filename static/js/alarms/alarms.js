@@ -100,7 +100,7 @@ class AlarmList {
     show(none, rows.length === 0);
     setText(none, noneWords({
       isSilent: store.isSilent, isReplay: store.replaying, isPaused: frame?.session.paused === true,
-      isChecked: frame?.replay ? frame.replay.silent_s !== null : store.chain.word === 'Live',
+      isChecked: frame?.replay ? frame.replay.silent_s !== null : store.chain.state === 'Live',
     }));
     const isQuiet = !store.isSilent && !store.replaying && !rows.some(({ kind }) => kind === 'unacknowledged' || kind === 'returned');
     setSentence(lately, isQuiet ? latelyWords(store.log.rows, frame?.alarm_load?.in_10_min) : '');

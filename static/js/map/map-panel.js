@@ -77,7 +77,7 @@ export class MapPanel {
     setAttribute(at('verdict'), 'class', verdict === 'fault' ? 'tag warn' : verdict === 'ok' ? 'tag' : 'tag unk');
     setAttribute(at('verdict-icon'), 'href', `#i-${verdict === 'fault' ? 'warn' : verdict === 'ok' ? 'ok' : 'unknown'}`);
     show(at('verdict-mark'), verdict !== 'unknown'); // the dashed frame shows it, and there is no room
-    setText(at('verdict-word'), verdict === 'fault' ? 'FAULT' : verdict === 'ok' ? 'OK' : 'not checked');
+    setText(at('verdict-text'), verdict === 'fault' ? 'FAULT' : verdict === 'ok' ? 'OK' : 'not checked');
     setSentence(at('verdict-why'), verdict === 'unknown' ? (check?.brief ?? '').replace(/^not checked:? ?/, '') : '');
   }
 }
