@@ -91,8 +91,8 @@ async def test_the_map_shows_both_and_says_which_is_old(phone: Phone, canned: Ca
         "age_s": 12.4,
     }
     await expect(panel.locator(".car-mark").first).to_have_attribute("data-ink", "stale")
-    await expect(phone.f("car-says", "#panel-map")).to_contain_text("the car may be elsewhere")
-    await expect(phone.f("phone-says", "#panel-map")).to_contain_text("The page is in the background")
+    await expect(phone.f("car-message", "#panel-map")).to_contain_text("the car may be elsewhere")
+    await expect(phone.f("phone-message", "#panel-map")).to_contain_text("The page is in the background")
     await expect(phone.f("apart", "#panel-map")).to_have_text("–")
 
 
@@ -131,7 +131,7 @@ async def test_a_limit_that_is_typed_in_settings_is_sent_in_si(phone: Phone, can
     assert (await until_sent(canned, "set"))["values"] == {"speed_limit.max_mps": 9.5}
     await row.locator("input.v").fill("95")
     await row.locator("input.v").press("Enter")
-    await expect(row.locator(".says")).to_contain_text("0.5 to 40 m/s is allowed")
+    await expect(row.locator(".msg")).to_contain_text("0.5 to 40 m/s is allowed")
     assert len(sent(canned, "set")) == 1
 
 
@@ -267,7 +267,7 @@ async def test_a_phone_that_is_not_paired_sees_nothing_of_the_car(phone: Phone, 
     await expect(phone.page.locator("#pairing h1")).to_have_text("Pair this device")
     await expect(phone.page.locator("#monitor")).to_be_hidden()
     await phone.f("pair-go", "#pairing").tap()
-    await expect(phone.f("pair-says", "#pairing")).to_have_text("The PIN has 6 digits.")
+    await expect(phone.f("pair-message", "#pairing")).to_have_text("The PIN has 6 digits.")
     phone.complaints.clear()  # the browser's own, of the ticket that was refused
 
 

@@ -214,7 +214,7 @@ function build(root) {
   const list = html('ul', { class: 'alarms', 'data-f': 'alarms' });
   const none = html('p', { class: 'state', 'data-f': 'alarms-none' });
   const lately = html('p', { class: 'lately', 'data-f': 'alarms-lately' });
-  const message = html('p', { class: 'note-line bad', role: 'alert', 'data-f': 'alarms-says' });
+  const message = html('p', { class: 'note-line bad', role: 'alert', 'data-f': 'alarms-message' });
   const ended = html('button', { type: 'button', class: 'key', 'data-f': 'alarms-ended' });
   const these = html('button', { type: 'button', class: 'key', 'data-f': 'alarms-these', hidden: true });
   const foot = html('div', { class: 'alarms-foot' }, ended, these);

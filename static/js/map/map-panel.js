@@ -19,12 +19,12 @@ export class MapPanel {
   draw({ car, phone, apart }, isTooFar) {
     const { at } = this;
     this.#drawFixes(car, phone);
-    const lines = { 'car-says': car.message, 'phone-says': phone.message, 'map-says': isTooFar ? 'Car and phone are too far apart for one view.' : '' };
+    const lines = { 'car-message': car.message, 'phone-message': phone.message, 'map-message': isTooFar ? 'Car and phone are too far apart for one view.' : '' };
     for (const [name, message] of Object.entries(lines)) {
       setSentence(at(name), message);
       show(at(name), message !== '');
     }
-    show(at('says'), Boolean(car.message || phone.message || isTooFar));
+    show(at('message'), Boolean(car.message || phone.message || isTooFar));
     this.#announce(`${car.message} ${phone.message}`.trim());
     const [number, unit] = apart ? distanceWords(apart.distance_m) : ['–', ''];
     setText(at('apart'), number);

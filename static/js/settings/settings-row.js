@@ -41,7 +41,7 @@ export class SettingsRow {
     this.field = field;
     this.texts = [field.title, field.description, field.heading, field.unit, speedUnit(), name];
     const id = `set-${name.replaceAll('.', '-')}`;
-    this.message = html('p', { class: 'says', role: 'status', hidden: true });
+    this.message = html('p', { class: 'msg', role: 'status', hidden: true });
     this.yet = html('p', { class: 'yet', hidden: true }, 'Not confirmed by the server yet.');
     this.isSwitch = field.unit === SWITCH;
     const help = field.description ? html('p', { class: 'help', id: `${id}-help` }, ...textNodes(field.description)) : '';
