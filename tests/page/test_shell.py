@@ -291,7 +291,7 @@ async def test_a_new_version_comes_at_the_next_load_and_never_mixed(
             await page.evaluate(later)
             await page.wait_for_function("() => document.documentElement.dataset.about === 'first'")
             await page.evaluate("history.back()")
-            # Whoever loads it has the new one, whole, while the old one is still open elsewhere.
+            # A page that loads it has the new one, whole, while the old one is still open elsewhere.
             await note.get_by_role("button", name="Reload").tap()
             await page.wait_for_function("() => document.documentElement.dataset.app === 'second'")
             await page.evaluate(later)
