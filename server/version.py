@@ -6,7 +6,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 
-@cache  # it is asked for by each page and each recording, and would be read from the disk
+@cache  # each page and each recording needs it, and it would be read from the disk
 def catgraph_version() -> str:
     """The installed version; "0" for a checkout that was never installed."""
     try:

@@ -6,7 +6,7 @@ import random
 import socket
 from collections import deque
 
-# Below those that Linux takes for whoever binds to port 0: nobody else is given one of them by chance.
+# Below those that Linux takes for a program that binds to port 0: nobody else is given one of them by chance.
 FIRST, LAST = 20_000, 30_000
 MOST_RESERVED = 300  # of one process; the oldest are of tests that are over
 

@@ -25,7 +25,7 @@ from monitor.check import (
 )
 from monitor.figures import beside
 from monitor.motion import MOVES_ABOVE_MPS
-from monitor.phone_words import name_of, why_words
+from monitor.phone_text import name_of, why_text
 from monitor.phones import FIX_LIVES_S
 from monitor.snapshot import Snapshot
 
@@ -70,7 +70,7 @@ def _why_not(snapshot: Snapshot, was_active: bool) -> Finding | None:
         return unknown("The car's receiver has no fix", short="no fix")
     reason = view.why_not(now_s)
     if reason is not None:
-        reason_text = why_words(reason, view, now_s, name_of(view))
+        reason_text = why_text(reason, view, now_s, name_of(view))
         return unknown(reason_text.sentence, short=reason_text.short)
     return None
 

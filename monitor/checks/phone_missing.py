@@ -22,7 +22,7 @@ from monitor.check import (
     threshold,
     unknown,
 )
-from monitor.phone_words import name_of, why_words
+from monitor.phone_text import name_of, why_text
 from monitor.phones import FIX_LIVES_S
 from monitor.snapshot import Snapshot
 
@@ -47,7 +47,7 @@ def find(snapshot: Snapshot, limits: MissingLimits, was_active: bool) -> Finding
         return _none("This is not a phone: no position is expected", was_active)
     if why == "silent" and not view.was_usable and not view.is_chosen:
         return _none("No phone is sharing its position", was_active)  # nothing was lost with it
-    reason_text, missing_s = why_words(why, view, now_s, name_of(view)), view.missing_s(now_s)
+    reason_text, missing_s = why_text(why, view, now_s, name_of(view)), view.missing_s(now_s)
     if missing_s < limits.after_s and not was_active:
         return unknown(reason_text.sentence, short=reason_text.short)
     return fault(

@@ -148,7 +148,7 @@ class PageBus(Protocol):
         """Calls `watcher(kind)` whenever something new is there; answers how to end that."""
 
     def watch_events(self, vehicle: str, watcher: Watcher) -> Callable[[], None]:
-        """Calls `watcher(name)` whenever pages may have new events of a vehicle, or of any for `ALL`; whoever does is
+        """Calls `watcher(name)` whenever pages may have new events of a vehicle, or of any for `ALL`; the caller is
         no viewer. Answers how to end that."""
 
     def want(self, vehicle: str, kind: str, change: int) -> None:

@@ -179,7 +179,7 @@ class LocalBus:
         return self._watchers.view(vehicle, watcher)
 
     def watch_events(self, vehicle: str, watcher: Watcher) -> Callable[[], None]:
-        """Calls `watcher(name)` whenever pages may have new events; whoever does is no viewer."""
+        """Calls `watcher(name)` whenever pages may have new events; the caller is no viewer."""
         return self._watchers.follow(vehicle, watcher)
 
     def watched(self, vehicle: str) -> int:

@@ -12,7 +12,7 @@ from nats.aio.msg import Msg
 from server.bus import nats_wire as wire
 from server.bus.bus import ALL, FRAME_LIVES_S, SUMMARY, UNSERVED, Frame, NotServed, Watcher
 from server.bus.log_runs import Resumed
-from server.bus.nats_heard import GONE_AFTER_S, AgentLiveness
+from server.bus.nats_liveness import GONE_AFTER_S, AgentLiveness
 from server.bus.nats_logs import RemoteLogs
 from server.bus.nats_pulls import Pulls
 from server.bus.nats_questions import Questions, ReadEvent

@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--before", type=_seconds, default=BEFORE_S, metavar="S", help="with --at (default: 30)")
     parser.add_argument("--after", type=_seconds, default=AFTER_S, metavar="S", help="with --at (default: 30)")
     parser.add_argument("--background", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--asked", type=Path, help=argparse.SUPPRESS)  # the one of FILE that must be in it
+    parser.add_argument("--required", type=Path, help=argparse.SUPPRESS)  # the one of FILE that must be in it
     parser.add_argument("--name", help=argparse.SUPPRESS)  # what the recording is called, where not as its file
 
 
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     speaker: _Lines | _Person = _Lines() if args.background else _Person(args.format)
     try:
         out = _target(args)
-        with bounded_memory(), open_recording(args.files, asked=args.asked) as recording:
+        with bounded_memory(), open_recording(args.files, required=args.required) as recording:
             progress = _with_room(out.path, speaker.progress) if args.background else speaker.progress
             outcome = _export(recording, args, out, progress)
             is_whole = not recording.damage

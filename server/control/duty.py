@@ -1,7 +1,7 @@
 """Who is on duty: a person signs on at a device that is paired. Pure: time is an argument, in ms since 1970.
 
-A person is on duty at one device at a time: a name in the log then says in whose hand the device was, and an escalated
-alarm or a hand-over goes to one place. Signing on elsewhere moves the duty, and only by a request that says so.
+A person is on duty at one device at a time: a name in the log then shows who had the device, and an escalated
+alarm or a hand-over goes to one place. Signing on elsewhere moves the duty, and only by a request that states it.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from server.judge.frame_words import name_parts
+from server.judge.frame_names import name_parts
 from server.judge.message_fields import Rejected, finite
 from server.system.clean_text import clean
 

@@ -105,7 +105,7 @@ async def _exported(
             on_progress = partial(_part_of, progress, i, len(order.recordings))
             paths = [path] if len(drive) == 1 else await asyncio.to_thread(_paths, drive, source, recording, path)
             try:
-                made = await source.export(paths, order.format, into, on_progress, asked=path)
+                made = await source.export(paths, order.format, into, on_progress, required=path)
             except (OSError, ValueError, RuntimeError) as why:
                 raise CannotPrepare(f"{recording} cannot be written as {order.format}: {why}") from None
             path = made.path

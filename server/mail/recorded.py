@@ -22,6 +22,6 @@ class Recorded:
         return self._drive_of(recording)
 
     async def export(
-        self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None], *, asked: Path
+        self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None], *, required: Path
     ) -> Made:
-        return await make_export(paths, format, into, progress, asked=asked)
+        return await make_export(paths, format, into, progress, required=required)

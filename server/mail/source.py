@@ -19,10 +19,10 @@ class Source(Protocol):
         """All recordings of its drive, oldest first; the recording alone where nothing else is known. As `path_of`."""
 
     async def export(
-        self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None], *, asked: Path
+        self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None], *, required: Path
     ) -> Made:
         """Writes a recording, or all parts of a drive, in another format into the folder `into`. Progress is 0 to 1.
 
-        What cannot be read with `asked`, one of the paths, is left out and named in the notes.
+        What cannot be read with `required`, one of the paths, is left out and named in the notes.
         Raises OSError, ValueError or RuntimeError with a sentence.
         """

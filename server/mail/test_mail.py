@@ -28,7 +28,7 @@ class Trial:
     """The result of a test that succeeded."""
 
     sentence: str
-    said: str
+    reply: str
     is_encrypted: bool
     largest_bytes: int | None
 
@@ -56,7 +56,7 @@ async def try_out(settings: MailSettings, to: MailAddress | None, now_ms: int) -
                 how += (
                     f" It accepts mails of at most {largest / 1e6:.1f} MB: set the limit to {largest / 1.4e6:.1f} MB."
                 )
-            return Trial(sentence=how, said=reply, is_encrypted=settings.security != "none", largest_bytes=largest)
+            return Trial(sentence=how, reply=reply, is_encrypted=settings.security != "none", largest_bytes=largest)
     except Trouble as why:
         raise MailTestFailed(str(why)) from None
     except TimeoutError:

@@ -15,7 +15,7 @@ from monitor.values import Mode
 from server.protocol.departure import DepartureResult, RecurringItem
 from server.protocol.doc import doc
 from server.protocol.driving_state import DriveSample
-from server.protocol.marks import HasPhoto, HasVoice, MarkedBy, MarkedMs, MarkId, MarkWords
+from server.protocol.marks import HasPhoto, HasVoice, MarkedBy, MarkedMs, MarkId, MarkText
 from server.protocol.people import DutyRole
 
 
@@ -172,7 +172,7 @@ class EventDetails(TypedDict, total=False):
     mark: MarkId
     marked_ms: MarkedMs
     category: str | None
-    words: MarkWords
+    words: MarkText
     voice: HasVoice
     photo: HasPhoto
     source: MarkedBy

@@ -325,7 +325,7 @@ class DeviceList(TypedDict):
     devices: list[DeviceRow]
 
 
-# All of them; for whoever makes their schemas.
+# All of them; their schemas are made from it.
 Answers = (
     SettingsAnswer
     | SignalsAnswer

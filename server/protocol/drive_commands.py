@@ -142,7 +142,7 @@ class Decelerate(OfSlowing):
 
 
 class Release(OfSlowing):
-    """Ends the order, or the guard's hold, of this number: whoever drives may drive on."""
+    """Ends the order, or the guard's hold, of this number: the driver, or the car, may drive on."""
 
     http: ClassVar[str] = "The driver or controller may continue"
     path: ClassVar[str] = "/api/slow-down/release"

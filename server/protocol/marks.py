@@ -12,7 +12,7 @@ from server.protocol.doc import doc
 MarkSource = Literal["page", "http", "car"]
 MarkId = Annotated[str, doc("the mark's id")]
 MarkedMs = Annotated[int, doc("the moment that was marked, by the server's clock")]
-MarkWords = Annotated[str, doc('text on the moment; "": none')]
+MarkText = Annotated[str, doc('text on the moment; "": none')]
 HasVoice = Annotated[bool, doc("a voice note belongs to it")]
 HasPhoto = Annotated[bool, doc("a photo belongs to it")]
 MarkedBy = Annotated[MarkSource, doc("what marked: a page, a program, or the car's own button")]
@@ -24,7 +24,7 @@ class DriveMark(TypedDict):
     mark: MarkId
     marked_ms: MarkedMs
     category: str | None
-    words: MarkWords
+    words: MarkText
     voice: HasVoice
     photo: HasPhoto
     source: MarkedBy

@@ -2,7 +2,7 @@
 
 recordings/<vehicle>/<id>.mcap           closed, whole, never changed again
 recordings/<vehicle>/<id>.mcap.writing   being written, or left by a server that was killed
-recordings/<vehicle>/<id>.mcap.damaged   what could not be read again; kept for whoever can
+recordings/<vehicle>/<id>.mcap.damaged   what could not be read again; kept for a repair by hand
 recordings/.trash/                       deleted by the operator, and not yet gone
 """
 

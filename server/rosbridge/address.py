@@ -231,7 +231,7 @@ def demand_allowed(target: Address, hosts: Collection[str]) -> None:
     if hosts and target.host not in hosts and target.shown not in hosts:
         raise BadAddress(
             f"{target.shown} is not among the vehicles that this server may connect to.",
-            "Ask whoever started the server.",
+            "Ask the person who started the server.",
             code="not_allowed",
         )
 

@@ -40,7 +40,7 @@ ASSUMPTIONS = {
     "ros": "Ros.__init__ sets _id_counter, factory and is_connecting and then calls connect()",
 }
 
-LAST_WORD_S = 0.2
+FLUSH_S = 0.2
 
 
 class RosLink:
@@ -97,14 +97,14 @@ class RosLink:
     def retry_now(self) -> None:
         self._ros.factory.retry_now()
 
-    def stop(self, *, has_last_word: bool = False) -> None:
+    def stop(self, *, is_flushed: bool = False) -> None:
         """Close the link finally, without further listener calls. Unsent data is dropped, except, with
-        `has_last_word`, what was written just now, which gets a moment to arrive."""
+        `is_flushed`, what was written just now, which gets a moment to arrive."""
         self._stopped = self._safe.is_stopped = True
         self._ros.factory.stop()
         self._calls.fail_all("the link was ended")
-        if has_last_word and self._socket is not None:
-            self._ros.factory.loop.call_later(LAST_WORD_S, self.abort)
+        if is_flushed and self._socket is not None:
+            self._ros.factory.loop.call_later(FLUSH_S, self.abort)
         else:
             self.abort()
 

@@ -117,8 +117,8 @@ class LiveSource(CommandChannel, Protocol):
     def retry_now(self) -> None:
         """Dial now, without the pause after a failed attempt."""
 
-    def stop(self, *, has_last_word: bool = False) -> None:
-        """End for good, and report nothing more. `has_last_word`: what was just sent leaves before."""
+    def stop(self, *, is_flushed: bool = False) -> None:
+        """End for good, and report nothing more. `is_flushed`: what was just sent leaves before."""
 
     def subscribe(self, wanted: Subscription) -> None:
         """Ask for a topic, now and at every opening; in place of an earlier subscription to it."""

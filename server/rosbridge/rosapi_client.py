@@ -25,7 +25,7 @@ OPENS_WITHIN_S = 1.0
 SIGNS_OF_LIFE = frozenset({"/rosapi/get_time", "/rosapi/topics"})  # on every rosapi, with a short answer
 
 
-class Asks(Protocol):
+class ServiceCaller(Protocol):
     """Whatever can call a service of the bridge."""
 
     async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any: ...

@@ -39,7 +39,7 @@ class Publications:
         self._bridge = bridge
         self._say = say
         self._advertised: dict[str, set[object]] = {}  # topic → ids under which it was advertised
-        self._told_of_times: set[str] = set()  # topics whose messages had times that ROS 1 leaves out
+        self._reported_times: set[str] = set()  # topics whose messages had times that ROS 1 leaves out
 
     def advertise(self, operation: dict[str, Any], id: object) -> None:
         name = fields.text(operation, "topic")
@@ -67,7 +67,7 @@ class Publications:
         ids.discard(id)
         if id is None or not ids:
             del self._advertised[topic.name]
-            self._told_of_times.discard(topic.name)
+            self._reported_times.discard(topic.name)
             topic.publishers.discard(self)
             self._bridge.graph.tidy(topic)
 
@@ -85,8 +85,8 @@ class Publications:
             topic.publishers.add(self)
         notes: list[str] = []
         message = self._bridge.types.complete(topic.type, message, self._bridge.now(), notes)
-        if notes and topic.name not in self._told_of_times:
-            self._told_of_times.add(topic.name)
+        if notes and topic.name not in self._reported_times:
+            self._reported_times.add(topic.name)
             self._say("error", f"publish: {topic.name}: {'; '.join(notes[:3])}; this is not repeated", id)
         topic.published += 1
         header = message.get("header")

@@ -107,7 +107,7 @@ class FrozenSpeed(Effect):
 
 
 class IgnoredCommand(Effect):
-    """Whoever drives orders a stop while the car is in motion; the car does what it would have done anyway."""
+    """The driver orders a stop while the car is in motion; the car does what it would have done anyway."""
 
     ABOVE_MPS = 2.0
 

@@ -177,10 +177,10 @@ class CarService:
                 self.start_scenario(name, duration_s)
         except UnknownScenario as error:
             raise ServiceFailed(str(error)) from None
-        return {"success": True, "message": _said(name, stop)}
+        return {"success": True, "message": _confirmation(name, stop)}
 
 
-def _said(name: str, stop: bool) -> str:
+def _confirmation(name: str, stop: bool) -> str:
     if not stop:
         return f"{name} started"
     return f"{name} stopped" if name else "all scenarios stopped"

@@ -125,7 +125,7 @@ STANDING = MotionCommand(speed_mps=0.0, tyre_rad=0.0)
 
 
 class Stack:
-    """The last command on the command topic, whoever sent it, and the part of it that the car carries out."""
+    """The last command on the command topic, of any publisher, and the part of it that the car carries out."""
 
     def __init__(self, *, has_stopper: bool = True) -> None:
         self.has_stopper = has_stopper
@@ -140,7 +140,7 @@ class Stack:
         return self._command.tyre_rad
 
     def receive(self, command: MotionCommand, now_s: float) -> None:
-        """Take a message of the command topic, whoever sent it; the last one counts."""
+        """Take a message of the command topic, of any publisher; the last one counts."""
         self._command, self._received_s = command, now_s
 
     def see(self, distance_m: float) -> None:

@@ -22,7 +22,7 @@ _TOKEN = re.compile(
     r'(?P<text>"""(?:[^"\\]|\\[\s\S]|"(?!""))*+(?:"{3,5}+|\Z)'  # two more quotes at its end belong to it
     r"|'''(?:[^']|'(?!''))*+(?:'{3,5}+|\Z)"
     r'|"(?:[^"\\\n]|\\.)*+"?|' + r"'[^'\n]*+'?)"
-    r"|(?P<comment>\#[^\n]*+)|(?P<space>[ \t\r]++)|(?P<word>[A-Za-z0-9_+:-]++)|(?P<line>\n++)|(?P<other>[\s\S])"
+    r"|(?P<comment>\#[^\n]*+)|(?P<space>[ \t\r]++)|(?P<bare>[A-Za-z0-9_+:-]++)|(?P<line>\n++)|(?P<other>[\s\S])"
 )
 
 
@@ -56,7 +56,7 @@ def _demand_flat(text: str) -> None:
     nesting = entries = 0
     for token in _TOKEN.finditer(text):
         match token.lastgroup:
-            case "space" | "word" | "text" | "comment":
+            case "space" | "bare" | "text" | "comment":
                 continue
         match token.group():
             case ".":

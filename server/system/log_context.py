@@ -27,7 +27,7 @@ def about(vehicle: str) -> Iterator[None]:
 
 
 def keeping(handler: Handler) -> Handler:
-    """The handler; what it logs is about the car that is meant where this is called, whoever calls the handler."""
+    """The handler; it logs for the car of this call's context, not of the handler's call."""
     vehicle = _VEHICLE.get()
 
     async def handle(message: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -23,9 +23,9 @@ from server.vehicle.handover_lines import (
     alarm_lines,
     departure_line,
     driving_line,
+    in_car_line,
     limit_lines,
     mode_lines,
-    rides_line,
     stop_lines,
 )
 from server.vehicle.judgement import Judgement
@@ -84,7 +84,7 @@ class CarHandover:
                 does = "is off duty and" if off_ms is not None else "is on duty again, and"
                 self._note("owner", f"{owner} {does} has acknowledged: {titles}.", owner=owner, off_duty_ms=off_ms)
 
-    def obey(
+    def execute(
         self, command: handover_commands.HandoverCommand, caller: Caller, now_s: float, wall_ms: int
     ) -> Operator | None:
         """Who was in control until now, where control changed by it; None: it did not. Raises Refused."""
@@ -160,7 +160,7 @@ class CarHandover:
         return [
             *alarm_lines(standing),
             *limit_lines(self._settings.as_json()),
-            rides_line(
+            in_car_line(
                 self._authorization.people(now_s), compared["label"] if compared is not None and is_riding else None
             ),
             driving_line(self._driving.frame(now_s, wall_ms)),

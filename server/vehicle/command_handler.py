@@ -219,7 +219,7 @@ class CommandHandler:
                 parts.authorization.execute(command, caller, now_s)
                 self._actions.attention_changed()  # the queue shows who requests control
             case handover_commands.OfHandover():
-                was = parts.handover.obey(command, caller, now_s, self._wall_ms())
+                was = parts.handover.execute(command, caller, now_s, self._wall_ms())
                 parts.publisher.put()
                 return was
             case drive_commands.OfDeparture():

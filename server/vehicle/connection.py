@@ -101,11 +101,11 @@ class Connection:
         self.subscriptions = self._make_subscriptions(self.link)
         self.link.start()
 
-    def drop(self, *, has_last_word: bool = False) -> None:
-        """Closes the link. `has_last_word`: what was just sent leaves before."""
+    def drop(self, *, is_flushed: bool = False) -> None:
+        """Closes the link. `is_flushed`: what was just sent leaves before."""
         self.subscriptions.end()
         if self.link is not None:
-            self.link.stop(has_last_word=has_last_word)
+            self.link.stop(is_flushed=is_flushed)
             self.link = None
 
     def refuse(self, why: BadAddress) -> bool:

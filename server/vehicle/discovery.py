@@ -11,7 +11,7 @@ from server.judge.message_fields import stamp_s
 from server.judge.topics import ros_version
 from server.recording.read.schemas import text_of_details
 from server.rosbridge.live_source import CallFailed, LinkDown
-from server.rosbridge.rosapi_client import Asks
+from server.rosbridge.rosapi_client import ServiceCaller
 
 MAX_TOPICS = 5000
 MAX_PUBLISHERS = 100
@@ -34,7 +34,7 @@ class Offer:
     ros: RosVersion | None
 
 
-async def fetch_topics(link: Asks) -> Offer | None:
+async def fetch_topics(link: ServiceCaller) -> Offer | None:
     """The topics of the car; None where the bridge has no rosapi or does not answer sensibly. Raises LinkDown."""
     try:
         answer = await link.call("/rosapi/topics", timeout_s=2.5)
@@ -50,7 +50,7 @@ async def fetch_topics(link: Asks) -> Offer | None:
     return Offer(topics=found, ros=2 if version == 2 else 1 if version == 1 else None)
 
 
-async def fetch_definitions(link: Asks, types: Collection[str], ros: RosVersion | None) -> dict[str, str]:
+async def fetch_definitions(link: ServiceCaller, types: Collection[str], ros: RosVersion | None) -> dict[str, str]:
     """The type definitions known to the bridge, as .msg text. Raises LinkDown, or CallFailed without an answer.
 
     `message_details` is called on ROS 1 only: on ROS 2 it can end rosapi.
@@ -68,7 +68,7 @@ async def fetch_definitions(link: Asks, types: Collection[str], ros: RosVersion 
     return found
 
 
-async def fetch_alive(link: Asks, *, timed: Callable[[float], None] = lambda _: None) -> bool | None:
+async def fetch_alive(link: ServiceCaller, *, timed: Callable[[float], None] = lambda _: None) -> bool | None:
     """Whether ROS behind the bridge answers; None: unknown, no rosapi. Raises LinkDown. `timed` gets the time of ROS
     [s]."""
     try:
@@ -81,7 +81,7 @@ async def fetch_alive(link: Asks, *, timed: Callable[[float], None] = lambda _: 
     return isinstance(answer, Mapping)
 
 
-async def fetch_publishers(link: Asks, topic: str, *, and_bridge: bool = False) -> tuple[str, ...] | None:
+async def fetch_publishers(link: ServiceCaller, topic: str, *, and_bridge: bool = False) -> tuple[str, ...] | None:
     """The nodes that publish on a topic; `and_bridge`: with the bridge, thus us; None: unknown. Raises LinkDown."""
     try:
         answer = await link.call("/rosapi/publishers", {"topic": topic}, timeout_s=1.0)
@@ -94,7 +94,7 @@ async def fetch_publishers(link: Asks, topic: str, *, and_bridge: bool = False) 
     return tuple(sorted(name[:MAX_NAME] for name in found if and_bridge or not any(own in name for own in BRIDGES)))
 
 
-async def fetch_subscribers(link: Asks, topic: str) -> tuple[str, ...] | None:
+async def fetch_subscribers(link: ServiceCaller, topic: str) -> tuple[str, ...] | None:
     """The nodes that subscribe to a topic, including the bridge; None: unknown. Raises LinkDown."""
     try:
         answer = await link.call("/rosapi/subscribers", {"topic": topic}, timeout_s=1.0)
@@ -106,7 +106,7 @@ async def fetch_subscribers(link: Asks, topic: str) -> tuple[str, ...] | None:
     return tuple(sorted({name[:MAX_NAME] for name in names[:MAX_PUBLISHERS] if isinstance(name, str)}))
 
 
-async def _fetch_type(link: Asks, topic: str) -> str:
+async def _fetch_type(link: ServiceCaller, topic: str) -> str:
     try:
         answer = await link.call("/rosapi/topic_type", {"topic": topic}, timeout_s=1.5)
     except (CallFailed, LinkDown):

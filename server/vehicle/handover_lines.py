@@ -99,7 +99,7 @@ def limit_lines(settings: SettingsAnswer) -> list[Line]:
     return lines
 
 
-def rides_line(people: Sequence[Operator], phone: str | None) -> Line:
+def in_car_line(people: Sequence[Operator], phone: str | None) -> Line:
     """Who is in the car: who is signed on as safety driver with a page of this car, and the phone that is in it."""
     names = sorted({one.person.name for one in people if one.person is not None and one.person.role == "safety_driver"})
     where = f"Phone in the car: {phone}." if phone else "No phone is known to be in the car."

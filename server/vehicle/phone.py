@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from monitor.agreement import phone_sigma_m
-from monitor.phone_words import why_words
+from monitor.phone_text import why_text
 from monitor.phones import PhoneView
 from monitor.state import Snapshot
 from server.protocol import serialize
@@ -91,5 +91,5 @@ def _place(view: PhoneView, now_s: float, name: str = "this phone") -> PhonePlac
         "age_s": serialize.plain(max(0.0, now_s - view.measured_s), 2) if fix else None,
         "used": why is None,
         "why": why,
-        "why_text": why_words(why, view, now_s, name).sentence if why else None,
+        "why_text": why_text(why, view, now_s, name).sentence if why else None,
     }

@@ -11,7 +11,7 @@ from server.recording import recorded_topics
 from server.rosbridge.connection_errors import Problem
 from server.rosbridge.diagnosis import Diagnosis
 from server.rosbridge.live_source import LiveSource
-from server.rosbridge.rosapi_client import Asks, Questions
+from server.rosbridge.rosapi_client import Questions, ServiceCaller
 from server.vehicle import discovery
 from server.vehicle.delivery import Delivery
 from server.vehicle.undelivered import CLIENT_COUNT, Passing
@@ -122,7 +122,7 @@ class MissingWatch:
 
     async def look(
         self,
-        rosapi: Asks,
+        rosapi: ServiceCaller,
         candidates: Collection[str],
         *,
         commanded: Collection[str | None],
@@ -157,7 +157,7 @@ class MissingWatch:
             self._named |= set(missing)
             self._noted(f"Topics with a publisher but no messages: {', '.join(news[:MOST_NAMED])}.")
 
-    async def look_behind(self, rosapi: Asks) -> None:
+    async def look_behind(self, rosapi: ServiceCaller) -> None:
         """Fetch whether the bridge subscribed to published signal topics that do not arrive; renew those that another
         client no longer blocks. Raises LinkDown."""
         needed = self._undelivered.needs_clients

@@ -245,8 +245,8 @@ class Session:
     def _end(self) -> None:
         """One car's monitoring is over: its alarms end in the log, and all that is known of it is forgotten."""
         self._parts.judgement.report(self._parts.judgement.monitor.end(self._now()))
-        said_farewell = self._parts.slow_down.ended()
-        self._parts.connection.drop(has_last_word=said_farewell)
+        has_released = self._parts.slow_down.ended()
+        self._parts.connection.drop(is_flushed=has_released)
         self._parts.recording.ended()
         self._parts.pause.forget()
         self._parts.planned_stop.end(": monitoring ended", by=None)

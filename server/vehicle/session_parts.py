@@ -74,7 +74,7 @@ class StatePublisher:
             asyncio.get_running_loop().call_later(EVENTS_FIRST_S, self._put_due)
 
     def put(self) -> None:
-        """Never raises: an order that was obeyed is not answered with an error because no state can be made. Pages
+        """Never raises: an order that was executed is not answered with an error because no state can be made. Pages
         that get none cover their values."""
         self.is_due = False
         try:

@@ -12,7 +12,7 @@ from server.judge.topics import Source, could_carry
 from server.recording.recorded_topics import Also, Missing
 from server.rosbridge.connection_errors import Problem
 from server.rosbridge.live_source import LinkDown, LiveSource
-from server.rosbridge.rosapi_client import Asks
+from server.rosbridge.rosapi_client import ServiceCaller
 from server.vehicle import car_marks, discovery
 from server.vehicle.rosapi_watch import MissingWatch, RosWatch
 from server.vehicle.signal_map import SignalMap
@@ -223,7 +223,7 @@ class Subscriptions:
 
     # -- subscribing -------------------------------------------------------------------------------------------------
 
-    async def _look(self, link: LiveSource, rosapi: Asks) -> None:
+    async def _look(self, link: LiveSource, rosapi: ServiceCaller) -> None:
         offer = await discovery.fetch_topics(rosapi)
         if link is not self._link:
             return
@@ -243,7 +243,7 @@ class Subscriptions:
         self._map()
         self._learn(rosapi, offer)
 
-    def _learn(self, rosapi: Asks, offer: discovery.Offer) -> None:
+    def _learn(self, rosapi: ServiceCaller, offer: discovery.Offer) -> None:
         if self.table.also != "none":
             self._definitions.learn(rosapi, offer.topics, self.ros_version)
 

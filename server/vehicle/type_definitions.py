@@ -21,7 +21,7 @@ from server.judge.message import RosVersion
 from server.recording.read.definitions import bounded, demand_few_fields
 from server.recording.read.schemas import long_type, standard
 from server.rosbridge.live_source import CallFailed, LinkDown
-from server.rosbridge.rosapi_client import Asks
+from server.rosbridge.rosapi_client import ServiceCaller
 from server.vehicle import discovery
 
 _DEEPEST = 32
@@ -104,7 +104,7 @@ class TypeDefinitions:
         self.fit: set[str] = set()  # of those, the ones that arrive as CBOR
         self.may_be_large: set[str] = set()  # types that have arrays without a bound
 
-    def learn(self, rosapi: Asks, topics: Mapping[str, str], ros_version: int | None) -> None:
+    def learn(self, rosapi: ServiceCaller, topics: Mapping[str, str], ros_version: int | None) -> None:
         """Start to fetch unknown type definitions of these topics; does nothing while a fetch runs."""
         if self._task is None:
             self._task = asyncio.create_task(self._ask(rosapi, topics, ros_version), name="definitions")
@@ -116,7 +116,7 @@ class TypeDefinitions:
         if self._task is not None:
             self._task.cancel()
 
-    async def _ask(self, rosapi: Asks, topics: Mapping[str, str], ros_version: int | None) -> None:
+    async def _ask(self, rosapi: ServiceCaller, topics: Mapping[str, str], ros_version: int | None) -> None:
         """Definitions come first: what is recorded before they are known is JSON."""
         types = {kind for kind in topics.values() if kind} - self.requested
         if self._tries < LEARN_TRIES:

@@ -42,7 +42,7 @@ class Hub:
         wall_ms: Callable[[], int],
         people: People = NOBODY,
     ) -> None:
-        """`server`: the server's part of a state; `off`: who said that a car is off; `now` is a monotonic clock [s],
+        """`server`: the server's part of a state; `off`: who declared a silent car off; `now` is a monotonic clock [s],
         `wall_ms` the time of day."""
         self._bus = bus
         self._limits = limits

@@ -77,7 +77,7 @@ class PageWriter:
         self._is_taking = False  # the page requested the newest
         self._replies: list[messages.ToPage] = []
         self._event = 0  # the last number sent; from the greeting on
-        self._have: int | None = None  # the newest event that the page has, as it said, and the run that it is of
+        self._have: int | None = None  # the newest event that the page has, as its hello names it, and its run
         self._have_run: str | None = None
         self._is_resuming = False  # where a page of another run goes on is not known yet
         self._resumed: messages.Resumed | None = None  # to be sent with the next events
@@ -85,7 +85,7 @@ class PageWriter:
         self._run = ""  # of the vehicle's session when the page was greeted
         self._feed = EventFeed(bus, vehicle, now, lambda: self.on_new("events"))
         self._are_events_due = self._are_events_unanswered = False
-        self._has_begun = False  # the page said hello
+        self._has_begun = False  # the page's hello came
         self._is_former = False
         self._is_state_waiting = False  # a state of the live car came that was not sent yet
         self.skipped = 0  # states of the live car that were replaced by newer ones before they were sent
@@ -124,7 +124,7 @@ class PageWriter:
     # -- what the page answers ---------------------------------------------------------------------------------------
 
     def begin(self, have_event: object, run: object = None, *, is_former: bool = False) -> None:
-        """The page said hello, and which event is the newest that it has, of which run; only the first hello counts.
+        """Take the page's hello: its newest event, and the run of that. Only the first hello counts.
         `is_former`: it knows the former names of phases."""
         self._is_former = self._is_former or (is_former and not self._has_begun)
         if not self._has_begun and type(have_event) is int and have_event < 1 << 53:
@@ -187,7 +187,7 @@ class PageWriter:
     async def run(self, hello: Callable[[], Hello]) -> None:
         """Sends until the socket fails, whose end the reader notices as well.
 
-        Where the vehicle's session is elsewhere and was not heard yet, the page is informed, and greeted once it was.
+        Where the vehicle's session is elsewhere and sent nothing yet, the page is informed, and greeted once it has.
         """
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):
             while not self._bus.knows(self._vehicle):
@@ -197,7 +197,7 @@ class PageWriter:
             self._since_s = self._now()
             self._event, self._run = self._bus.last_event(self._vehicle), self._bus.run(self._vehicle)
             self._is_greeted = True
-            asyncio.get_running_loop().call_later(HELLO_WITHIN_S, self._wake.set)  # for a client that says no hello
+            asyncio.get_running_loop().call_later(HELLO_WITHIN_S, self._wake.set)  # for a client that sends no hello
             self._go_on()
             await self._send(hello())
             with contextlib.suppress(NotServed):  # there may have been no viewer for a while

@@ -268,7 +268,7 @@ function mountScreens(page, arming) {
   mountChip(need(document, '#connect'), cars);
   const start = need(document, '#start');
   mountStart(start, store);
-  if (start.querySelector('[data-f="who"]')) mountChip(start, cars); // the car that is asked for may never answer: another one may be chosen
+  if (start.querySelector('[data-f="who"]')) mountChip(start, cars); // the requested car may never answer: another one may be chosen
   mountConnect(need(document, '#connect'), store, router, arming);
   const contents = tabContents(monitor, store, say, (name) => router.isMonitorShown && tabs.shows(name) && screens.open === null);
   const screens = new Screens(monitor, store, () => page.front(), say);

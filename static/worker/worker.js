@@ -1,12 +1,12 @@
 // Keeps the page's shell on this phone, and nothing that is live. The server writes `self.SHELL` before it: which files.
 //
-// The page itself always comes from the server; only where the server does not answer, a page of its own says so. Files whose
+// The page itself always comes from the server; only where the server does not answer, a page of its own states it. Files whose
 // address holds the hash of their content come from here: another content has another address, so none can be old or mixed.
 
 /**
  * @typedef {{version: string, build: string, named: string[], plain: string[], offline: string}} Kept
  * @typedef {Event & {waitUntil(work: Promise<unknown>): void}} Lasting
- * @typedef {Event & {request: Request, respondWith(answer: Promise<Response>): void}} Asked
+ * @typedef {Event & {request: Request, respondWith(answer: Promise<Response>): void}} FetchEvent
  * @typedef {{postMessage(what: unknown, ports: MessagePort[]): void}} Client
  * @typedef {{SHELL: Kept, skipWaiting(): Promise<void>, clients: {claim(): Promise<void>, matchAll(of: object): Promise<Client[]>}}} Scope
  */
@@ -27,7 +27,7 @@ scope.addEventListener('message', (event) => {
   if (data?.kind === 'take') /** @type {Lasting} */ (event).waitUntil(take());
 });
 scope.addEventListener('fetch', (event) => {
-  const { request, respondWith } = /** @type {Asked} */ (event);
+  const { request, respondWith } = /** @type {FetchEvent} */ (event);
   if (request.method !== 'GET') return;
   const { origin, pathname, search } = new URL(request.url);
   if (origin !== location.origin) return;

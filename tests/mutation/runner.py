@@ -66,7 +66,7 @@ class Runner:
         self._done = done
 
     def pytest_configure(self) -> None:
-        """A failing example is enough: to make it small costs much and says nothing here."""
+        """A failing example is enough: to make it small costs much and shows nothing here."""
         from hypothesis import Phase, settings
 
         phases = (Phase.explicit, Phase.generate)

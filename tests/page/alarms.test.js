@@ -43,7 +43,7 @@ test('strip, list, dialog, snackbar, title and sound have one order: unacknowled
     const ended = first.active ? '' : ': ended';
     assert.equal(rowsOf(left, [], true)[0]?.id, first.id);
     assert.equal(stripOf(frame, { isSilent: false, chain, paused_s: 0 }).text, `${first.title}${ended}`);
-    assert.match(badgeOf(frame, { isSilent: false, isMonitoring: true, word: 'Live' }).title, new RegExp(`^\\(\\d+\\) ${first.title}${ended} `));
+    assert.match(badgeOf(frame, { isSilent: false, isMonitoring: true, state: 'Live' }).title, new RegExp(`^\\(\\d+\\) ${first.title}${ended} `));
     assert.equal(asideOf(/** @type {any} */ ({ phase: 'monitoring', cut: null, alarms: left }))?.text.split(' (')[0], `Live: ${first.title}${ended}`);
     const asking = first.state === 'ACKED' ? null : first;
     const { dialog, snackbars } = layOut(left);

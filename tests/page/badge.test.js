@@ -3,7 +3,7 @@ import { test } from 'node:test';
 import { badgeOf } from '../../static/js/shell/badge.js';
 import { alarm, state } from './frames.js';
 
-const seen = { isSilent: false, isMonitoring: true, word: 'Live' };
+const seen = { isSilent: false, isMonitoring: true, state: 'Live' };
 const warning = (more = {}) => alarm({ id: 'gps', title: 'GPS drift', priority: 'warning', ...more });
 
 test('the title names the worst alarm and counts what is urgent', () => {
@@ -17,7 +17,7 @@ test('the title names the worst alarm and counts what is urgent', () => {
 test('what is not live is never called by its last alarm', () => {
   const frame = state({ alarms: [alarm()] });
   assert.deepEqual(badgeOf(frame, { ...seen, isSilent: true }), { title: 'Not live · catgraph', icon: 'lost', count: null });
-  assert.equal(badgeOf(frame, { ...seen, word: 'Lost' }).title, 'Connection lost · catgraph');
+  assert.equal(badgeOf(frame, { ...seen, state: 'Lost' }).title, 'Connection lost · catgraph');
   assert.equal(badgeOf(frame, { ...seen, isMonitoring: false }).title, 'catgraph');
   assert.equal(badgeOf(null, seen).title, 'catgraph');
   assert.match(badgeOf(state({ session: { paused: true } }), seen).title, /^Paused/);

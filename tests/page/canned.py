@@ -151,7 +151,7 @@ def slow(state: str, **more: Any) -> Json:
 
 
 def slowed(confirmed: bool | None = True, **more: Any) -> Json:
-    """An order of 1.3 s ago as it stands, where it was obeyed: each step later than the one before."""
+    """An order of 1.3 s ago as it stands, where it was executed: each step later than the one before."""
     begun_ms = _now_ms() - 1300
     slows_ms = begun_ms + 420 if confirmed else None
     steps = {"pressed_ms": begun_ms, "server_ms": begun_ms + 20, "bridge_ms": begun_ms + 30, "slows_ms": slows_ms}

@@ -91,7 +91,7 @@ def quiet() -> list[Json]:
 
 def events() -> list[Json]:
     rows = ((9, "Caracal", "Assigned to Desk 2.", 152), (8, "Ocelot", "Desk 2 gave it back: unassigned.", 250),
-            (7, "Ocelot", "Desk 2 asks Field 2 to take over.", 570))  # fmt: skip
+            (7, "Ocelot", "Desk 2 offers it to Field 2.", 570))  # fmt: skip
     return [
         {"vehicle": name, "n": n, "time_ms": now_ms() - 1000 * ago_s, "text": text, "by": "Desk 2"}
         for n, name, text, ago_s in rows

@@ -41,7 +41,7 @@ test('the car that needs a person most comes first', () => {
 test('a row shows what needs an answer, for how long, who is in control, and how old its speed is', () => {
   const [one] = rows({ serval: summary({ worst: worst(), waiting: 2, holder: 'Ann', page: 'my-page' }) });
   assert.equal(one?.text, 'Speed above limit, 7.1 s +1');
-  assert.deepEqual([one?.operator, one?.speed, one?.chain?.word, one?.isFilled, one?.recording], ['You', { ink: 'fresh', value_mps: 4.2 }, 'Live', true, '04:12']);
+  assert.deepEqual([one?.operator, one?.speed, one?.chain?.state, one?.isFilled, one?.recording], ['You', { ink: 'fresh', value_mps: 4.2 }, 'Live', true, '04:12']);
   assert.equal(rows({ serval: summary({ worst: worst({ active: false, state: 'RTN_UNACKED' }) }) })[0]?.text, 'Speed above limit: ended', 'an older agent');
   assert.equal(rows({ serval: summary({ worst: worst({ active: false, state: 'RTN_UNACKED', ended_title: 'The car was silent' }) }) })[0]?.text, 'The car was silent');
   assert.equal(rows({ serval: summary({ worst: worst({ state: 'ACKED' }) }) })[0]?.text, 'Speed above limit, acknowledged');

@@ -82,7 +82,7 @@ test('both play from one key, and stand at the same moment after the next', asyn
   server.pace.toggle();
   await server.run(3);
   assert.ok(server.replays.a.at_s > 8, `${server.replays.a.at_s}`);
-  assert.equal(server.orders.filter((order) => order === 'a rate').length, 1, 'an order that was obeyed is not repeated');
+  assert.equal(server.orders.filter((order) => order === 'a rate').length, 1, 'an order that was executed is not repeated');
   assert.ok(server.apart_s < 1, `${server.apart_s}`);
   server.pace.toggle();
   await server.run(1);

@@ -79,7 +79,7 @@ def words_of(message: ConsoleMessage) -> str:
 def is_complaint(message: ConsoleMessage) -> bool:
     """Whether the page reports on its console that something is wrong. It is not that these tests keep its worker away,
     that a page on a slow machine shows its first number some seconds after it preloaded the font, or that the browser
-    asks for the site's icon while the page is being left, and refuses itself."""
+    loads the site's icon while the page is being left, and refuses it itself."""
     text = message.text
     is_advice = "blocked by Playwright" in text or ("catgraph-numerals" in text and "was preloaded" in text)
     is_icon = "apple-touch-icon" in text + message.location["url"]
@@ -172,7 +172,7 @@ class Phone:
 
     async def live(self) -> None:
         """Waits until the values are live."""
-        await expect(self.f("word")).to_have_text(LIVE, timeout=40_000)
+        await expect(self.f("link-state")).to_have_text(LIVE, timeout=40_000)
         await expect(self.f("veil")).not_to_have_attribute("data-on", re.compile("."))
 
     async def acknowledge_all(self) -> None:

@@ -1,4 +1,4 @@
-"""Small drives written as ROS 1 bags, for a real bridge to replay: what a car says is chosen by the test."""
+"""Small drives written as ROS 1 bags, for a real bridge to replay: what a car sends is chosen by the test."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ def number(value: float) -> Any:
 
 
 def steering(tyre_rad: float) -> Any:
-    """As the simulated car says it, for which a drive with these topics is taken: the tyres' angle, positive = left."""
+    """As the simulated car sends it, which such topics are taken for: the tyres' angle, positive = left."""
     return T["geometry_msgs/msg/Wrench"](
         force=vector(0.0), torque=T["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=tyre_rad)
     )
 
 
 def laser(at_s: float, ranges_m: Any, angle_min: float = -np.pi / 2, increment: float | None = None) -> Any:
-    """A scan `at_s` after the start; its beams stand evenly over half a turn from the right, unless told otherwise."""
+    """A scan `at_s` after the start; its beams stand evenly over half a turn from the right by default."""
     ranges = np.asarray(ranges_m, dtype=np.float32)
     step = np.pi / max(ranges.size - 1, 1) if increment is None else increment
     sec, nanosec = divmod(BEGAN_NS + round(at_s * 1e9), 10**9)
@@ -82,18 +82,18 @@ def diagnostics(*components: tuple[str, int, str]) -> Any:
     return T["diagnostic_msgs/msg/DiagnosticArray"](header=header, status=rows)
 
 
-def write(path: Path, says: dict[str, Callable[[float], Any]], *, seconds: float = 10.0) -> Path:
-    """A bag in which each named signal says what its function gives for the time since the start [s]; where it
+def write(path: Path, signals: dict[str, Callable[[float], Any]], *, seconds: float = 10.0) -> Path:
+    """A bag in which each named signal has what its function gives for the time since the start [s]; where it
     gives None, the signal is silent."""
     with Writer(path) as bag:
         lines = {}
-        for name in says:
+        for name in signals:
             topic, kind, hz = TOPICS[name]
             lines[name] = (bag.add_connection(topic, kind, typestore=STORE), kind, hz)
         moments = sorted((i / hz, name) for name, (_, _, hz) in lines.items() for i in range(round(seconds * hz)))
         for at_s, name in moments:
             connection, kind, _ = lines[name]
-            message = says[name](at_s)
+            message = signals[name](at_s)
             if message is not None:
                 bag.write(connection, BEGAN_NS + round(at_s * 1e9), bytes(STORE.serialize_ros1(message, kind)))
     return path

@@ -31,7 +31,7 @@ test('live values, ages and distances have a comma', () => {
   assert.deepEqual([unseenWords(2.71), rateWords(0.25)], ['≤ 2,8 m unseen', '×0,25']);
 });
 
-test('the mark of a usual language is known without the long start of Intl, and is what Intl says', () => {
+test('the mark of a usual language is known without the long start of Intl, and is that of Intl', () => {
   assert.equal(fixed(4.25), '4,3');
   assert.equal(built, 0, 'a number was drawn without it');
   for (const [language, mark] of Object.entries(KNOWN)) assert.equal(new NumberFormat(language).formatToParts(1.5).find(({ type }) => type === 'decimal')?.value, mark, language);

@@ -29,12 +29,10 @@ def build(house: Path) -> None:
     join(MODULES / ".bin", house / "static")
 
 
-def change(house: Path, word: str) -> None:
-    """Another version of the page: the script that begins it and one that is fetched later both say `word`."""
-    for name, word_of in (("main.js", "app"), ("shell/about.js", "about")):
+def change(house: Path, mark: str) -> None:
+    """Another version of the page: the script that begins it and one that is fetched later both bear `mark`."""
+    for name, key in (("main.js", "app"), ("shell/about.js", "about")):
         path = house / "static" / "js" / name
         text = path.read_text(encoding="utf-8").split("\n// --- another version ---\n")[0]
-        path.write_text(
-            f"{text}\n// --- another version ---\ndocument.documentElement.dataset['{word_of}'] = '{word}';\n"
-        )
+        path.write_text(f"{text}\n// --- another version ---\ndocument.documentElement.dataset['{key}'] = '{mark}';\n")
     build(house)

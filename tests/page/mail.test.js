@@ -52,7 +52,7 @@ for (const [name, given, label, detail] of /** @type {[string, object, string, s
   ['refused', { state: 'failed', said: '550 no.', parts: [part({ state: 'failed' })] }, 'Failed', '550 no.'],
   ['cancelled', { state: 'cancelled' }, 'Cancelled', ''],
 ])) {
-  test(`a mail that is ${name} says so`, () => {
+  test(`the state of a mail that is ${name}`, () => {
     const found = stateOf(mail(given), NOW_MS);
     assert.equal(found.label, label);
     assert.equal(found.detail, detail);

@@ -97,7 +97,7 @@ test('what is to be delivered follows from what is stored', () => {
 
 /**
  * A server that answers as set.
- * @param {(step: string, id: string) => import('../../static/js/drive/mark-delivery.js').Told | Promise<import('../../static/js/drive/mark-delivery.js').Told>} tells
+ * @param {(step: string, id: string) => import('../../static/js/drive/mark-delivery.js').Delivered | Promise<import('../../static/js/drive/mark-delivery.js').Delivered>} tells
  * @param {{vehicle?: () => string, onChange?: () => void}} [more]
  */
 function delivery(tells, { vehicle = () => 'car', onChange = () => {} } = {}) {
@@ -177,7 +177,7 @@ test('one that is refused shows why and keeps no other waiting', async () => {
 });
 
 test('a photo that cannot be uploaded, or takes long, keeps no mark waiting', async () => {
-  /** @type {((reply: import('../../static/js/drive/mark-delivery.js').Told) => void) | undefined} */
+  /** @type {((reply: import('../../static/js/drive/mark-delivery.js').Delivered) => void) | undefined} */
   let answer;
   const { it, kept, received, wait } = delivery((step) => (step === 'photo' ? new Promise((resolve) => { answer = resolve; }) : OK));
   kept.set('a', mark('a', { stored: 1, photo: part() }));

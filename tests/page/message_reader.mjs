@@ -8,7 +8,7 @@ for await (const line of createInterface({ input: process.stdin })) {
   try {
     const frame = readMessage(JSON.parse(line));
     result.kind = frame?.kind ?? null;
-    if (frame?.kind === 'state') result.word = chainOf({ frame, isSilent: false, silence_s: 0.1, lag_s: 0.1, heard_ms: 0 }).word;
+    if (frame?.kind === 'state') result.link = chainOf({ frame, isSilent: false, silence_s: 0.1, lag_s: 0.1, heard_ms: 0 }).state;
   } catch (error) {
     result.threw = String(error);
   }

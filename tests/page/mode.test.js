@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { alarmWords, modeWords, startedWords } from '../../static/js/drive/mode-words.js';
+import { alarmWords, modeWords, startedWords } from '../../static/js/drive/mode-text.js';
 import { pathOf, topOf, xOf } from '../../static/js/drive/take-over-plot.js';
 
 /** @param {object} [more] */

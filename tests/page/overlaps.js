@@ -18,7 +18,7 @@
   };
   const name = (one) => (one.id || one.dataset.f || one.dataset.tab || one.getAttribute('aria-label') || one.textContent.trim().slice(0, 24) || one.className).trim();
   const KEYS = 'button, a[href], input, select, textarea';
-  const SAFETY = '.gauge .speed, .strip > [data-f="strip-text"], .slide .tx, .rail-note, .snack .tx > *, .sheet h2, .sheet .bd p, .sheet-head > *, .versus .v, .alarms .t, .order, .plate p, .head-speed, .bar-speed, .unit-said';
+  const SAFETY = '.gauge .speed, .strip > [data-f="strip-text"], .slide .tx, .rail-note, .snack .tx > *, .sheet h2, .sheet .bd p, .sheet-head > *, .versus .v, .alarms .t, .order, .plate p, .head-speed, .bar-speed';
   const LAYERS = '.snack, dialog[open], #monitor > :is(.top, .tabs, .titlebar, .strip, .under, .ledge, .rail, .scrub), .view > .screen, .pager';
   const layerOf = (one) => one.closest(LAYERS) ?? one.closest('.board');
   const items = all(`:is(${KEYS}), ${SAFETY}`).map((one) => ({ one, layer: layerOf(one), at: shown(one) })).filter(({ layer, at }) => layer && area(at));

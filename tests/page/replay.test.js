@@ -173,16 +173,16 @@ test('what is live is shown in a line: the recording, and alarms that are not ur
   assert.equal(asideOf(summaryOf(state({ alarms: [alarm()] })))?.text, 'Live: Speed above limit', 'while it is being opened');
 });
 
-test('a recording rings nobody: no dialog, and the title says REPLAY', () => {
+test('a recording rings nobody: no dialog, and the title has REPLAY', () => {
   const frame = playing({ alarms: [alarm()] });
   const seen = { frame, isSilent: false, silence_s: 0.1, isChoosing: false, isAnswered: false };
   assert.equal(dialogOf(seen), null);
   assert.equal(dialogOf({ ...seen, isSilent: true, silence_s: 5 })?.kind, 'lost', 'the server itself is live');
-  assert.deepEqual(badgeOf(frame, { isSilent: false, isMonitoring: true, word: 'Replay' }), { title: 'REPLAY · catgraph', icon: 'replay', count: 0 });
+  assert.deepEqual(badgeOf(frame, { isSilent: false, isMonitoring: true, state: 'Replay' }), { title: 'REPLAY · catgraph', icon: 'replay', count: 0 });
   const alarmed = playing({ live: live({ alarms: [alarm()] }) });
-  assert.deepEqual(badgeOf(alarmed, { isSilent: false, isMonitoring: true, word: 'Replay' }), { title: '(1) LIVE Speed above limit · REPLAY · catgraph', icon: 'critical', count: 1 });
-  assert.equal(chainOf({ frame, isSilent: false, silence_s: 0, lag_s: 0.1, heard_ms: 0 }).word, 'Replay');
-  assert.equal(chainOf({ frame, isSilent: true, silence_s: 3, lag_s: 3, heard_ms: 0 }).word, 'Lost');
+  assert.deepEqual(badgeOf(alarmed, { isSilent: false, isMonitoring: true, state: 'Replay' }), { title: '(1) LIVE Speed above limit · REPLAY · catgraph', icon: 'critical', count: 1 });
+  assert.equal(chainOf({ frame, isSilent: false, silence_s: 0, lag_s: 0.1, heard_ms: 0 }).state, 'Replay');
+  assert.equal(chainOf({ frame, isSilent: true, silence_s: 3, lag_s: 3, heard_ms: 0 }).state, 'Lost');
 });
 
 test('what is no time line is not taken for one', () => {

@@ -114,7 +114,7 @@ async def test_paused_no_alarm_comes_and_every_tab_says_so(phone: Phone, calm: P
     await phone.f("pause").tap()
     await expect(phone.f("strip")).to_have_text(re.compile(r"Paused 0:0\d: no alarm is raised"))
     await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "paused")
-    await expect(phone.f("pause-word")).to_have_text("Resume")
+    await expect(phone.f("pause-label")).to_have_text("Resume")
     await expect(phone.page.locator(".checks li.ok")).to_have_count(0)
     await expect(phone.page.locator(".checks li", has_text="Speed").first).to_contain_text("paused")
     assert re.fullmatch(r"4\.2", await phone.speed())  # the values go on

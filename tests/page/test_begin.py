@@ -21,7 +21,8 @@ FIRST = """() => new MutationObserver((_, observer) => {
   observer.disconnect();
   const seen = (selector) => document.querySelector(selector)?.textContent?.trim() ?? '';
   window.first = {
-    speed: seen('.gauge .speed'), word: seen('#monitor [data-f=word]'), strip: seen('#monitor [data-f="strip-text"]'),
+    speed: seen('.gauge .speed'), link: seen('#monitor [data-f=link-state]'),
+    strip: seen('#monitor [data-f="strip-text"]'),
     plate: document.querySelector('.plate').hidden, checks: document.querySelectorAll('[data-part=checks] li').length,
   };
 }).observe(document, {attributeFilter: ['data-screen'], subtree: true})"""
@@ -42,7 +43,7 @@ async def test_the_first_picture_of_the_car_is_whole_and_what_lies_under_the_fol
     await phone.live()
     await expect(phone.page.locator("[data-part=checks] li").first).to_be_attached()
     first = await phone.page.evaluate("window.first")
-    assert LIVE.fullmatch(first["word"])
+    assert LIVE.fullmatch(first["link"])
     assert re.fullmatch(r"−?[0-9]+\.[0-9]", first["speed"]), first
     assert first["strip"]
     assert first["checks"] == 0
@@ -78,7 +79,7 @@ async def alarmed(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Pro
 @pytest.mark.own_phone
 @pytest.mark.parametrize(
     ("pressed", "opened"),
-    [("[data-f=menu] svg", "#sheet-menu[open]"), ("[data-f=word-age] .n", "#monitor .screen:not([hidden])")],
+    [("[data-f=menu] svg", "#sheet-menu[open]"), ("[data-f=link-age] .n", "#monitor .screen:not([hidden])")],
     ids=["a key", "a number in a key, which is written anew meanwhile"],
 )
 async def test_what_is_pressed_before_the_page_listens_is_pressed_once_it_does(

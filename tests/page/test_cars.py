@@ -282,4 +282,4 @@ async def test_a_slow_down_reaches_no_car_but_the_one_whose_name_stands_on_the_s
         await shows(one, "Margay")
         await expect(one.page.locator("#sheet-release")).to_be_hidden()
         await expect(one.f("slow")).to_have_attribute("data-kind", "armed")
-        assert "is released" not in await one.f("order-said").inner_text()
+        assert "is released" not in await one.f("order-live").inner_text()

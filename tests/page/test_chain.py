@@ -69,7 +69,7 @@ async def test_a_silent_car(phone: Phone, drive: Drive) -> None:
     await phone.page.keyboard.press("Escape")  # seen: the sheet goes, the veil stays
     await expect(sheet).to_be_hidden()
     await cut_between(phone, "#monitor .veil", "Bridge", "Car")
-    await expect(phone.f("word")).to_have_text("Silent")
+    await expect(phone.f("link-state")).to_have_text("Silent")
     await expect(phone.f("strip")).to_contain_text("The car fell silent")
     await expect(phone.f("veil-then")).to_have_text(re.compile(r"\d+\.\d m/s"))
     await expect(phone.page.locator(".checks li.ok")).to_have_count(0)
@@ -147,7 +147,7 @@ async def test_a_frozen_server_is_said_by_the_page_alone(phone: Phone, drive: Dr
     began_s = time.monotonic()
     await covered(phone, "all", "The server fell silent.", VEIL_S, began_s)
     await cut_between(phone, "#monitor .veil", "Phone", "Server")
-    await expect(phone.f("word")).to_have_text("Lost")
+    await expect(phone.f("link-state")).to_have_text("Lost")
     await expect(phone.page.locator(".gauge")).to_have_attribute("data-speed", "stale")
     await expect(phone.f("latitude")).to_have_attribute("data-ink", "stale")
     await expect(phone.f("distance")).to_have_attribute("data-ink", "stale")

@@ -163,12 +163,12 @@ async def test_without_a_server_the_page_says_so_and_comes_by_itself(phone: Phon
     async with running(*server(tmp_path, port=port)) as first:
         await phone.open(first.address)
         await expect(phone.page.locator("#connect")).to_be_visible()
-    await expect(phone.f("says", "#connect")).to_have_text("The server does not answer; this page keeps trying.")
+    await expect(phone.f("message", "#connect")).to_have_text("The server does not answer; this page keeps trying.")
     await phone.page.fill("#address", "127.0.0.1:1")
     await phone.f("go", "#connect").tap()
-    await expect(phone.f("says", "#connect")).to_have_text("Not sent: the server does not answer.")
+    await expect(phone.f("message", "#connect")).to_have_text("Not sent: the server does not answer.")
     async with running(*server(tmp_path, port=port)):
-        await expect(phone.f("says", "#connect")).to_be_hidden()
+        await expect(phone.f("message", "#connect")).to_be_hidden()
 
 
 DIALS = ("192.168.4.1", "car.local:9091", "ws://car/bridge", "wss://car/bridge?x=1", "wss://car:9090", "fd00::1")

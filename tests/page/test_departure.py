@@ -184,7 +184,7 @@ async def test_ten_items_are_walked_fixed_and_signed_within_15_taps(
             assert steps[-1] == "signed"
             assert steps.count("item") >= 10 + len(fixed), "each item, and each failure"
         await watch.kill()
-        await expect(phone.f("word")).not_to_have_text(LIVE, timeout=12_000)
+        await expect(phone.f("link-state")).not_to_have_text(LIVE, timeout=12_000)
     async with (
         running(*server(tmp_path, car.address, port)) as watch,
         httpx.AsyncClient(base_url=watch.address) as client,

@@ -30,7 +30,7 @@ UNFIT = """() => [...document.querySelectorAll('#fleet :is(button, a, p, h1, h2,
 async def opened(phone: Phone, canned: Canned, cars: list[Any]) -> Page:
     canned.cars = cars
     await phone.open(f"{canned.address}/fleet")
-    await expect(phone.f("word", "#fleet")).to_have_text("Live")
+    await expect(phone.f("link-state", "#fleet")).to_have_text("Live")
     return phone.page
 
 

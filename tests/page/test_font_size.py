@@ -72,7 +72,7 @@ async def all_is_in_reach(phone: Phone, canned: Canned, sizes: list[tuple[float,
     assert await faults(page, sizes) == {}
     several(canned)
     await noticed(page, canned)
-    await expect(page.locator(".snacks > .asks:not(.other)")).to_be_attached()
+    await expect(page.locator(".snacks > .prompt:not(.other)")).to_be_attached()
     assert await faults(page, sizes) == {}
     canned.state["alarms"].append(critical())
     await expect(page.locator("#sheet-alarm")).to_be_visible()

@@ -30,7 +30,7 @@ PAINTED_US = 50_000  # the picture with the first values is complete by then
 # Live values stand on Home: the time of the page's own clock when they first did.
 WATCH = """() => {
   const look = () => {
-    const state = document.querySelector('#monitor [data-f=word]')?.textContent;
+    const state = document.querySelector('#monitor [data-f=link-state]')?.textContent;
     const digits = document.querySelector('.gauge .speed')?.textContent ?? '';
     const isCovered = document.querySelector('.veil')?.dataset.on;
     if (['Live', 'Weak'].includes(state) && /[0-9]/.test(digits) && !isCovered) window.thereAt = performance.now();
@@ -128,9 +128,9 @@ async def test_no_script_forces_a_style_or_layout_before_the_first_values(
 
 
 def stack_of(event: dict[str, Any]) -> list[dict[str, Any]]:
-    """The script that asked for a size while the page was not laid out."""
-    told = event.get("args", {})
-    frames: list[dict[str, Any]] = told.get("beginData", told).get("stackTrace", [])
+    """The script that read a size while the page was not laid out."""
+    args = event.get("args", {})
+    frames: list[dict[str, Any]] = args.get("beginData", args).get("stackTrace", [])
     return frames
 
 

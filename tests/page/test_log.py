@@ -74,7 +74,7 @@ async def test_older_events_come_page_by_page_to_the_beginning(phone: Phone, wat
         before = await rows.count()
         await older.tap()
         await expect(rows).not_to_have_count(before)
-    await expect(phone.page.locator("[data-f=log-says]")).to_have_text("This is the beginning of the log.")
+    await expect(phone.page.locator("[data-f=log-message]")).to_have_text("This is the beginning of the log.")
     assert await rows.filter(has_text="m at once").count() == 230
     await expect(rows.last).to_contain_text("1 m at once")
     days = await phone.page.locator("[data-f=happened] li.day").all_inner_texts()

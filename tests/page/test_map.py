@@ -116,9 +116,9 @@ async def test_car_and_phone_with_distance_bearing_and_their_errors(phone: Phone
     async with roaming() as car, lying(phone, car, 6.0, -8.0), looking(phone, car) as it:
         await expect(it.f("apart")).to_have_text(re.compile(r"^(9\.9|10\.0|10\.1)$"))
         await expect(it.f("bearing")).to_have_text(re.compile(r"^car at 32[234]° NW$"))
-        await expect(it.f("verdict-word")).to_have_text("OK", timeout=15_000)
+        await expect(it.f("verdict-text")).to_have_text("OK", timeout=15_000)
         assert float(await it.f("allowed").text_content()) >= 10.0
-        await expect(it.f("says")).to_be_hidden()
+        await expect(it.f("message")).to_be_hidden()
         assert await it.f("car-lat").text_content() == "32.231900"
         assert await it.f("phone-lon").text_content() == "−110.950036"
         await expect(it.f("phone-age")).to_have_text(re.compile(r"^\d\.\d s$"))
@@ -204,7 +204,9 @@ async def test_a_stale_car_loses_its_ink_and_its_line(phone: Phone) -> None:
         car.tells_position, car.heading_deg = False, None
         await expect(it.svg(".car-mark")).to_have_attribute("data-ink", "stale")
         await expect(it.svg(".name")).to_have_text(re.compile(r"^Car STALE \d"))
-        await expect(it.f("car-says")).to_have_text(re.compile(r"^The car’s position is \d+\.\d s old: the car may be"))
+        await expect(it.f("car-message")).to_have_text(
+            re.compile(r"^The car’s position is \d+\.\d s old: the car may be")
+        )
         await expect(it.f("car-age")).to_have_text(re.compile(r"^STALE \d+\.\d s$"))
         spoken = await it.f("spoken").text_content()
         assert spoken.startswith("The car’s position is ")
@@ -216,13 +218,13 @@ async def test_a_stale_car_loses_its_ink_and_its_line(phone: Phone) -> None:
         await expect(it.f("apart")).to_have_text("–")
         car.tells_position, car.heading_deg = True, 90.0
         await expect(it.svg(".car-mark")).to_have_attribute("data-ink", "fresh")
-        await expect(it.f("car-says")).to_be_hidden()
+        await expect(it.f("car-message")).to_be_hidden()
 
 
 async def test_without_a_fix_the_coordinates_are_no_position(phone: Phone) -> None:
     async with roaming() as car, looking(phone, car) as it:
         car.status = -1
-        await expect(it.f("car-says")).to_have_text("The car’s receiver has no fix: the car’s position is unknown.")
+        await expect(it.f("car-message")).to_have_text("The car’s receiver has no fix: the car’s position is unknown.")
         await expect(it.f("car-age")).to_have_text("no fix")
         await expect(it.f("car-lat")).to_have_text("–")
         await expect(it.svg(".name")).to_have_text("Car was here")
@@ -250,19 +252,19 @@ async def test_a_heading_that_is_not_known_points_nowhere(phone: Phone) -> None:
 @pytest.mark.own_phone
 async def test_every_reason_of_the_phone_is_said_in_words(phone: Phone) -> None:
     async with roaming() as car, looking(phone, car) as it:
-        await expect(it.f("phone-says")).to_have_text("No phone is sharing its position.")
+        await expect(it.f("phone-message")).to_have_text("No phone is sharing its position.")
         await phone.f("sound-off").tap()  # arms the position too: this phone refuses
-        await expect(it.f("phone-says")).to_have_text("Location permission denied on the phone.")
+        await expect(it.f("phone-message")).to_have_text("Location permission denied on the phone.")
         await expect(it.f("verdict-why")).to_have_text("denied")
         async with lying(phone, car, 30.0, 40.0, accuracy_m=80.0):
-            await expect(it.f("phone-says")).to_have_text(
+            await expect(it.f("phone-message")).to_have_text(
                 "Position of the phone is accurate to 80 m only; 50 m is needed.", timeout=12_000
             )
             await expect(it.f("apart")).to_have_text(re.compile(r"^(49\.9|50\.0|50\.1)$"))  # by its fix, uncompared
             await expect(it.f("allowed")).to_have_text("–")
             await expect(it.page.locator(".mapv .name").nth(1)).to_have_text("Phone ±80 m")
         await phone.page.context.clear_permissions()
-        await expect(it.f("phone-says")).to_have_text("Location permission denied on the phone.")
+        await expect(it.f("phone-message")).to_have_text("Location permission denied on the phone.")
         await expect(it.svg(".phone-mark")).to_have_attribute("data-ink", "stale")
         await expect(it.f("phone-age")).to_have_text(re.compile(r"^STALE \d"))
 
@@ -274,7 +276,7 @@ async def test_before_any_position_nothing_is_drawn_and_that_is_said(phone: Phon
             await phone.live()
             it = Map(phone)
             await expect(it.f("none-words")).to_have_text("no position yet")
-            await expect(it.f("car-says")).to_have_text("No position received from the car yet.")
+            await expect(it.f("car-message")).to_have_text("No position received from the car yet.")
             await expect(it.f("car-lat")).to_have_text("no message yet")
             for mark in (".car-mark", ".phone-mark", ".dl", ".acc", ".phacc"):
                 await expect(it.svg(mark)).to_be_hidden()

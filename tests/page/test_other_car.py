@@ -1,4 +1,4 @@
-"""Another car's alarm beside this car's values: what its card says, what room it leaves, and how few presses help."""
+"""Another car's alarm beside this car's values: what its card shows, what room it leaves, and how few presses help."""
 
 from __future__ import annotations
 

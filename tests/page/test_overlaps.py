@@ -88,7 +88,7 @@ async def nothing_lies_over_another(
     several(canned)
     page = await opened(phone, canned, tab)
     await noticed(page, canned)
-    for kind in ("asks:not(.other)", "other", "note"):
+    for kind in ("prompt:not(.other)", "other", "note"):
         await expect(page.locator(f".snacks > .{kind}")).to_be_attached()
     if is_critical:
         canned.state["alarms"].append(critical())

@@ -85,7 +85,7 @@ async def test_a_pin_lets_a_phone_in_and_it_stays_in_over_a_reload(browser: Brow
         await expect(phone.page.locator("#pairing h1")).to_have_text("Pair this device")
         await expect(phone.page.locator("#monitor")).to_be_hidden()
         pin, _ = await site.invitation()
-        message = phone.f("pair-says", "#pairing")
+        message = phone.f("pair-message", "#pairing")
         await phone.f("pair-go", "#pairing").tap()
         await expect(message).to_have_text("The PIN has 6 digits.")
         await type_pin(phone, f"{(int(pin) + 1) % 10**6:06d}")
@@ -110,7 +110,7 @@ async def test_too_many_wrong_pins_are_told_with_the_time_to_wait_and_the_link_s
         for _ in range(3):
             await expect(phone.f("pair-go", "#pairing")).to_have_text("Pair this device")
             await type_pin(phone, wrong)
-            await expect(phone.f("pair-says", "#pairing")).not_to_be_empty()
+            await expect(phone.f("pair-message", "#pairing")).not_to_be_empty()
         await expect(phone.f("pair-go", "#pairing")).to_have_text(re.compile(r"Wait [12] seconds?"))
         await phone.page.evaluate("token => { location.hash = `#pair=${token}`; }", token)  # scanned while it is open
         await expect(phone.page.locator("#pair-pin")).to_be_hidden()
@@ -158,7 +158,7 @@ async def test_a_link_pairs_a_viewer_and_is_gone_from_the_address_before_anythin
         async with another_phone(browser) as second:
             await second.open(f"{site.address}/#pair={token}")
             await second.f("pair-go", "#pairing").tap()
-            await expect(second.f("pair-says", "#pairing")).to_contain_text("This link was used already")
+            await expect(second.f("pair-message", "#pairing")).to_contain_text("This link was used already")
             await expect(second.page.locator("#pair-pin")).to_be_visible()
 
 

@@ -58,7 +58,7 @@ async def test_home_shows_each_value_and_none_of_them_as_live_once_the_car_is_si
     await expect(phone.f("veil")).to_have_attribute("data-on", "values")
     await expect(phone.f("veil-words")).to_contain_text("The car fell silent.")
     await is_cut(phone.page.locator("#monitor .veil"), "Bridge", "Car")
-    await expect(phone.f("word")).to_have_text("Silent")
+    await expect(phone.f("link-state")).to_have_text("Silent")
     await expect(phone.page.locator(".checks li.ok")).to_have_count(0)
     canned.state = live()
     await phone.live()
@@ -91,8 +91,8 @@ async def test_the_map_shows_both_and_says_which_is_old(phone: Phone, canned: Ca
         "age_s": 12.4,
     }
     await expect(panel.locator(".car-mark").first).to_have_attribute("data-ink", "stale")
-    await expect(phone.f("car-says", "#panel-map")).to_contain_text("the car may be elsewhere")
-    await expect(phone.f("phone-says", "#panel-map")).to_contain_text("The page is in the background")
+    await expect(phone.f("car-message", "#panel-map")).to_contain_text("the car may be elsewhere")
+    await expect(phone.f("phone-message", "#panel-map")).to_contain_text("The page is in the background")
     await expect(phone.f("apart", "#panel-map")).to_have_text("–")
 
 
@@ -131,7 +131,7 @@ async def test_a_limit_that_is_typed_in_settings_is_sent_in_si(phone: Phone, can
     assert (await until_sent(canned, "set"))["values"] == {"speed_limit.max_mps": 9.5}
     await row.locator("input.v").fill("95")
     await row.locator("input.v").press("Enter")
-    await expect(row.locator(".says")).to_contain_text("0.5 to 40 m/s is allowed")
+    await expect(row.locator(".msg")).to_contain_text("0.5 to 40 m/s is allowed")
     assert len(sent(canned, "set")) == 1
 
 
@@ -219,7 +219,7 @@ async def test_a_server_that_falls_silent_covers_everything_and_its_return_uncov
     canned.silent = True
     await expect(phone.f("veil")).to_have_attribute("data-on", "all")
     await expect(phone.f("veil-words")).to_contain_text("The server fell silent.")
-    await expect(phone.f("word")).to_have_text("Lost")
+    await expect(phone.f("link-state")).to_have_text("Lost")
     await expect(phone.page.locator(".gauge")).to_have_attribute("data-speed", "stale")
     sheet = phone.page.locator("#sheet-lost")
     await expect(sheet).to_be_visible()
@@ -267,7 +267,7 @@ async def test_a_phone_that_is_not_paired_sees_nothing_of_the_car(phone: Phone, 
     await expect(phone.page.locator("#pairing h1")).to_have_text("Pair this device")
     await expect(phone.page.locator("#monitor")).to_be_hidden()
     await phone.f("pair-go", "#pairing").tap()
-    await expect(phone.f("pair-says", "#pairing")).to_have_text("The PIN has 6 digits.")
+    await expect(phone.f("pair-message", "#pairing")).to_have_text("The PIN has 6 digits.")
     phone.complaints.clear()  # the browser's own, of the ticket that was refused
 
 

@@ -34,9 +34,9 @@ OVER = """(both) => ((all) => all[0].some((a) => all[1].some((b) => {
 #: Defaults under the slider, or over an end of their range.
 COVERED = """() => [...document.querySelectorAll('#panel-settings .range')].filter((one) => {
   if (!one.checkVisibility()) return false;
-  const label = one.querySelector('.word').getBoundingClientRect();
+  const label = one.querySelector('.text').getBoundingClientRect();
   const range = document.createRange();
-  range.selectNodeContents(one.querySelector('.word'));
+  range.selectNodeContents(one.querySelector('.text'));
   const { left, right, top, bottom } = range.getBoundingClientRect();
   const ends = [...one.querySelectorAll('.low, .high')]
     .filter((end) => end.checkVisibility({ visibilityProperty: true }));

@@ -47,7 +47,7 @@ async def a_phone_on_each_tab(browser: Browser, address: str) -> AsyncIterator[d
         for tab, context in zip(TABS, contexts, strict=True):
             pages[tab] = await context.new_page()
             await pages[tab].goto(f"{address}/#{tab}")
-            await expect(pages[tab].locator('#monitor [data-f="word"]')).to_have_text(LIVE, timeout=LONG)
+            await expect(pages[tab].locator('#monitor [data-f="link-state"]')).to_have_text(LIVE, timeout=LONG)
         yield pages
     finally:
         for context in contexts:
@@ -83,7 +83,7 @@ async def dialog_on_each_tab(browser: Browser, drive: Drive, fault: str, title: 
             await expect(page.locator("#sheet-alarm")).to_be_hidden()
             await expect(page.locator("#monitor")).to_be_visible()
             await expect(page.locator(f"#tab-{tab}")).to_have_attribute("aria-selected", "true")
-            await expect(page.locator('#monitor [data-f="word"]')).to_have_text(LIVE)
+            await expect(page.locator('#monitor [data-f="link-state"]')).to_have_text(LIVE)
         await car.type("stop")
 
 

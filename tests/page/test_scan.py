@@ -243,11 +243,11 @@ async def test_a_tapped_return_is_told_in_words_and_stays_until_tapped_away(phon
     place = {"x": 206 - 6 * scale + 15, "y": height - 34 - 6 * scale}
     await aim.tap(position=place)
     await expect(marked).to_have_text(re.compile(r"Marked: \d\.\d m, 4\d° left, 0\.\d\d s ago"))
-    spoken = await phone.f("said", "#panel-scan").text_content()
+    spoken = await phone.f("live", "#panel-scan").text_content()
     assert 7.5 < float(re.match(r"[\d.]+", spoken)[0]) < 9.5  # type: ignore[index]
     await phone.page.wait_for_timeout(700)
     await expect(marked).to_be_visible()  # it is followed from scan to scan
-    assert await phone.f("said", "#panel-scan").text_content() == spoken  # and announced once
+    assert await phone.f("live", "#panel-scan").text_content() == spoken  # and announced once
     await aim.tap(position={"x": 206 + 60, "y": height - 34 - 9 * scale})  # where nothing is
     await expect(marked).to_be_hidden()
     await aim.focus()

@@ -165,7 +165,7 @@ async def test_what_is_typed_is_taken_with_comma_or_point_or_refused_in_words(
         ("", "a number is required"),
     ):
         await type_number(phone, typed)
-        await expect(row(phone).locator(".says")).to_contain_text(why)
+        await expect(row(phone).locator(".msg")).to_contain_text(why)
         await expect(number(phone)).to_have_value("13.25")
     await number(phone).fill("3")
     await phone.page.keyboard.press("Escape")
@@ -189,7 +189,7 @@ async def test_what_the_server_refuses_goes_back_and_its_sentence_stands_there(
       };
     }""")
     await type_number(phone, "19")
-    await expect(row(phone).locator(".says")).to_contain_text("Somebody else changed the settings meanwhile")
+    await expect(row(phone).locator(".msg")).to_contain_text("Somebody else changed the settings meanwhile")
     await expect(number(phone)).to_have_value("11.0")
     await expect(number(phone, "obstacle.standoff_m")).to_have_value("7.0")
     assert await limit(api) == 11.0
@@ -478,7 +478,7 @@ async def test_without_the_server_nothing_pretends_to_be_set(phone: Phone, tmp_p
         await expect(number(phone)).to_be_disabled()
         await expect(slider(phone)).to_be_disabled()
         await expect(phone.page.locator("p.state[data-bad]")).to_contain_text("nothing can be changed")
-        await expect(row(phone).locator(".says")).to_contain_text("Not changed.")
+        await expect(row(phone).locator(".msg")).to_contain_text("Not changed.")
         await expect(number(phone)).to_have_value("11.0")
         watch.thaw()
         await expect(number(phone)).to_be_enabled(timeout=15_000)
@@ -489,7 +489,7 @@ async def test_each_alarm_sound_can_be_tried_before_a_car_is_connected(phone: Ph
     async with running(*server(tmp_path)) as watch:
         await phone.open(watch.address)
         await phone.page.locator("#connect [data-f=settings]").tap()
-        message = phone.page.locator("[data-f=sound-says]")
+        message = phone.page.locator("[data-f=sound-message]")
         for sound, text in (("high", "ten quick"), ("medium", "three rising"), ("low", "two falling")):
             await phone.page.locator(f"[data-sound-key={sound}]").tap()
             await expect(message).to_contain_text(text)
@@ -512,13 +512,13 @@ async def test_a_phone_that_cannot_sound_is_told_plainly(phone: Phone, watch: Pr
     await settings(phone, watch)
     await phone.page.get_by_role("button", name="Preferences of this device").tap()
     await phone.page.locator("[data-sound-key=high]").tap()
-    await expect(phone.page.locator("[data-f=sound-says]")).to_contain_text("This browser has no sound")
+    await expect(phone.page.locator("[data-f=sound-message]")).to_contain_text("This browser has no sound")
 
 
 async def test_with_all_of_it_open_it_keeps_nobody_out_and_fits_every_screen(phone: Phone, canned: Canned) -> None:
     await settings(phone, canned)
     await type_number(phone, "99")
-    await expect(row(phone).locator(".says")).to_be_visible()
+    await expect(row(phone).locator(".msg")).to_be_visible()
     await phone.page.evaluate("document.querySelectorAll('.group').forEach((one) => { one.open = true; })")
     await expect(phone.page.locator("#panel-settings .people-list input").first).to_have_value("A. K.")
     await no_barrier(phone.page, "tab", "#panel-settings")

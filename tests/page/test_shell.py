@@ -291,7 +291,7 @@ async def test_a_new_version_comes_at_the_next_load_and_never_mixed(
             await page.evaluate(later)
             await page.wait_for_function("() => document.documentElement.dataset.about === 'first'")
             await page.evaluate("history.back()")
-            # Whoever loads it has the new one, whole, while the old one is still open elsewhere.
+            # A page that loads it has the new one, whole, while the old one is still open elsewhere.
             await note.get_by_role("button", name="Reload").tap()
             await page.wait_for_function("() => document.documentElement.dataset.app === 'second'")
             await page.evaluate(later)
@@ -383,7 +383,7 @@ async def test_without_a_worker_the_page_is_the_same(browser: Browser, project: 
             };"""
         )
         await page.goto(one.address)
-        await expect(page.locator('#monitor [data-f="word"]')).to_have_text(LIVE, timeout=12_000)
+        await expect(page.locator('#monitor [data-f="link-state"]')).to_have_text(LIVE, timeout=12_000)
         await asyncio.sleep(5.0)  # by then it would have been registered
         await page.evaluate("document.querySelector('[data-screen=about]').click()")
         await expect(page.locator("#monitor .facts")).to_contain_text("because it does not trust the certificate")

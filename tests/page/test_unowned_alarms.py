@@ -1,4 +1,4 @@
-"""Whoever signs on is shown the alarms that people who are off duty left acknowledged, and takes them over."""
+"""A person who signs on is shown the alarms that people who are off duty left acknowledged, and takes them over."""
 
 from __future__ import annotations
 

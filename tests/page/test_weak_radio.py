@@ -14,7 +14,7 @@ from tests.page.conftest import Phone
 #: By how much a text of the top bar lies over the next part [px].
 OVER = """bar => {
   const boxOf = (name) => bar.querySelector(`[data-f="${name}"]`).getBoundingClientRect();
-  return boxOf('word-age').right - boxOf('rec').left;
+  return boxOf('link-age').right - boxOf('rec').left;
 }"""
 
 
@@ -24,7 +24,7 @@ async def test_a_weak_radio_is_said_beside_the_age(phone: Phone, canned: Canned,
     canned.answers_after_s = 0.4
     await phone.page.set_viewport_size({"width": width, "height": 780})
     await phone.open(canned.address)
-    state = phone.page.locator('#monitor [data-f="word"]')
+    state = phone.page.locator('#monitor [data-f="link-state"]')
     await expect(state).to_have_text("Weak")
     link = phone.page.locator('#monitor [data-f="link"]')
     label = await link.get_attribute("aria-label") or ""

@@ -10,7 +10,7 @@ from tests.page.drives import steady
 from tests.page.processes import replay, running, server
 from tests.page.webdriver import lacking, webkit
 
-IS_LIVE = "return document.querySelector('#monitor [data-f=word]')?.textContent === 'Live'"
+IS_LIVE = "return document.querySelector('#monitor [data-f=link-state]')?.textContent === 'Live'"
 
 
 @pytest.mark.skipif(lacking() is not None, reason=str(lacking()))

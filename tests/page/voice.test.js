@@ -55,7 +55,7 @@ test('a tap marks while the recorder of the voice before is still ending', async
   Object.assign(globalThis, { document: new EventTarget(), window: new EventTarget() });
   let count = 0;
   const marks = { place: () => ({ id: String((count += 1)) }), get: () => null, change: async () => {}, attach: async () => {} };
-  const fresh = { show() {}, listen() {}, heard() {} };
+  const fresh = { show() {}, listen() {}, voiceEnded() {} };
   const it = new MarkKey(/** @type {any} */ (key), /** @type {any} */ (marks), () => {}, /** @type {any} */ (fresh));
   const send = (/** @type {string} */ type) => key.dispatchEvent(Object.assign(new Event(type), { button: 0, pointerId: 1, clientX: 0 }));
   send('pointerdown');

@@ -117,9 +117,9 @@ async def measure(number: int, tree: Path, seconds: float, only: list[str]) -> d
         if not wanted:
             continue
         with tempfile.TemporaryDirectory() as data:
-            async with on_air(number, "clean") as air, serving(air, Path(data), tree=tree, car_end=car_end) as asked:
+            async with on_air(number, "clean") as air, serving(air, Path(data), tree=tree, car_end=car_end) as served:
                 for name, (run, more) in wanted.items():
-                    found[name] = await run(air, *asked, tree, *more)
+                    found[name] = await run(air, *served, tree, *more)
                     print(f"{tree.name:8} {name:26} {found[name]}", flush=True)
     return found
 

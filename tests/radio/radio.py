@@ -137,7 +137,7 @@ def change(directions: dict[str, Direction], line: list[str]) -> None:
             chosen, shape = list(directions.values()), PROFILES[line[0]]
         else:
             chosen = list(directions.values()) if line[0] == "both" else [directions[line[0]]]
-            shape = tuple(float(word) for word in line[1:5])
+            shape = tuple(float(part) for part in line[1:5])
             if len(shape) != 4:
                 raise ValueError("four numbers are needed")
     except (KeyError, ValueError) as error:

@@ -18,7 +18,7 @@ UNDER_S = 0.25  # 0.2 s, and the reading of two clocks
 
 @pytest.mark.field
 async def test_over_each_radio_values_come_and_none_is_shown_younger_than_it_is(tmp_path: Path) -> None:
-    async with on_air(1, "clean") as air, serving(air, tmp_path) as asked, page(air, *asked) as seen:
+    async with on_air(1, "clean") as air, serving(air, tmp_path) as served, page(air, *served) as seen:
         await asyncio.sleep(4)
         for profile in ("fair", "weak", "bad"):
             began_ms = await air.shape(profile)
@@ -43,7 +43,7 @@ ROWS = (phone_rows(SOAK_S), car_rows(SOAK_S))
 @pytest.mark.parametrize(("car_end", "name"), [(end, name) for end, rows in enumerate(ROWS) for name in rows])
 async def test_each_radio_for_a_while(tmp_path: Path, car_end: int, name: str) -> None:
     run, more = ROWS[car_end][name]
-    async with on_air(1, "clean") as air, serving(air, tmp_path, car_end=car_end) as asked:
-        found = await run(air, *asked, ROOT, *more)
+    async with on_air(1, "clean") as air, serving(air, tmp_path, car_end=car_end) as served:
+        found = await run(air, *served, ROOT, *more)
     print(found)  # the row of `make soak`
     assert "inf" not in found

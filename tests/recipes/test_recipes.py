@@ -1,4 +1,4 @@
-"""Each recipe of docs/extending.md applies, touches no more files than it promises, and does what it says."""
+"""Each recipe of docs/extending.md applies, touches no more files than it promises, and does what it promises."""
 
 from __future__ import annotations
 

@@ -93,12 +93,12 @@ def judged(
             fix = PhoneFix(lat_deg=truth["lat_deg"], lon_deg=truth["lon_deg"], accuracy_m=5.0)
             state.receive_phone(PhoneReport(phone="in the car", is_handheld=True, fix=fix, measured_s=now_s), now_s)
         for message in step.messages:
-            heard = sources.get(message.topic)
-            if heard is None:
+            source = sources.get(message.topic)
+            if source is None:
                 continue
             last_s = now_s
             changed = pipeline.receive(
-                heard,
+                source,
                 message.message,
                 now_s,
                 None,

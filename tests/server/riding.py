@@ -1,4 +1,4 @@
-"""A phone that rides along with the simulated car, and the two before the judge in virtual time."""
+"""A phone in the simulated car, and the two before the judge in virtual time."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Rider:
         self._left: tuple[float, float] | None = None
 
     def ride(self, now_s: float, lat_deg: float, lon_deg: float) -> dict[str, Any] | None:
-        """Where the car is now; answers the command that the phone's page sends at this moment."""
+        """Where the car is now; returns the command that the phone's page sends at this moment."""
         if self._left is None and now_s >= self._left_at_s:
             self._left = lat_deg, lon_deg
         self._truth.append((now_s, *(self._left or (lat_deg, lon_deg))))
@@ -101,7 +101,7 @@ class RideEvent:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ride:
     events: list[RideEvent]
-    briefs: dict[str, set[str]]  # what each check's tile ever said
+    briefs: dict[str, set[str]]  # each text of a check's tile
 
     @property
     def raised(self) -> list[str]:
@@ -111,7 +111,7 @@ class Ride:
 def ride(
     rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[Planned] = (), profile: Profile = GENERIC
 ) -> Ride:
-    """The car's speed and position and the phone's words before the checks of both, for so long."""
+    """The car's speed and position and the phone's commands before the checks of both, for so long."""
     car = SimulatedCar(seed=seed, plan=plan)
     sources = pipeline.by_topic(
         source
@@ -138,16 +138,16 @@ def ride(
             LinkFacts(phase="monitoring", connected_s=0.0, bridge_answers=True, published=frozenset({"position"}))
         )
         truth = car.state()["truth"]
-        said = rider.ride(now_s, truth["lat_deg"], truth["lon_deg"]) if rider is not None else None
-        if said is not None:
-            command = commands.read(said)
+        sent = rider.ride(now_s, truth["lat_deg"], truth["lon_deg"]) if rider is not None else None
+        if sent is not None:
+            command = commands.read(sent)
             assert isinstance(command, commands.Position)
             state.receive_phone(phone_report(command, now_s, WALL_MS + now_s * 1000), now_s)
         for message in step.messages:
-            heard = sources.get(message.topic)
-            if heard is not None:
+            source = sources.get(message.topic)
+            if source is not None:
                 changed = pipeline.receive(
-                    heard,
+                    source,
                     message.message,
                     now_s,
                     None,

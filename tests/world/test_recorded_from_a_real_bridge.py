@@ -16,7 +16,7 @@ from server.judge.message import RosVersion
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
 from server.rosbridge.live_source import CallFailed
-from server.rosbridge.rosapi_client import Asks
+from server.rosbridge.rosapi_client import ServiceCaller
 from server.rosbridge_server.client_topics import Subscription
 from server.rosbridge_server.encoding import Outgoing
 from server.rosbridge_server.server import RosBridge
@@ -272,7 +272,7 @@ async def test_what_is_recorded_only_is_requested_though_rosapi_ended_before_its
     """rosapi named the topics, and ended before the recording began: they are recorded as far as they are known."""
     fetch_topics, has_ended = discovery.fetch_topics, False
 
-    async def topics_while_it_lives(questions: Asks) -> discovery.Offer | None:
+    async def topics_while_it_lives(questions: ServiceCaller) -> discovery.Offer | None:
         return None if has_ended else await fetch_topics(questions)
 
     async def no_definitions(*_: object) -> dict[str, str]:

@@ -56,8 +56,8 @@ class DriveReport:
     def foot(self) -> str:
         """Whether it is as it was recorded, at the foot of each page."""
         chain = self.found["chain"]
-        said = [f"{one['short']}, head {(one['head'] or 'not known')[:16]}" for one in chain[:2]]
-        return ", ".join([*said, f"{len(chain) - 2} more parts"] if len(chain) > 2 else said)
+        parts = [f"{one['short']}, head {(one['head'] or 'not known')[:16]}" for one in chain[:2]]
+        return ", ".join([*parts, f"{len(chain) - 2} more parts"] if len(chain) > 2 else parts)
 
     def sheet(self, environment: Environment, template: str) -> Markup:
         """As the first part of the page."""

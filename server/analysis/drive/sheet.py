@@ -28,7 +28,7 @@ _RESULTS = {"failed": "critical", "not_applicable": "na", "open": "unknown", "do
 
 
 def sheet(environment: Environment, template: str, facts: DriveFacts, found: Mapping[str, Any], media: Media) -> Markup:
-    """`found`: what report_json says. Every text of it is escaped by the template."""
+    """`found`: the result of report_json. Every text of it is escaped by the template."""
     return Markup(environment.from_string(template).render(view=_view(facts, found, media), version=catgraph_version()))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from monitor.values import Twist
-from server.judge.frame_words import is_earth_fixed
+from server.judge.frame_names import is_earth_fixed
 from server.judge.message_fields import finite, inner, known, number, text
 from server.judge.topic import Topic, floats
 from server.judge.units import FASTEST_KMH, plausible_speed

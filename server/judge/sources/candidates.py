@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from server.judge.frame_words import direction_by_name
+from server.judge.frame_names import direction_by_name
 from server.judge.signals import TOPICS
 from server.judge.sources import namespaces
 from server.judge.sources.evidence import Evidence

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from server.judge.frame_words import is_earth_fixed
+from server.judge.frame_names import is_earth_fixed
 from server.judge.signals import TOPICS
 from server.judge.signals.odometry import pose_only
 from server.judge.signals.speed import way_made, way_made_stamped

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Mapping
 
-from server.judge.frame_words import AHEAD_WORDS, ELSEWHERE_WORDS, name_parts
+from server.judge.frame_names import AHEAD_WORDS, ELSEWHERE_WORDS, name_parts
 
 # Parts of the prefixes that sensors, estimators and components of one car have.
 PART_WORDS = (

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from monitor.values import LaserScan
-from server.judge.frame_words import is_earth_fixed
+from server.judge.frame_names import is_earth_fixed
 from server.judge.message_fields import inner, number
 from server.judge.sources.motion import FAR_M, MOVES_MPS, POSE_LEAST_M, POSES_MPS, Motion, is_lost, least_way_m
 from server.judge.topic import FLOATS

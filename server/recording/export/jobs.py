@@ -208,7 +208,7 @@ class Exports:
         async with self._turn:
             out = await self._place(job, f"{job.of}.{FORMATS[job.format].extension}")
             named = next((path for path in sources if id_of(path) == job.named), sources[0])
-            arguments = ["--format", job.format, "--name", job.of, "--asked", str(named), "--out", str(out)]
+            arguments = ["--format", job.format, "--name", job.of, "--required", str(named), "--out", str(out)]
             made = await self._work(job, sources, arguments)
             job.path = made.path
             job.size = (await asyncio.to_thread(made.path.stat)).st_size

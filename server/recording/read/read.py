@@ -54,11 +54,11 @@ Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, content
 _Decoders = Mapping[int, tuple[str, str, Callable[[bytes], Json]]]  # number of a channel → topic, type, decoder
 
 
-def open_recording(paths: Sequence[Path], *, asked: Path | None = None) -> Recording:
+def open_recording(paths: Sequence[Path], *, required: Path | None = None) -> Recording:
     """Open one drive of one or several files, of ROS 1 or ROS 2.
 
     A path is a ROS 1 bag, a ROS 2 bag directory, a single .mcap or .db3 file, or a directory with such files in it.
-    With `asked`, one of the paths, the others are read where they can be read with it, and else named in `lacking`.
+    With `required`, one of the paths, the others are read where they can be read with it, and else named in `lacking`.
     Raises RecordingUnreadable with one sentence that names the file.
     """
     if not paths:
@@ -66,11 +66,11 @@ def open_recording(paths: Sequence[Path], *, asked: Path | None = None) -> Recor
     sources: list[FileSource] = []
     lacking: list[str] = []
     try:
-        if asked is None:
+        if required is None:
             for path in paths:
                 open_parts(recognise(Path(path)), sources, lacking)
         else:
-            open_with(asked, paths, sources, lacking)
+            open_with(required, paths, sources, lacking)
         if len({source.ros_version for source in sources if of_car(source)}) > 1:
             raise RecordingUnreadable("recordings of ROS 1 and ROS 2 cannot be read as one")
         return Recording(sources, lacking, list(map(Path, paths)))
@@ -324,7 +324,7 @@ def _decoder(channel: Channel, source: FileSource) -> tuple[Decode, Layout | Non
 
 
 def _is_own(source: FileSource) -> bool:
-    """Whether it is a recording of catgraph, whoever copied it: there messages of unknown types are JSON."""
+    """Whether it is a recording of catgraph, or a copy of one: there messages of unknown types are JSON."""
     return isinstance(source, McapFile) and (
         bool(source.metadata) or any(channel.topic.startswith(PREFIX) for channel in source.channels)
     )

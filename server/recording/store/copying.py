@@ -17,13 +17,12 @@ from server.recording.catalog.annotations import NONE, Annotations
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.discovery import why_not_one_file
 from server.recording.catalog.entries import NotThere, Refused
-from server.recording.store import names, row
-from server.recording.store import said as annotation_upload
+from server.recording.store import annotation_upload, names, row
+from server.recording.store.annotation_upload import AnnotationSet
 from server.recording.store.clips import ClipMaker
 from server.recording.store.object_store import FileChanged, ObjectStore, Pace
 from server.recording.store.plan import is_another
 from server.recording.store.rules import moments_of
-from server.recording.store.said import AnnotationSet
 from server.recording.store.trouble import Kind, StoreTrouble
 from server.recording.store.uploads import SentClip, SentPart, Upload, Uploads, Verified
 

@@ -127,7 +127,7 @@ def made(row: Recording, upload: Upload, annotations: dict[str, Any] | None = No
 
 
 def read(body: bytes, folder: str, id: str) -> StoredRow:
-    """Raises BadRow. Whoever can write into the store can write anything there."""
+    """Raises BadRow. A program with write access to the store can write anything there."""
     try:
         row = StoredRow.model_validate_json(body)
     except ValidationError:

@@ -22,7 +22,7 @@ from server.vehicle.foxglove.delay import Delay
 from server.vehicle.foxglove.readers import ReaderTable
 from server.vehicle.foxglove.server_state import Answers, ServerState, Subscribed
 
-LAST_WORD_S = 0.2
+FLUSH_S = 0.2
 
 
 class FoxgloveSource:
@@ -91,13 +91,13 @@ class FoxgloveSource:
     def retry_now(self) -> None:
         self._dialer.retry_now()
 
-    def stop(self, *, has_last_word: bool = False) -> None:
+    def stop(self, *, is_flushed: bool = False) -> None:
         self._stopped = self._calls.is_stopped = True
         self._dialer.stop()
         self._readers.end()
         self._state.end()
-        if has_last_word and self._socket is not None:
-            self._dialer.loop.call_later(LAST_WORD_S, self.abort)
+        if is_flushed and self._socket is not None:
+            self._dialer.loop.call_later(FLUSH_S, self.abort)
         else:
             self.abort()
 

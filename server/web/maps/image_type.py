@@ -65,14 +65,14 @@ def _webp_pixels(data: bytes) -> tuple[int, int] | None:
 
 def plain_text(markup: str) -> str:
     """The text of an attribution, which many files write as HTML: without tags, on one line, at most 200 letters."""
-    reader = _Words()
+    reader = _TextReader()
     reader.feed(markup[:5000])
     reader.close()
     text = " ".join("".join(reader.pieces).split())
     return "".join(letter for letter in text if letter.isprintable())[:SHOWN_ATTRIBUTION]
 
 
-class _Words(HTMLParser):
+class _TextReader(HTMLParser):
     def __init__(self) -> None:
         super().__init__(convert_charrefs=True)
         self.pieces: list[str] = []

@@ -49,7 +49,7 @@ class MapFile:
         """Open and validate the file. Raises MapRefused."""
         self._path = path
         self._lock = threading.Lock()
-        self._said_damaged = False
+        self._is_damage_logged = False
         self._rows = _opened(path)
         self._until_s = math.inf
         self._rows.set_progress_handler(lambda: time.monotonic() > self._until_s, _STEPS)
@@ -74,8 +74,8 @@ class MapFile:
         try:
             data = self._read(z, x, (1 << z) - 1 - y)  # MBTiles counts rows from the south (TMS)
         except sqlite3.Error as why:
-            if not self._said_damaged:
-                self._said_damaged = True
+            if not self._is_damage_logged:
+                self._is_damage_logged = True
                 log.error("map damaged: path=%s error=%s", self._path, why)
             return None
         kind = media_type(data) if data else None

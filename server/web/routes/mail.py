@@ -54,7 +54,7 @@ class MailOrder(BaseModel):
 class RecipientOut(BaseModel):
     address: str
     state: Literal["waiting", "accepted", "refused"]
-    said: str = Field(description="The server's reply")
+    reply: str = Field(serialization_alias="said", description="The server's reply")
 
 
 class PartOut(BaseModel):
@@ -64,7 +64,7 @@ class PartOut(BaseModel):
     parts: int
     message_id: str
     state: State
-    said: str
+    reply: str = Field(serialization_alias="said")
     attempts: int
     next_ms: int | None = Field(description="When it is tried again; null: it does not wait")
     done_ms: int | None
@@ -85,7 +85,9 @@ class MailOut(BaseModel):
     subject: str
     too_large: TooLarge
     state: State
-    said: str = Field(description="The server's reply, or why it waits or failed; may be empty")
+    reply: str = Field(
+        serialization_alias="said", description="The server's reply, or why it waits or failed; may be empty"
+    )
     is_ready: bool = Field(description="False: its mails are still being made")
     share: float | None = Field(description="How much is made, or sent of the mail on its way: 0 to 1; null: neither")
     way: Way | None = Field(description="attached, split or link; null: not made yet")
@@ -162,7 +164,7 @@ class MailTestOut(BaseModel):
     """The server took it."""
 
     sentence: str
-    said: str = Field(description="The server's last reply")
+    reply: str = Field(serialization_alias="said", description="The server's last reply")
     is_encrypted: bool
     largest_bytes: int | None = Field(
         description="The largest mail that the server accepts, as it states; null: it does not state it"
@@ -320,7 +322,7 @@ def _out(mailer: Mailer, letter: Letter) -> MailOut:
         subject=order.subject,
         too_large=order.too_large,
         state=letter.state,
-        said=letter.detail,
+        reply=letter.detail,
         is_ready=letter.is_ready,
         share=mailer.share_of(letter),
         way=letter.way,
@@ -332,13 +334,13 @@ def _out(mailer: Mailer, letter: Letter) -> MailOut:
                 parts=mail.parts,
                 message_id=mail.message_id,
                 state=mail.state,
-                said=mail.detail,
+                reply=mail.detail,
                 attempts=mail.attempts,
                 next_ms=mail.next_ms if mail.state == "queued" else None,
                 done_ms=mail.done_ms,
                 size_bytes=mail.size_bytes,
                 recipients=[
-                    RecipientOut(address=address.parse(one.address).shown, state=one.state, said=one.detail)
+                    RecipientOut(address=address.parse(one.address).shown, state=one.state, reply=one.detail)
                     for one in mail.recipients
                 ],
             )

@@ -87,7 +87,7 @@ export function stripOf(frame, { isSilent, chain, paused_s }) {
   if (frame.session.paused && !isSilent) {
     return { kind: 'invert', icon: 'pause', text: `Paused ${paused(paused_s)}: no alarm is raised`, end: '', opens: 'alarms' };
   }
-  if (chain.word === 'Lost') {
+  if (chain.state === 'Lost') {
     return { kind: 'crit', icon: 'link-off', text: 'Connection lost', end: chain.since_ms === null ? '' : `since ${timeOfDay(chain.since_ms)}`, opens: 'alarms' };
   }
   if (isSilent) return { kind: 'invert', icon: 'clock', text: 'Values are not live', end: 'not checked', opens: 'signals' };

@@ -26,7 +26,7 @@ export function kindOf({ state }) {
  * The rows, top to bottom.
  * @param {Alarm[]} alarms
  * @param {Suppressed[]} suppressed
- * @param {boolean} mayAct a viewer, and whoever looks at a recording, only reads
+ * @param {boolean} mayAct false for a viewer and in a replay: they only read
  * @returns {Row[]}
  */
 export function rowsOf(alarms, suppressed, mayAct) {

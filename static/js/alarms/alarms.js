@@ -100,7 +100,7 @@ class AlarmList {
     show(none, rows.length === 0);
     setText(none, noneWords({
       isSilent: store.isSilent, isReplay: store.replaying, isPaused: frame?.session.paused === true,
-      isChecked: frame?.replay ? frame.replay.silent_s !== null : store.chain.word === 'Live',
+      isChecked: frame?.replay ? frame.replay.silent_s !== null : store.chain.state === 'Live',
     }));
     const isQuiet = !store.isSilent && !store.replaying && !rows.some(({ kind }) => kind === 'unacknowledged' || kind === 'returned');
     setSentence(lately, isQuiet ? latelyWords(store.log.rows, frame?.alarm_load?.in_10_min) : '');
@@ -214,7 +214,7 @@ function build(root) {
   const list = html('ul', { class: 'alarms', 'data-f': 'alarms' });
   const none = html('p', { class: 'state', 'data-f': 'alarms-none' });
   const lately = html('p', { class: 'lately', 'data-f': 'alarms-lately' });
-  const message = html('p', { class: 'note-line bad', role: 'alert', 'data-f': 'alarms-says' });
+  const message = html('p', { class: 'note-line bad', role: 'alert', 'data-f': 'alarms-message' });
   const ended = html('button', { type: 'button', class: 'key', 'data-f': 'alarms-ended' });
   const these = html('button', { type: 'button', class: 'key', 'data-f': 'alarms-these', hidden: true });
   const foot = html('div', { class: 'alarms-foot' }, ended, these);

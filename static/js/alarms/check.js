@@ -72,8 +72,8 @@ class CheckView {
   }
 
   #palette() {
-    const { body, chartSays } = this.parts;
-    return { ...colours(body), ink2: getComputedStyle(chartSays).color };
+    const { body, chartNote } = this.parts;
+    return { ...colours(body), ink2: getComputedStyle(chartNote).color };
   }
 
   recolour() {
@@ -163,13 +163,13 @@ class CheckView {
   /** @param {boolean} isKnown */
   #drawChart(isKnown) {
     const { answer, got_ms } = this.feed;
-    const { chart, chartSays, canvas } = this.parts;
+    const { chart, chartNote, canvas } = this.parts;
     const minute = answer?.minute ?? null;
     const isMeasured = minute !== null && minute.values.some((value) => value !== null);
     show(chart, answer !== null);
     show(canvas, isMeasured);
     const unit = answer?.measured?.unit ?? this.alarm?.measured?.unit ?? this.feed.unit;
-    setSentence(chartSays, !answer ? '' : !isMeasured ? 'nothing was measured' : isKnown ? unit : `until ${new Date(got_ms).toTimeString().slice(0, 8)}`);
+    setSentence(chartNote, !answer ? '' : !isMeasured ? 'nothing was measured' : isKnown ? unit : `until ${new Date(got_ms).toTimeString().slice(0, 8)}`);
     if (minute === null || !isMeasured) return;
     drawMinute(/** @type {HTMLCanvasElement} */ (canvas), minute, unit, momentOf(this.store) ?? Date.now(), this.palette);
     const known = minute.values.filter((value) => value !== null);
@@ -289,8 +289,8 @@ function build(root) {
   const alarm = html('section', { class: 'block check-alarm', 'aria-label': 'Its alarm', 'data-f': 'check-alarm' }, html('p', {}, alarmTitle, ' ', state), story, keys, message);
   const figures = Array.from({ length: 3 }, () => ({ label: html('span', { class: 'lab' }), value: html('span', { class: 'n v' }), unit: html('span', { class: 'u' }) }));
   const three = html('section', { class: 'three', 'data-f': 'check-figures', 'aria-label': 'Numbers' }, ...figures.map(({ label, value, unit: of }) => html('div', {}, label, html('br'), value, of)));
-  const [chartSays, canvas] = [html('span', { class: 'age', 'data-f': 'check-chart-says' }), html('canvas', { class: 'minute', role: 'img', 'aria-label': 'Last 60 s' })];
-  const chart = html('section', { class: 'block', 'aria-label': 'Its last 60 seconds' }, html('div', { class: 'head' }, html('span', {}, 'Last ', html('span', { class: 'n' }, '60'), ' s'), chartSays), canvas);
+  const [chartNote, canvas] = [html('span', { class: 'age', 'data-f': 'check-chart-message' }), html('canvas', { class: 'minute', role: 'img', 'aria-label': 'Last 60 s' })];
+  const chart = html('section', { class: 'block', 'aria-label': 'Its last 60 seconds' }, html('div', { class: 'head' }, html('span', {}, 'Last ', html('span', { class: 'n' }, '60'), ' s'), chartNote), canvas);
   const [thresholdTitle, thresholdWords] = [html('b'), html('span', { class: 'm' })];
   const change = html('button', { type: 'button', class: 'key', 'aria-expanded': 'false', 'data-f': 'check-change' }, 'Change');
   const rows = html('div', { class: 'check-rows', hidden: true });
@@ -299,7 +299,7 @@ function build(root) {
   const past = html('section', { class: 'block', 'aria-label': 'Its alarms in this drive' }, html('div', { class: 'head' }, html('span', {}, 'This drive'), total), history);
   const [siblingsTitle, others] = [html('span'), html('ul', { class: 'others' })];
   const siblings = html('section', { class: 'block', 'aria-label': 'Checks of this tile' }, html('div', { class: 'head' }, siblingsTitle), others);
-  const body = html('div', { class: 'check-body', tabindex: 0, role: 'region', 'aria-label': 'The check' }, html('div', { class: 'block check-says' }, sentence, needs), three, alarm, chart, thresholds, past, siblings);
+  const body = html('div', { class: 'check-body', tabindex: 0, role: 'region', 'aria-label': 'The check' }, html('div', { class: 'block check-message' }, sentence, needs), three, alarm, chart, thresholds, past, siblings);
   const turn = (/** @type {string} */ name, /** @type {string} */ label) => html('button', { type: 'button', class: 'key', 'aria-label': label, 'data-f': name }, icon(name === 'check-before' ? 'back' : 'next'));
   const [before, after, place] = [turn('check-before', 'Check before'), turn('check-after', 'Next check'), html('span', { 'data-f': 'check-place' })];
   const trends = html('button', { type: 'button', class: 'key', 'data-f': 'check-trends' }, 'Show in trends');
@@ -307,6 +307,6 @@ function build(root) {
     html('div', { class: 'alarms-head' }, mark, title, tag, html('span', { class: 'alarms-speed', 'aria-label': 'Speed' }, speed, unit), close),
     body, html('div', { class: 'alarms-foot' }, trends, html('div', { class: 'turn' }, before, place, after)));
   root.replaceChildren(view);
-  return { view, mark, title, tag, speed, unit, close, sentence, needs, alarm, alarmTitle, state, story, keys, message, figures, chart, chartSays, canvas, thresholds,
+  return { view, mark, title, tag, speed, unit, close, sentence, needs, alarm, alarmTitle, state, story, keys, message, figures, chart, chartNote, canvas, thresholds,
     thresholdTitle, thresholdWords, change, rows, past, total, history, siblings, siblingsTitle, others, body, before, after, place, trends };
 }

@@ -121,7 +121,7 @@ function build(root) {
   const find = /** @type {HTMLInputElement} */ (html('input', { type: 'search', id: 'log-find', maxlength: 100, enterkeyhint: 'search', autocomplete: 'off', placeholder: 'Find', 'aria-label': 'Find in the log' }));
   const [csv, json] = [html('a', { download: '' }, icon('download', 's'), 'CSV'), html('a', { download: '' }, icon('download', 's'), 'JSON')];
   const older = html('button', { type: 'button', class: 'key wide', 'data-f': 'older' }, 'Older');
-  const note = html('p', { class: 'note-line', role: 'status', 'data-f': 'log-says' });
+  const note = html('p', { class: 'note-line', role: 'status', 'data-f': 'log-message' });
   root.replaceChildren(
     html('section', { class: 'three' }, figure('In 10 min', inTen), figure('Active', standing), figure('Shelved', shelved)), load, trouble, now,
     html('div', { class: 'log-tools' }, kinds, html('div', { class: 'field' }, icon('find', 's'), find)),

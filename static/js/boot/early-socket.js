@@ -32,7 +32,7 @@ export class EarlySocket {
   /** @param {Early} early */
   constructor(early) {
     this.early = early;
-    queueMicrotask(() => { // by then whoever dialled listens
+    queueMicrotask(() => { // by then the caller listens
       for (const event of early.queue.splice(0)) this.#handle(event);
       early.handle = (event) => this.#handle(event);
     });

@@ -32,7 +32,7 @@
   /** Where devices are paired, a socket needs one. @param {string} way @returns {Promise<string | null>} */
   async function ticketOf(way) {
     if (way !== 'paired') return null;
-    const answer = await fetch('/api/ticket', { method: 'POST', cache: 'no-store' }); // how long to wait, whoever takes the socket over decides
+    const answer = await fetch('/api/ticket', { method: 'POST', cache: 'no-store' }); // how long to wait is decided by the owner of the socket
     return (await answer.json()).ticket;
   }
 

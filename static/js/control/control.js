@@ -77,7 +77,7 @@ export function mount(snacks, store, control) {
   const text = html('span');
   const keep = html('button', { type: 'button', class: 'key' }, 'Keep');
   const give = html('button', { type: 'button', class: 'key solid' }, 'Hand over');
-  const prompt = html('div', { class: 'snack asks', role: 'alert', 'data-f': 'asks' },
+  const prompt = html('div', { class: 'snack prompt', role: 'alert', 'data-f': 'prompt' },
     html('div', { class: 'side' }, icon('operator')), html('div', { class: 'tx' }, html('b', {}, 'Control requested'), text), html('div', { class: 'ac' }, keep, give));
   let asking = '';
   /** @type {{notice: NonNullable<ReturnType<typeof noticeOf>>, at_ms: number} | null} */

@@ -61,7 +61,7 @@ function mayAsk(store) {
   return store.frame !== null && !isSlowing(store) && !document.querySelector('dialog[open]') && !document.documentElement.hasAttribute('data-replay');
 }
 
-/** Prompts once in this tab, and never over another sheet: whoever does not want to sign on closes it. @param {Store} store @param {Say} say */
+/** Prompts once in this tab, and never over another sheet: a person who does not want to sign on closes it. @param {Store} store @param {Say} say */
 function asker(store, say) {
   let isPromptedHere = false; // or it cannot be, or it is being opened
 
@@ -80,7 +80,7 @@ function asker(store, say) {
   };
 }
 
-/** Whoever signs on is shown once what people who are off duty left acknowledged; later it stands in the list of alarms. @param {Store} store @param {Say} say */
+/** A person who signs on is shown once what people who are off duty left acknowledged; later it stands in the list of alarms. @param {Store} store @param {Say} say */
 function leftBehind(store, say) {
   const notice = new LeftNotice();
   let isOpening = false;

@@ -1,4 +1,4 @@
-// What people who are off duty by now left acknowledged: whoever signs on reads each line and takes it over.
+// What people who are off duty by now left acknowledged: the next who signs on reads each line and takes it over.
 
 import { LineRow } from './handover-sheet.js';
 import { leftLines } from './handover-layout.js';

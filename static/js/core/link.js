@@ -8,7 +8,7 @@ import { isWeak } from './round-trip.js';
  * @typedef {{name: string, mark: string, isBad: boolean, isKnown: boolean}} Node
  *
  * @typedef {object} ChainView
- * @property {'Live' | 'Silent' | 'Lost' | 'Dialling' | 'Waiting' | 'Waking' | 'Replay'} word
+ * @property {'Live' | 'Silent' | 'Lost' | 'Dialling' | 'Waiting' | 'Waking' | 'Replay'} state
  * @property {number | null} age_s age of what is beyond the cut, or of the car's newest message
  * @property {0 | 1 | 2 | null} cut the broken wire: after the phone, the server or the bridge
  * @property {number | null} since_ms wall clock: when what is beyond the cut was last received
@@ -48,12 +48,12 @@ function viewOf({ frame, isSilent, silence_s, lag_s, heard_ms, unserved = '' }) 
   if (isSilent && unserved) return agentSilent(unserved, silence_s, heard_ms);
   if (isSilent || !frame) return serverSilent(silence_s, heard_ms);
   const { session, link } = frame;
-  if (frame.replay) return { word: 'Replay', age_s: frame.replay.silent_s, cut: null, since_ms: null, nodes: nodesOf(null, []), sentence: 'A recording is shown.', detail: '' };
+  if (frame.replay) return { state: 'Replay', age_s: frame.replay.silent_s, cut: null, since_ms: null, nodes: nodesOf(null, []), sentence: 'A recording is shown.', detail: '' };
   const bridge_s = older(link.bridge_age_s, lag_s);
   const car_s = older(link.car_age_s, lag_s);
   if (session.phase === 'connecting' || session.phase === 'failed') {
     return {
-      word: 'Dialling', age_s: link.trying_for_s + lag_s, cut: 1, since_ms: null,
+      state: 'Dialling', age_s: link.trying_for_s + lag_s, cut: 1, since_ms: null,
       nodes: nodesOf(1, ['here', 'answers', link.problem?.mark ?? 'connecting', 'unknown']),
       sentence: link.problem?.title ?? 'Connecting to the bridge.',
       detail: link.problem?.hint ?? '',
@@ -61,7 +61,7 @@ function viewOf({ frame, isSilent, silence_s, lag_s, heard_ms, unserved = '' }) 
   }
   if (session.phase === 'lost' || link.cut === 'server-bridge') {
     return {
-      word: 'Lost', age_s: bridge_s, cut: 1, since_ms: link.since_ms,
+      state: 'Lost', age_s: bridge_s, cut: 1, since_ms: link.since_ms,
       nodes: nodesOf(1, ['here', `${age(lag_s)} s`, bridge_s === null ? 'silent' : `silent ${age(bridge_s)} s`, 'unknown']),
       sentence: link.problem?.title ?? 'The bridge stopped answering.',
       detail: link.problem?.hint ?? '',
@@ -71,7 +71,7 @@ function viewOf({ frame, isSilent, silence_s, lag_s, heard_ms, unserved = '' }) 
   const silent_s = car_s ?? older(session.connected_for_s, lag_s);
   if (link.cut === 'bridge-car' || (car_s === null && (silent_s ?? 0) > FIRST_MESSAGE_S)) {
     return {
-      word: 'Silent', age_s: silent_s, cut: 2, since_ms: link.since_ms,
+      state: 'Silent', age_s: silent_s, cut: 2, since_ms: link.since_ms,
       nodes: nodesOf(2, [...live, silent_s === null ? 'silent' : `silent ${age(silent_s)} s`]),
       sentence: link.problem?.title ?? 'The car fell silent.',
       detail: link.problem?.hint ?? 'Server and bridge answer.',
@@ -79,14 +79,14 @@ function viewOf({ frame, isSilent, silence_s, lag_s, heard_ms, unserved = '' }) 
   }
   if (car_s === null) {
     return {
-      word: 'Waiting', age_s: older(session.connected_for_s, lag_s), cut: null, since_ms: null,
+      state: 'Waiting', age_s: older(session.connected_for_s, lag_s), cut: null, since_ms: null,
       nodes: nodesOf(null, [...live, 'no message yet']),
       sentence: link.problem?.title ?? 'Nothing received yet.',
       detail: link.problem?.hint ?? '',
     };
   }
   return {
-    word: 'Live', age_s: car_s, cut: null, since_ms: null,
+    state: 'Live', age_s: car_s, cut: null, since_ms: null,
     nodes: nodesOf(null, [...live, link.problem?.mark ?? `${age(car_s)} s`]),
     sentence: link.problem?.title ?? 'Every part of the chain answers.',
     detail: link.problem?.hint ?? '',
@@ -100,7 +100,7 @@ function viewOf({ frame, isSilent, silence_s, lag_s, heard_ms, unserved = '' }) 
  */
 function waking(silence_s) {
   return {
-    word: 'Waking', age_s: silence_s, cut: null, since_ms: null,
+    state: 'Waking', age_s: silence_s, cut: null, since_ms: null,
     nodes: nodesOf(null, ['here', 'answers', '', '']),
     sentence: 'This page was away.', detail: 'Values return with the next data.',
   };
@@ -114,7 +114,7 @@ function waking(silence_s) {
 function serverSilent(silence_s, heard_ms) {
   const wasHeard = heard_ms !== null;
   return {
-    word: 'Lost', age_s: wasHeard ? silence_s : null, cut: 0, since_ms: heard_ms,
+    state: 'Lost', age_s: wasHeard ? silence_s : null, cut: 0, since_ms: heard_ms,
     nodes: nodesOf(0, ['here', wasHeard ? `silent ${age(silence_s)} s` : 'no answer', 'unknown', 'unknown']),
     sentence: wasHeard ? 'The server fell silent.' : 'The server does not answer.',
     detail: wasHeard ? `Last data at ${timeOfDay(heard_ms)}. This page keeps trying.` : 'This page keeps trying.',
@@ -131,7 +131,7 @@ function serverSilent(silence_s, heard_ms) {
 function agentSilent(why, silence_s, heard_ms) {
   const wasHeard = heard_ms !== null;
   return {
-    word: 'Lost', age_s: wasHeard ? silence_s : null, cut: 1, since_ms: heard_ms, isUnserved: true,
+    state: 'Lost', age_s: wasHeard ? silence_s : null, cut: 1, since_ms: heard_ms, isUnserved: true,
     nodes: nodesOf(1, ['here', 'answers', wasHeard ? `silent ${age(silence_s)} s` : 'no answer', 'unknown'], BY_AGENT),
     sentence: why,
     detail: wasHeard ? `Last data at ${timeOfDay(heard_ms)}. The server answers.` : 'The server answers.',

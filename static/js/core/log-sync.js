@@ -54,7 +54,7 @@ export class LogSync {
 
   /** @param {import('./protocol-types.js').LogEvent[]} events @param {import('./protocol-types.js').Resumed} [resumed] */
   take(events, resumed) {
-    if (this.#owed) { // they came before this page told what it has: from there they are sent again, and in order
+    if (this.#owed) { // they came before this page reported its newest event: from there they are sent again, and in order
       this.#owed();
       this.#send({ kind: 'have', event: this.#log.last ?? 0 });
       return;

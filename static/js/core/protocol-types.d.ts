@@ -1934,7 +1934,7 @@ export interface RefusedAddress {
   suggestion: string | null;
 }
 
-/** Ends the order, or the guard's hold, of this number: whoever drives may drive on. */
+/** Ends the order, or the guard's hold, of this number: the driver, or the car, may drive on. */
 export interface ReleaseCommand {
   id?: string | null;
   /** since the finger let go, when it was sent */

@@ -15,14 +15,14 @@ const EVENLY = { take: [2, 85], replay: [2, 250] };
 /**
  * @typedef {Pick<WebSocket, 'binaryType' | 'send' | 'close'> & {onopen: any, onmessage: any, onclose: any, onerror: any, dialled_ms?: number}} Socket dialled_ms: when it was, where that was not at once [ms, monotonic]
  *
- * @typedef {object} Ear
+ * @typedef {object} Listener
  * @property {() => void} opened
  * @property {(text: string, at_ms?: number) => void} text at_ms: when it came, where that was before now [ms, monotonic]
  * @property {(bytes: ArrayBuffer) => void} bytes
  * @property {() => void} closed
  */
 
-/** One socket at a time. Time is an argument: whoever owns it calls `look` a few times a second. */
+/** One socket at a time. Time is an argument: the owner calls `look` a few times a second. */
 export class PageSocket {
   /** The one that is open. @type {Socket | null} */
   #socket = null;
@@ -40,13 +40,13 @@ export class PageSocket {
   #sent = [];
 
   /**
-   * @param {Ear} ear
+   * @param {Listener} listener
    * @param {() => Socket} dial makes a socket that is connecting
    * @param {() => number} [now] monotonic [ms]
    * @param {() => number} [chance] from 0 to 1
    */
-  constructor(ear, dial, now = () => performance.now(), chance = () => Math.random()) {
-    this.ear = ear;
+  constructor(listener, dial, now = () => performance.now(), chance = () => Math.random()) {
+    this.listener = listener;
     this.dial = dial;
     this.now = now;
     this.#dials = new Dials(chance);
@@ -230,12 +230,12 @@ export class PageSocket {
     this.#takes = new Takes(asked_ms, opened_ms, aheadOf(this.trip), this.#takes.areNamed);
     socket.onmessage = (/** @type {{data: any, at_ms?: number}} */ event) => {
       this.#came_ms = this.now();
-      if (typeof event.data === 'string') return this.ear.text(event.data, event.at_ms);
+      if (typeof event.data === 'string') return this.listener.text(event.data, event.at_ms);
       this.answered(this.now(), 'scan');
-      this.ear.bytes(event.data);
+      this.listener.bytes(event.data);
     };
     socket.onclose = () => this.#drop();
-    this.ear.opened();
+    this.listener.opened();
   }
 
   /** The open one is gone or given up. */
@@ -244,7 +244,7 @@ export class PageSocket {
     this.#socket = null;
     this.#takes.isOwed = false;
     this.#dials.gone();
-    this.ear.closed();
+    this.listener.closed();
   }
 
   #failedDial() {
@@ -267,7 +267,7 @@ export class PageSocket {
   /** @param {Socket | null} socket */
   #close(socket) {
     if (!socket) return;
-    // Forgotten before it is closed: a frame still under way on the old socket is never heard again.
+    // Forgotten before it is closed: a frame still under way on the old socket is never received.
     socket.onopen = socket.onmessage = socket.onclose = socket.onerror = null;
     socket.close();
   }

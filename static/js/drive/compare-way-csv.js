@@ -46,8 +46,8 @@ function eventsAt(rows, events, place) {
     rows.forEach(({ x }, i) => {
       if (Math.abs(x - at) < Math.abs((rows[best]?.x ?? 0) - at)) best = i;
     });
-    const said = event.text ? `${event.kind}: ${event.text}` : event.kind;
-    found.set(best, found.has(best) ? `${found.get(best)}; ${said}` : said);
+    const entry = event.text ? `${event.kind}: ${event.text}` : event.kind;
+    found.set(best, found.has(best) ? `${found.get(best)}; ${entry}` : entry);
   }
   return found;
 }
@@ -55,8 +55,8 @@ function eventsAt(rows, events, place) {
 /** @param {number | null} value @param {number} digits */
 const number = (value, digits) => (value === null ? '' : String(Number(value.toFixed(digits))));
 
-/** Words of people: no spreadsheet takes them for a formula. @param {string | undefined} said */
-const text = (said) => (said === undefined ? '' : FORMULA.test(said) ? `'${said}` : said);
+/** A text that people wrote, so that no spreadsheet takes it for a formula. @param {string | undefined} entered */
+const text = (entered) => (entered === undefined ? '' : FORMULA.test(entered) ? `'${entered}` : entered);
 
 /** @param {string} cell */
 const quoted = (cell) => (/[",\r\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell);

@@ -12,7 +12,7 @@ import { fixed, signed } from '../core/format.js';
  * @typedef {{name: string, unit: string, a: number | null, b: number | null, mean: number | null, most: number | null, words: string}} Line mean and most: of B − A
  */
 
-/** Where both drove alone: what happened elsewhere says nothing of the change. @param {Row[]} rows @param {By} by @param {Course} a @param {Course} b @returns {Line[]} */
+/** Where both drove alone: what happened elsewhere is no evidence of the change. @param {Row[]} rows @param {By} by @param {Course} a @param {Course} b @returns {Line[]} */
 export function summaryOf(rows, by, a, b) {
   const both = rows.filter((row) => row.b);
   return [

@@ -146,7 +146,7 @@ class CompareWay {
     const both = (/** @type {string} */ text, /** @type {SVGElement | null} */ drawing) => (drawing ? [caption(text), drawing] : [caption(`${text}: not known`)]);
     this.plots.replaceChildren(caption('speed, m/s: A solid, B dotted, hatched where B has no data'), speedPlot(rows, width, a.limit_mps), ...both('B − A, m/s', differencePlot(rows, width, 'speed')),
       ...both('steering, % (− left)', bothPlot(rows, width, 'steering', 'Steering', 5)), ...both('steering, B − A, %', differencePlot(rows, width, 'steering')),
-      ...both('following error, m/s: speed minus the commanded speed', bothPlot(rows, width, 'follow', 'Following error', 1)), ...both('GPS error, m: one sigma, as the receiver says it', bothPlot(rows, width, 'gps', 'GPS error', 1)),
+      ...both('following error, m/s: speed minus the commanded speed', bothPlot(rows, width, 'follow', 'Following error', 1)), ...both('GPS error, m: one sigma, as the receiver states it', bothPlot(rows, width, 'gps', 'GPS error', 1)),
       caption('alarms, marks, interventions'), eventsPlot(rows, width, this.#by, a.events, b.events), this.cursor, this.slider);
     this.#map = waysMap(rows, Math.max(200, Math.floor(this.side.clientWidth) - 32));
     const most = differences(rows);

@@ -1,4 +1,4 @@
-// The departure check of this drive: worked through, and signed. Asked for from the server while it is open.
+// The departure check of this drive: worked through, and signed. Requested from the server while it is open.
 
 import { countWords, doneOf, leftWords, nextOf, rowsOf, shortHash } from './departure-layout.js';
 import { DueItems } from './due.js';
@@ -17,7 +17,7 @@ import { openScreen } from '../core/open-screen.js';
  * @typedef {import('./departure-layout.js').Item} Item
  */
 
-/** How often it is asked for [ms]; while a pedal is looked at, oftener. */
+/** How often it is requested [ms]; while a pedal is looked at, oftener. */
 const EVERY_MS = 500;
 const EVERY_NOW_MS = 200;
 /** An answer that takes longer is none [ms]: what stands there is old. */
@@ -236,7 +236,7 @@ class DepartureView {
     else this.#draw();
   }
 
-  // -- what a row asks for -----------------------------------------------------------------------------------------
+  // -- requests of a row -------------------------------------------------------------------------------------------
 
   /** @param {Item} item @param {Event} event */
   tick(item, event) {

@@ -21,7 +21,7 @@ const ANSWER_MS = 5000;
  * Nothing can be changed before the list is known: one that does not load is an error of the caller's.
  * @param {HTMLElement} place
  * @param {import('../core/store.js').Store} store
- * @param {(words: string) => void} head says at the group's head what holds
+ * @param {(words: string) => void} head shows at the group's head what holds
  */
 export async function mount(place, store, head) {
   await styled('departure');
@@ -172,7 +172,7 @@ function path(vehicle, as = '') {
   return `/api/departure${as}${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
 }
 
-/** Not a number where it is none: the server says what it wants. @param {HTMLInputElement | null} field */
+/** Not a number where it is none: the server's refusal names what it wants. @param {HTMLInputElement | null} field */
 const numberIn = (field) => decimalOf(field?.value ?? '');
 
 /** @param {string} label @param {string} of @param {string} value @param {number} longest */

@@ -6,13 +6,13 @@ import { html, icon, setAttribute, setText, setSentence, show } from '../core/do
 /**
  * @typedef {import('./departure-layout.js').Item} Item
  * @typedef {import('./departure-layout.js').Face} Face
- * @typedef {object} Acts what a row asks for
+ * @typedef {object} Acts what a row can request
  * @property {(item: Item, event: Event) => void} tick
- * @property {(item: Item) => void} explain says why it failed or is not applicable
+ * @property {(item: Item) => void} explain opens the reason why it failed or is not applicable
  * @property {(item: Item, does: import('./departure-layout.js').Fix['does'], event: Event) => void} fix
  */
 
-/** A press so long opens what else can be said of an item [ms]. */
+/** A press so long opens the other choices of an item [ms]. */
 const LONG_MS = 500;
 const MARKS = { manual: 'edit', automatic: 'clock', active: 'slow' };
 
@@ -91,9 +91,9 @@ function nowParts(item, _, isLocked) {
   const bar = new Bar(item);
   const element = html('li', { class: 'dep-now' }, body, bar.element);
   const draw = (/** @type {Item} */ now) => {
-    const [number, word] = valueOf(now);
+    const [number, unitText] = valueOf(now);
     setText(value, number);
-    setText(unit, word);
+    setText(unit, unitText);
     bar.draw(now);
   };
   return { element, body, title, line, draw, tick: null, fix: null, why: null, isNow: /** @type {const} */ (true), isFailed: /** @type {const} */ (false) };

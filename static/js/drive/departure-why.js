@@ -1,4 +1,4 @@
-// Why an item of the departure check is not applicable, or failed: one chip or words. What was said can be taken back.
+// Why an item of the departure check is not applicable, or failed: one chip or a text. The entry can be taken back.
 
 import { REASONS } from './departure-layout.js';
 import { intervalWords } from './due.js';

@@ -18,7 +18,7 @@ import { mustWait } from '../shell/sheet.js';
 export function openBoard({ kind, label, title, ends, view, store, onClose }) {
   const monitor = need(document, '#monitor');
   const isInView = !monitor.hidden;
-  const others = /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(isInView ? '.drive-board' : 'body > .board')); // no dialog, no notice: what asks can be answered
+  const others = /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(isInView ? '.drive-board' : 'body > .board')); // no dialog, no notice: what waits for an answer can be answered
   const beneath = [...others].filter((one) => !one.inert);
   const back = html('button', { type: 'button', class: 'btn', 'aria-label': 'Back', 'data-f': `${kind}-back` }, icon('back'));
   const bar = html('div', { class: 'titlebar' }, back, title, ...ends);
@@ -48,7 +48,7 @@ export function openBoard({ kind, label, title, ends, view, store, onClose }) {
       if (event.key === 'Escape') history.back();
     }),
     store.on('draw', () => {
-      if (mustWait() || frontOf(monitor) !== front) close(); // something asks, or another page, tab or screen was opened
+      if (mustWait() || frontOf(monitor) !== front) close(); // something waits for an answer, or another page, tab or screen was opened
     }),
   ];
   title.focus();
@@ -60,8 +60,8 @@ const frontOf = (monitor) => [document.body.dataset['screen'], monitor.dataset['
 /** One figure of a row. @param {string} name @param {string | null} value null: not known @param {string} unit @param {string} more @param {boolean} [isBad] */
 export function figure(name, value, unit, more, isBad = false) {
   const head = html('dt', {}, name, ...(isBad ? [icon('warn', 's c-warn')] : []));
-  const said = value === null ? html('b', { class: 'unknown' }, 'not known') : html('b', { class: 'n' }, value);
-  return html('div', {}, head, html('dd', {}, said, ...(value !== null && unit ? [html('span', { class: 'u' }, unit)] : [])), html('dd', { class: 'sub' }, more));
+  const shown = value === null ? html('b', { class: 'unknown' }, 'not known') : html('b', { class: 'n' }, value);
+  return html('div', {}, head, html('dd', {}, shown, ...(value !== null && unit ? [html('span', { class: 'u' }, unit)] : [])), html('dd', { class: 'sub' }, more));
 }
 
 /** @param {number} at_ms */

@@ -1,4 +1,4 @@
-// When an item of the departure check that has an interval is due again: in words, and asked for from the logbook.
+// When an item of the departure check that has an interval is due again: the texts, and the request to the logbook.
 
 import { request } from '../control/request.js';
 import { counted, fixed } from '../core/format.js';
@@ -38,7 +38,7 @@ export function lastWords({ done_ms, is_least }) {
 /** @param {number} value */
 const kilometres = (value) => fixed(value, value < 100 && value % 1 ? 1 : 0);
 
-/** What the logbook of one car says of its items, asked for once. */
+/** The due dates of one car's items, as the logbook has them; requested once. */
 export class DueItems {
   /** @type {Map<string, Due>} */
   #found = new Map();
@@ -63,7 +63,7 @@ export class DueItems {
     return [intervalWords(item), due ? dueWords(due) : ''].filter(Boolean).join(', ');
   }
 
-  /** The interval alone is said where the logbook does not answer. @param {string} vehicle */
+  /** The interval alone is shown where the logbook does not answer. @param {string} vehicle */
   async #load(vehicle) {
     const query = new URLSearchParams({ vehicle, from: String(Date.now()) }); // of the drives only what is due
     try {

@@ -44,9 +44,9 @@ export class FreshPanel {
     this.photo = html('button', { type: 'button', class: 'key', 'data-f': 'mark-photo', 'data-operator': '' }, shape('camera'), 'Photo');
     this.words = html('button', { type: 'button', class: 'key you', 'data-f': 'mark-words', 'data-operator': '' }, svg('svg', { class: 'i', viewBox: '0 0 24 24', 'aria-hidden': 'true' }, svg('use', { href: '#i-edit' })), 'Words');
     this.keys = html('div', { class: 'fresh-keys' }, this.undo, this.photo, this.words);
-    this.said = html('p', { class: 'unseen', role: 'status' });
-    this.element = html('div', { class: 'fresh', role: 'group', 'aria-label': 'The mark placed last', hidden: true }, this.ring.element, html('div', { class: 'told' }, this.title, this.wave, this.more), this.keys);
-    place.append(this.element, this.said);
+    this.live = html('p', { class: 'unseen', role: 'status' });
+    this.element = html('div', { class: 'fresh', role: 'group', 'aria-label': 'The mark placed last', hidden: true }, this.ring.element, html('div', { class: 'about' }, this.title, this.wave, this.more), this.keys);
+    place.append(this.element, this.live);
     this.stops = [
       listen(this.undo, 'click', () => this.#undo()),
       listen(this.photo, 'click', () => this.#photo()),
@@ -70,7 +70,7 @@ export class FreshPanel {
     this.#speed = speed?.value && speed.freshness === 'fresh' ? `${fixed(speed.value.speed_mps)} m/s` : '';
     this.#open(mark.id);
     this.#until_ms = performance.now() + STAYS_MS;
-    setText(this.said, `Marked ${timeOfDay(markedAt(mark))}`);
+    setText(this.live, `Marked ${timeOfDay(markedAt(mark))}`);
     this.draw();
   }
 
@@ -84,7 +84,7 @@ export class FreshPanel {
   }
 
   /** The voice is over; for a while more its mark can be changed. */
-  heard() {
+  voiceEnded() {
     this.#voice = null;
     this.#until_ms = performance.now() + STAYS_MS;
     this.draw();

@@ -35,9 +35,9 @@ class Ledge {
     this.say = say;
     this.marks = new Marks(store, say);
     this.icon = shape('flag');
-    this.word = html('small', {}, 'hold: voice');
+    this.hint = html('small', {}, 'hold: voice');
     this.wait = html('span', { class: 'wait', 'data-f': 'marks-wait', hidden: true });
-    this.key = html('button', { type: 'button', class: 'mark-key', 'data-f': 'mark', 'data-operator': '' }, this.icon, html('span', {}, 'Mark', this.word), this.wait);
+    this.key = html('button', { type: 'button', class: 'mark-key', 'data-f': 'mark', 'data-operator': '' }, this.icon, html('span', {}, 'Mark', this.hint), this.wait);
     this.mode = html('div', { class: 'mode-slot', 'data-f': 'mode' });
     this.panel = html('div', { class: 'fresh-slot' });
     this.element = need(monitor, ':scope > .ledge');
@@ -86,7 +86,7 @@ class Ledge {
     this.#shown = shown;
     const isHeld = this.key.dataset['held'] !== undefined;
     setShape(this.icon, isHeld ? 'mic' : 'flag');
-    setText(this.word, isHeld ? 'let go: stored' : !isAway ? 'hold: voice' : marks.isDurable ? 'stored on this device' : 'until the page closes');
+    setText(this.hint, isHeld ? 'let go: stored' : !isAway ? 'hold: voice' : marks.isDurable ? 'stored on this device' : 'until the page closes');
     show(this.wait, waiting > 0 && isAway);
     setText(this.wait, waitWords(waiting));
     setAttribute(this.key, 'aria-label', ['Mark this moment', isAway ? 'stored on this device' : 'hold to speak', ...(waiting && isAway ? [waitWords(waiting)] : [])].join('; '));

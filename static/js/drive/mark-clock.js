@@ -9,7 +9,7 @@ const SLEPT_MS = 500;
 const CHANGED_MS = 50;
 
 /**
- * @typedef {'measured' | 'remembered' | 'unknown'} Source of a time: the server was heard by this page, by an earlier visit of it, or never
+ * @typedef {'measured' | 'remembered' | 'unknown'} Source of a time: data came from the server to this page, to an earlier visit of it, or never
  * @typedef {{at_ms: number, ahead_ms: number, source: Source}} Moment at_ms: by the server's clock; ahead_ms: this phone's clock − the server's
  */
 
@@ -61,7 +61,7 @@ export class MarkClock {
     return { at_ms: Math.round(wall_ms), ahead_ms: 0, source: 'unknown' };
   }
 
-  /** Whether this page heard the server: a time from before that can be corrected by `at`. */
+  /** Whether data came from the server to this page: a time from before that can be corrected by `at`. */
   get isMeasured() {
     return this.#lead_ms !== null;
   }

@@ -10,7 +10,7 @@ const MOST_MS = 8000;
 const REFUSED_MS = 30_000;
 const COMMAND_MS = 4000;
 const UPLOAD_MS = 60_000;
-/** What the server says of a mark that it does not have. */
+/** The server's answer for a mark that it does not have. */
 const UNKNOWN = 'There is no such mark.';
 
 /**

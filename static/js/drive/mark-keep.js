@@ -36,7 +36,7 @@ export class MarkKeep {
     return [...all.values()];
   }
 
-  /** Raises what the database says where it cannot be read. @param {string} id @returns {Promise<Mark | null>} null: there is none */
+  /** Raises the database's error where it cannot be read. @param {string} id @returns {Promise<Mark | null>} null: there is none */
   async get(id) {
     const database = await this.#opened;
     const kept = database ? await done(database.transaction(MARKS).objectStore(MARKS).get(id)) : undefined;
@@ -87,9 +87,9 @@ export class MarkKeep {
       transaction.oncomplete = () => resolve(mark);
       transaction.onabort = transaction.onerror = () => reject(transaction.error);
       const marks = transaction.objectStore(MARKS);
-      const asked = marks.get(id);
-      asked.onsuccess = () => {
-        mark = change(asked.result);
+      const request = marks.get(id);
+      request.onsuccess = () => {
+        mark = change(request.result);
         if (mark) marks.put(isWhole ? mark : withoutParts(mark));
         else marks.delete(id);
       };
@@ -151,9 +151,9 @@ function withoutParts(mark) {
 
 /** @returns {Promise<IDBDatabase>} */
 function opened() {
-  const asked = indexedDB.open(DATABASE, 1);
-  asked.onupgradeneeded = () => asked.result.createObjectStore(MARKS, { keyPath: 'id' });
-  return done(asked);
+  const request = indexedDB.open(DATABASE, 1);
+  request.onupgradeneeded = () => request.result.createObjectStore(MARKS, { keyPath: 'id' });
+  return done(request);
 }
 
 /** @template T @param {Promise<T>} wanted @returns {Promise<T>} */

@@ -125,7 +125,7 @@ export class MarkKey {
       await this.marks.change(id, (mark) => ({ ...mark, voice: null }));
       if (!isPulled && !isRefused) this.say('The microphone was not ready yet: hold the key longer, once it may be used, to add voice. The moment is marked.', 'No voice');
     }
-    if (isLast && !this.#speaking) this.fresh.heard();
+    if (isLast && !this.#speaking) this.fresh.voiceEnded();
   }
 
   /**

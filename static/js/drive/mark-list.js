@@ -13,10 +13,10 @@ import { quietly } from './marks.js';
 /** @typedef {{mark: string, marked_ms: number, category: string | null, words: string, voice: boolean, photo: boolean, source: string, by: string | null, at_s?: number, late?: boolean}} Stored as the server has it */
 /** @typedef {{id: string, at_ms: number, head: string, more: string[], isWaiting: boolean, isOwn: boolean, isRefused: boolean, voice: boolean}} Row */
 
-/** What is said of a mark of the server. @param {Stored} mark */
-export function storedWords({ marked_ms, category, words: said, voice, photo, source, by }) {
-  const head = `${timeOfDay(marked_ms)} · ${category || (voice ? 'voice' : photo ? 'photo' : said ? 'words' : 'tap only')}`;
-  return { head, more: [...(said ? [said] : []), ...(voice ? ['voice'] : []), ...(photo ? ['photo'] : []), source === 'car' ? 'by the car’s button' : by ?? ''].filter(Boolean) };
+/** The texts of a mark of the server. @param {Stored} mark */
+export function storedWords({ marked_ms, category, words, voice, photo, source, by }) {
+  const head = `${timeOfDay(marked_ms)} · ${category || (voice ? 'voice' : photo ? 'photo' : words ? 'words' : 'tap only')}`;
+  return { head, more: [...(words ? [words] : []), ...(voice ? ['voice'] : []), ...(photo ? ['photo'] : []), source === 'car' ? 'by the car’s button' : by ?? ''].filter(Boolean) };
 }
 
 /**
@@ -95,9 +95,9 @@ class MarkList {
     const { waiting } = marks;
     setSentence(this.count, countWords(waiting.length, rows.length - waiting.length));
     show(this.waiting, waiting.length > 0);
-    const said = waitingWords(waiting, marks.isDurable, !marks.isServerThere);
-    setSentence(/** @type {Element} */ (this.waiting.querySelector('b')), said.title);
-    setSentence(/** @type {Element} */ (this.waiting.querySelector('p')), said.text);
+    const notice = waitingWords(waiting, marks.isDurable, !marks.isServerThere);
+    setSentence(/** @type {Element} */ (this.waiting.querySelector('b')), notice.title);
+    setSentence(/** @type {Element} */ (this.waiting.querySelector('p')), notice.text);
     show(this.none, rows.length === 0 || this.#problem !== '');
     setText(this.none, this.#problem || 'No marks in this drive yet. Press “Mark” to mark a moment.');
     for (const player of this.#players) player.stop();

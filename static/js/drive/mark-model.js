@@ -10,8 +10,8 @@ export const MOST_SHIFT_S = 12;
 /** Marks that are delivered and older than this are left to the server [ms]. */
 const KEPT_MS = 12 * 3_600_000;
 const MOST_KEPT = 60;
-/** A difference of clocks that is told [ms]. */
-const TOLD_MS = 200;
+/** A difference of clocks of at least this is shown [ms]. */
+const SHOWN_MS = 200;
 
 /**
  * @typedef {{blob: Blob | null, type: string, bytes: number, length_s: number | null, note: string, isOpen: boolean, isStored: boolean, made?: string}} Part a
@@ -73,7 +73,7 @@ export function markedAt({ tap_ms, shift_s }) {
   return Math.round(tap_ms + shift_s * 1000);
 }
 
-/** What the server is to be told next of the mark itself; null: nothing. @param {Mark} mark @returns {'mark' | 'change' | 'remove' | 'drop' | null} */
+/** The next command of the mark itself to the server; null: none. @param {Mark} mark @returns {'mark' | 'change' | 'remove' | 'drop' | null} */
 export function commandOf({ isRemoved, isSent, stored, version }) {
   if (isRemoved) return stored > 0 || isSent ? 'remove' : 'drop';
   if (stored === 0) return 'mark';
@@ -117,26 +117,26 @@ export function categoryWords(category) {
   return category ? category.charAt(0).toUpperCase() + category.slice(1) : '';
 }
 
-/** What a row says first: "14:08:31 · photo". @param {Mark} mark */
+/** The head of a row: "14:08:31 · photo". @param {Mark} mark */
 export function headWords(mark) {
   const { category, voice, photo } = mark;
   const what = category ? category : voice?.note ? /^voice \w+/.exec(voice.note)?.[0] : voice ? 'voice' : photo ? 'photo' : mark.words ? 'words' : 'tap only';
   return `${timeOfDay(markedAt(mark))} · ${what}`;
 }
 
-/** What a row says beneath: words, what came with it, what was cut or corrected. @param {Mark} mark @returns {string[]} */
+/** The details of a row: the text, what came with it, what was cut or corrected. @param {Mark} mark @returns {string[]} */
 export function moreWords(mark) {
   const { words, voice, photo, ahead_ms, clock, shift_s } = mark;
-  const said = [];
-  if (words) said.push(words);
-  if (voice) said.push(voice.note || `voice ${fixed(voice.length_s)} s`);
-  if (photo) said.push(photo.note || `photo ${fixed(photo.bytes / 1e6)} MB`);
-  if (shift_s) said.push(`moved by ${signed(shift_s)} s`);
-  if (clock === 'unknown') said.push('by the clock of this device, which was not compared with the server’s');
-  else if (Math.abs(ahead_ms) >= TOLD_MS) said.push(`clock of this device ${signed(ahead_ms / 1000, 2)} s, corrected`);
+  const parts = [];
+  if (words) parts.push(words);
+  if (voice) parts.push(voice.note || `voice ${fixed(voice.length_s)} s`);
+  if (photo) parts.push(photo.note || `photo ${fixed(photo.bytes / 1e6)} MB`);
+  if (shift_s) parts.push(`moved by ${signed(shift_s)} s`);
+  if (clock === 'unknown') parts.push('by the clock of this device, which was not compared with the server’s');
+  else if (Math.abs(ahead_ms) >= SHOWN_MS) parts.push(`clock of this device ${signed(ahead_ms / 1000, 2)} s, corrected`);
   const refused = refusedWords(mark);
-  if (refused) said.push(refused);
-  return said;
+  if (refused) parts.push(refused);
+  return parts;
 }
 
 /** What the server did not do, and why. @param {Mark} mark */

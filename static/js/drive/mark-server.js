@@ -1,4 +1,4 @@
-// What the server is told of the marks of this phone, and what it answers.
+// Commands and uploads to the server for the marks of this phone, and its answers.
 
 import { keptAt } from '../core/kept-at.js';
 import { ownName } from '../control/own-name.js';
@@ -34,8 +34,8 @@ export function serverOf(store) {
           method: 'POST', body: blob, cache: 'no-store', signal: AbortSignal.timeout(within_ms), headers: { 'content-type': type, 'x-catgraph-page': ownName() },
         });
         if (answer.ok) return { ok: true, isLost: false, reason: '' };
-        const said = await answer.json().catch(() => null);
-        return { ok: false, isLost: isForNow(answer.status), reason: typeof said?.detail === 'string' ? said.detail : `The server refused it (${answer.status}).` };
+        const body = await answer.json().catch(() => null);
+        return { ok: false, isLost: isForNow(answer.status), reason: typeof body?.detail === 'string' ? body.detail : `The server refused it (${answer.status}).` };
       } catch {
         return { ok: false, isLost: true, reason: '' };
       }

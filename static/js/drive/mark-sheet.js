@@ -51,7 +51,7 @@ class MarkSheet {
     this.shift = html('b', { class: 'n' });
     this.from = html('span', {}, 'from the tap');
     this.chips = CATEGORIES.map((category) => html('button', { type: 'button', class: 'key chip-key', 'data-category': category, 'data-operator': '' }, categoryWords(category)));
-    this.words = /** @type {HTMLTextAreaElement} */ (html('textarea', { rows: 1, maxlength: MOST_WORDS, dir: 'auto', 'aria-label': 'Words', placeholder: 'What happened?', enterkeyhint: 'done', 'data-f': 'mark-said', 'data-operator': '' }));
+    this.words = /** @type {HTMLTextAreaElement} */ (html('textarea', { rows: 1, maxlength: MOST_WORDS, dir: 'auto', 'aria-label': 'Words', placeholder: 'What happened?', enterkeyhint: 'done', 'data-f': 'mark-text', 'data-operator': '' }));
     this.words.value = marks.get(id)?.words ?? '';
     this.note = html('p', { class: 'sub note' });
     this.photoKey = html('button', { type: 'button', class: 'key wide', 'data-f': 'sheet-photo', 'data-operator': '' }, shape('camera'), 'Photo');

@@ -31,7 +31,7 @@ export class Marks {
   #writing = new Map();
   /** @type {Set<() => void>} */
   #listeners = new Set();
-  #said = '';
+  #reported = '';
   #looked_ms = -Infinity;
   #recalled_ms = -Infinity;
   #spoken = new Spoken();
@@ -198,9 +198,9 @@ export class Marks {
       if (kept !== 'memory') this.#kept.add(id);
       this.isDurable = kept !== 'memory';
       if (stepOf(mark) === null || kept === 'whole') return;
-      const said = kept === 'memory' ? MEMORY : FULL;
-      if (said !== this.#said) this.say(said, 'Stored in part');
-      this.#said = said;
+      const trouble = kept === 'memory' ? MEMORY : FULL;
+      if (trouble !== this.#reported) this.say(trouble, 'Stored in part');
+      this.#reported = trouble;
     }).catch((error) => console.info('A mark could not be kept:', error));
     this.#writing.set(id, written);
     void written.then(() => {
@@ -225,7 +225,7 @@ export class Marks {
     });
   }
 
-  /** Those that were pressed before any server was heard get its time. */
+  /** Those that were pressed before anything came from a server get its time. */
   #correct() {
     const { ahead_ms } = this.clock.at(this.store.now(), Date.now());
     for (const mark of [...this.#marks.values()]) if (mark.clock === 'unknown' && mark.stored === 0) void this.change(mark.id, (now) => corrected(now, ahead_ms));

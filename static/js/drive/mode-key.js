@@ -1,7 +1,7 @@
 // The left of the ledge: who drives. Where an intervention waits for its description it is a key that opens the form.
 
 import { html, icon, listen, setAttribute, setText, show, svg } from '../core/dom.js';
-import { modeWords } from './mode-words.js';
+import { modeWords } from './mode-text.js';
 
 /** @typedef {import('../core/store.js').Store} Store */
 /** @typedef {(sentence: string, title?: string) => void} Say */
@@ -63,7 +63,7 @@ class Face {
     element.append(this.#known, this.#unknown, html('span', {}, this.#title, this.#text));
   }
 
-  /** @param {import('./mode-words.js').Shown} shown */
+  /** @param {import('./mode-text.js').Shown} shown */
   draw({ mode, title, text }) {
     setAttribute(this.element, 'data-mode', mode);
     show(this.#known, mode !== 'unknown');

@@ -4,7 +4,7 @@ import { html } from '../core/dom.js';
 import { shrunk } from './photo.js';
 
 /**
- * Asks for a picture and keeps it with a mark.
+ * Lets the user take a picture, and keeps it with a mark.
  * @param {string} id
  * @param {import('./marks.js').Marks} marks
  * @param {import('./marks.js').Say} say

@@ -21,7 +21,7 @@ export function scaled(width, height) {
   return [Math.max(1, Math.floor(width * by)), Math.max(1, Math.floor(height * by))];
 }
 
-/** What is said of one that was made smaller; '' where it stayed about as it was. @param {number} before @param {number} after bytes */
+/** The note of one that was made smaller; '' where it stayed about as it was. @param {number} before @param {number} after bytes */
 export function smallerWords(before, after) {
   return before > 1.2 * after ? `photo ${fixed(after / 1e6)} MB, made smaller from ${fixed(before / 1e6)} MB` : '';
 }

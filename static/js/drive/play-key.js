@@ -7,8 +7,8 @@ export class PlayKey {
   #audio = /** @type {HTMLAudioElement} */ (html('audio', { preload: 'none' }));
   #url = '';
   #icon = icon('play');
-  #word = html('span');
-  element = html('button', { type: 'button', class: 'key wide', 'data-f': 'mark-play', hidden: true }, this.#icon, this.#word);
+  #label = html('span');
+  element = html('button', { type: 'button', class: 'key wide', 'data-f': 'mark-play', hidden: true }, this.#icon, this.#label);
 
   /** @param {() => Blob | string | null} source null: there is no voice @param {import('./marks.js').Say} say */
   constructor(source, say) {
@@ -21,7 +21,7 @@ export class PlayKey {
   /** @param {number | null} length_s */
   draw(length_s) {
     show(this.element, this.source() !== null);
-    setText(this.#word, length_s === null ? 'Voice' : `${fixed(length_s)} s`);
+    setText(this.#label, length_s === null ? 'Voice' : `${fixed(length_s)} s`);
     setAttribute(this.element, 'aria-label', `${this.#audio.paused ? 'Play' : 'Stop'} the voice note`);
   }
 

@@ -7,12 +7,12 @@ import { speedWords } from '../core/units.js';
 import { request, sentenceOf } from '../control/request.js';
 import { addSheet, closeSheet, mustWait, openSheet } from '../shell/sheet.js';
 import { AFTER_S, TakeOverPlot } from './take-over-plot.js';
-import { CATEGORIES, KINDS, STARTERS, alarmWords, startedWords } from './mode-words.js';
+import { CATEGORIES, KINDS, STARTERS, alarmWords, startedWords } from './mode-text.js';
 import { styled } from '../core/style-sheet.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
- * @typedef {import('./mode-words.js').Intervention} Intervention
+ * @typedef {import('./mode-text.js').Intervention} Intervention
  * @typedef {{category: string | null, what: string, by: Intervention['initiated_by'] | null}} Draft
  */
 
@@ -108,7 +108,7 @@ class TakeOver {
     this.draw();
   }
 
-  /** Samples after the intervention come for 6 s; what could not be loaded is asked for again. */
+  /** Samples after the intervention come for 6 s; what could not be loaded is requested again. */
   #look() {
     const last = this.#found?.samples.at(-1)?.at_s ?? -Infinity;
     const ago_s = ((this.store.frame?.server.time_ms ?? 0) - (this.#found?.at_ms ?? 0)) / 1000;

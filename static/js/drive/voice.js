@@ -6,7 +6,7 @@ import { fixed } from '../core/format.js';
 export const LONGEST_MS = 10_000;
 /** A piece comes so often: so much at most is lost when the page is killed [ms]. */
 const PIECE_MS = 500;
-/** A microphone that gives nothing for so long after it was asked to end is left alone [ms]. */
+/** A microphone that gives nothing for so long after it was stopped is left alone [ms]. */
 const ENDS_MS = 3000;
 /** In this order; the first that this browser can record. */
 const TYPES = ['audio/webm;codecs=opus', 'audio/mp4;codecs=opus', 'audio/ogg;codecs=opus', 'audio/mp4', 'audio/webm'];
@@ -16,7 +16,7 @@ const TYPES = ['audio/webm;codecs=opus', 'audio/mp4;codecs=opus', 'audio/ogg;cod
 const CUT = { hidden: 'the page was hidden', microphone: 'the microphone was lost', page: 'the page was closed' };
 
 /**
- * What is said of a voice that was cut off; '' where it was not.
+ * The note of a voice that was cut off; '' where it was not.
  * @param {Ending} ending
  * @param {number} length_s
  */
@@ -66,7 +66,7 @@ export class Voice {
     this.ended = new Promise((resolve) => { this.#settle = () => resolve(this.#ending ?? 'let go'); });
   }
 
-  /** Asks for the microphone and records. Raises what the browser says where it gives none. */
+  /** Requests the microphone and records. Raises the browser's error where it gives none. */
   async begin() {
     if (!globalThis.MediaRecorder || !navigator.mediaDevices?.getUserMedia) throw new Error('No recorder');
     const stream = await navigator.mediaDevices.getUserMedia({ audio: { channelCount: 1, echoCancellation: true, noiseSuppression: true } });
@@ -85,7 +85,7 @@ export class Voice {
     this.#listen(stream);
   }
 
-  /** Raises what the browser says where it cannot. @param {MediaStream} stream */
+  /** Raises the browser's error where it cannot. @param {MediaStream} stream */
   #record(stream) {
     const type = typeOf((one) => MediaRecorder.isTypeSupported(one));
     const recorder = new MediaRecorder(stream, { ...(type ? { mimeType: type } : {}), audioBitsPerSecond: 32_000 });

@@ -88,18 +88,19 @@ export function sizeNote(bytes, limit_mb, tooLarge) {
 export function stateOf(mail, now_ms) {
   const share = mail.share === null ? '' : ` ${Math.round(mail.share * 100)} %`;
   const sent = mail.parts.filter(({ state }) => state === 'sent').length;
+  const reply = mail.said;
   const parts = mail.parts.length > 1 ? `${sent} of ${mail.parts.length} parts sent. ` : '';
   switch (mail.state) {
     case 'queued': {
       if (!mail.is_ready) return { label: `Preparing${share}`, icon: 'clock', isBad: false, detail: '' };
       const next = Math.min(...mail.parts.map(({ state, next_ms }) => (state === 'queued' && next_ms !== null ? next_ms : Infinity)));
-      const tries = next > now_ms && Number.isFinite(next) ? `${mail.said ? ' ' : ''}Tried again at ${timeOfDay(next)}.` : '';
-      return { label: mail.said ? 'Waiting' : 'Queued', icon: 'clock', isBad: false, detail: `${parts}${sentence(mail.said)}${tries}` };
+      const tries = next > now_ms && Number.isFinite(next) ? `${reply ? ' ' : ''}Tried again at ${timeOfDay(next)}.` : '';
+      return { label: reply ? 'Waiting' : 'Queued', icon: 'clock', isBad: false, detail: `${parts}${sentence(reply)}${tries}` };
     }
     case 'sending': return { label: `Sending${share}`, icon: 'mail', isBad: false, detail: parts.trim() };
-    case 'sent': return { label: 'Sent', icon: 'ok', isBad: false, detail: `${mail.parts.length > 1 ? `${counted(mail.parts.length, 'part')}. ` : ''}${sentence(mail.said)}` };
-    case 'failed': return { label: 'Failed', icon: 'warn', isBad: true, detail: `${parts}${sentence(mail.said)}` };
-    default: return { label: 'Cancelled', icon: 'close', isBad: false, detail: sentence(mail.said) };
+    case 'sent': return { label: 'Sent', icon: 'ok', isBad: false, detail: `${mail.parts.length > 1 ? `${counted(mail.parts.length, 'part')}. ` : ''}${sentence(reply)}` };
+    case 'failed': return { label: 'Failed', icon: 'warn', isBad: true, detail: `${parts}${sentence(reply)}` };
+    default: return { label: 'Cancelled', icon: 'close', isBad: false, detail: sentence(reply) };
   }
 }
 

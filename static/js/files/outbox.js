@@ -117,7 +117,7 @@ class Outbox {
       html('p', { class: 'm', dir: 'auto' }, `to ${mail.to.join(', ')}`),
       html('p', { class: 'm' }, ...textNodes(`${dayTime(mail.ordered_ms, now_ms)} · ${aboutOf(mail)}`)),
       html('div', state.isBad ? { 'data-bad': true } : {}, html('p', { class: 'st' }, icon(state.icon), html('span', {}, ...textNodes(state.label))),
-        html('p', { class: 'said' }, ...textNodes(state.detail)), ...refusedOf(mail).map((line) => html('p', { class: 'said' }, ...textNodes(line)))),
+        html('p', { class: 'reply' }, ...textNodes(state.detail)), ...refusedOf(mail).map((line) => html('p', { class: 'reply' }, ...textNodes(line)))),
       html('div', { class: 'pair' }, ...key(resend, 'resend'), ...key(cancel, 'cancel')));
   }
 

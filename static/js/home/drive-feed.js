@@ -136,7 +136,7 @@ export class DriveFeed {
       ranked(found.marks);
       return found;
     } catch {
-      return null; // requested again; until then the chart says that it is not live
+      return null; // requested again; until then the chart shows that it is not live
     } finally {
       this.#isAsking = false;
     }

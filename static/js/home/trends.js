@@ -143,7 +143,7 @@ function mountHere(root, list, store, say) {
     show(place, chart !== null);
     show(list, chart === null);
     setSentence(field(root, 'sparks-title'), chart ? 'Trends' : 'Last 60 s');
-    setText(field(root, 'sparks-says'), chart ? '' : 'now at the right');
+    setText(field(root, 'sparks-message'), chart ? '' : 'now at the right');
     if (chart) unmount = chart.mount(place, { store, say });
   };
   const resize = new ResizeObserver(() => void look());

@@ -19,12 +19,12 @@ export class MapPanel {
   draw({ car, phone, apart }, isTooFar) {
     const { at } = this;
     this.#drawFixes(car, phone);
-    const lines = { 'car-says': car.message, 'phone-says': phone.message, 'map-says': isTooFar ? 'Car and phone are too far apart for one view.' : '' };
+    const lines = { 'car-message': car.message, 'phone-message': phone.message, 'map-message': isTooFar ? 'Car and phone are too far apart for one view.' : '' };
     for (const [name, message] of Object.entries(lines)) {
       setSentence(at(name), message);
       show(at(name), message !== '');
     }
-    show(at('says'), Boolean(car.message || phone.message || isTooFar));
+    show(at('message'), Boolean(car.message || phone.message || isTooFar));
     this.#announce(`${car.message} ${phone.message}`.trim());
     const [number, unit] = apart ? distanceWords(apart.distance_m) : ['–', ''];
     setText(at('apart'), number);
@@ -77,7 +77,7 @@ export class MapPanel {
     setAttribute(at('verdict'), 'class', verdict === 'fault' ? 'tag warn' : verdict === 'ok' ? 'tag' : 'tag unk');
     setAttribute(at('verdict-icon'), 'href', `#i-${verdict === 'fault' ? 'warn' : verdict === 'ok' ? 'ok' : 'unknown'}`);
     show(at('verdict-mark'), verdict !== 'unknown'); // the dashed frame shows it, and there is no room
-    setText(at('verdict-word'), verdict === 'fault' ? 'FAULT' : verdict === 'ok' ? 'OK' : 'not checked');
+    setText(at('verdict-text'), verdict === 'fault' ? 'FAULT' : verdict === 'ok' ? 'OK' : 'not checked');
     setSentence(at('verdict-why'), verdict === 'unknown' ? (check?.brief ?? '').replace(/^not checked:? ?/, '') : '');
   }
 }

@@ -122,9 +122,9 @@ function build(root, why, name) {
   const own = /** @type {HTMLInputElement} */ (html('input', { id: 'pair-name', type: 'text', maxlength: 40, autocomplete: 'off', spellcheck: 'false', enterkeyhint: 'next', 'data-f': 'pair-name' }));
   own.value = name;
   const pin = /** @type {HTMLInputElement} */ (html('input', {
-    id: 'pair-pin', class: 'n', type: 'text', inputmode: 'numeric', autocomplete: 'one-time-code', pattern: '[0-9 ]*', maxlength: 12, enterkeyhint: 'go', placeholder: '––– –––', 'aria-describedby': 'pair-says', 'data-f': 'pair-pin',
+    id: 'pair-pin', class: 'n', type: 'text', inputmode: 'numeric', autocomplete: 'one-time-code', pattern: '[0-9 ]*', maxlength: 12, enterkeyhint: 'go', placeholder: '––– –––', 'aria-describedby': 'pair-message', 'data-f': 'pair-pin',
   }));
-  const message = html('p', { class: 'says', id: 'pair-says', role: 'alert', 'data-f': 'pair-says' });
+  const message = html('p', { class: 'msg', id: 'pair-message', role: 'alert', 'data-f': 'pair-message' });
   const go = html('button', { type: 'submit', class: 'main', 'data-f': 'pair-go' });
   const pad = html('div', { class: 'pad', role: 'group', 'aria-label': 'Digits' },
     ...['1', '2', '3', '4', '5', '6', '7', '8', '9'].map((digit) => html('button', { type: 'button', class: 'key n', 'data-digit': digit }, digit)),

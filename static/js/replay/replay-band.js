@@ -16,7 +16,7 @@ export class ReplayBand {
   #liveText = html('b', { class: 'text' });
   #recording = html('span', { class: 'recording' });
   /** Opens the list of alarms. */
-  moment = html('button', { type: 'button', class: 'replay-line', 'aria-haspopup': 'dialog', disabled: true }, html('span', { class: 'said' }, this.#mark, this.#text, this.#end), this.#count, icon('next', 's'));
+  moment = html('button', { type: 'button', class: 'replay-line', 'aria-haspopup': 'dialog', disabled: true }, html('span', { class: 'body' }, this.#mark, this.#text, this.#end), this.#count, icon('next', 's'));
   /** Leads back to the live car, where it needs the operator. */
   live = html('button', { type: 'button', class: 'replay-live', hidden: true }, icon('bell', 's'), this.#liveText, this.#recording, html('span', { class: 'end' }, 'Back to live'));
   element = html('section', { class: 'replay-band', 'aria-label': 'Replay of a recording' },

@@ -1,7 +1,7 @@
 // The list of what to jump to in a recording: pure functions, no DOM.
 
 import { categoryWords } from '../drive/mark-model.js';
-import { CATEGORIES, KINDS } from '../drive/mode-words.js';
+import { CATEGORIES, KINDS } from '../drive/mode-text.js';
 import { counted, duration, fixed } from '../core/format.js';
 import { ICONS } from '../core/priority.js';
 

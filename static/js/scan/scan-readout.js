@@ -99,7 +99,7 @@ export class ScanReadout {
     const degrees = mark.at ? Math.round((-mark.at.bearing_rad * 180) / Math.PI) : 0;
     setAttribute(at('aim'), 'aria-valuenow', Math.max(-90, Math.min(90, degrees)));
     setAttribute(at('aim'), 'aria-valuetext', side ? mark.text : instead || 'no return marked');
-    setText(at('said'), side ? mark.text : instead);
+    setText(at('live'), side ? mark.text : instead);
   }
 }
 

@@ -75,7 +75,7 @@ class Questions {
     } else this.#shown = '';
     if (may) setSentence(this.lineWords, waitingWords(waiting, label));
     else setSentence(this.others, `${questions.map(({ words }) => words).join(' ')} The operator in control answers.`);
-    setAttribute(document.documentElement, 'data-asks', may && first !== undefined);
+    setAttribute(document.documentElement, 'data-prompt', may && first !== undefined);
   }
 
   /** @param {Question | undefined} question */

@@ -41,7 +41,7 @@ export class SettingsRow {
     this.field = field;
     this.texts = [field.title, field.description, field.heading, field.unit, speedUnit(), name];
     const id = `set-${name.replaceAll('.', '-')}`;
-    this.message = html('p', { class: 'says', role: 'status', hidden: true });
+    this.message = html('p', { class: 'msg', role: 'status', hidden: true });
     this.yet = html('p', { class: 'yet', hidden: true }, 'Not confirmed by the server yet.');
     this.isSwitch = field.unit === SWITCH;
     const help = field.description ? html('p', { class: 'help', id: `${id}-help` }, ...textNodes(field.description)) : '';
@@ -54,11 +54,11 @@ export class SettingsRow {
     this.slider = /** @type {HTMLInputElement} */ (html('input', {
       type: 'range', min: 0, max: POSITIONS, step: 1, 'aria-label': `${field.title}, slider`, 'aria-describedby': described,
     }));
-    this.usual = html('button', { type: 'button', class: 'usual' }, html('span', { class: 'word' }));
+    this.usual = html('button', { type: 'button', class: 'usual' }, html('span', { class: 'text' }));
     this.low = html('span', { class: 'n low', 'aria-hidden': 'true' });
     this.high = html('span', { class: 'n high', 'aria-hidden': 'true' });
     this.toggle = html('button', { type: 'button', class: 'toggle', id, role: 'switch', 'aria-checked': 'false', 'aria-describedby': described },
-      html('span', { class: 'knob' }), html('span', { class: 'word' }));
+      html('span', { class: 'knob' }), html('span', { class: 'text' }));
     this.range = html('div', { class: 'range' }, html('span', { class: 'line' }), html('span', { class: 'on' }), html('span', { class: 'tick' }), this.low, this.high, this.usual, this.slider);
     this.element = html('div', { class: 'set', 'data-setting': name },
       html('div', { class: 'row' }, html('label', { class: 't', for: id }, field.title), ...(this.isSwitch ? [this.toggle] : [this.number, this.unit])),

@@ -11,7 +11,7 @@ import { field, listen, need, setAttribute, setIcon, setText } from '../core/dom
  */
 export function mount(root, store, router) {
   const pause = field(root, 'pause');
-  const label = field(root, 'pause-word');
+  const label = field(root, 'pause-label');
   const mark = need(pause, '.i');
   const stopSheet = /** @type {HTMLDialogElement} */ (need(document, '#sheet-stop'));
 

@@ -10,12 +10,12 @@ const NAME = 'catgraph';
 /**
  * The worst first; what is not live is never called by its last alarm.
  * @param {import('../core/protocol-types.js').State | null} frame
- * @param {{isSilent: boolean, isMonitoring: boolean, word: string}} seen
+ * @param {{isSilent: boolean, isMonitoring: boolean, state: string}} seen
  * @returns {Badge}
  */
-export function badgeOf(frame, { isSilent, isMonitoring, word }) {
+export function badgeOf(frame, { isSilent, isMonitoring, state }) {
   if (!frame || !isMonitoring) return { title: NAME, icon: 'plain', count: 0 };
-  if (isSilent || word === 'Lost') return { title: `${isSilent ? 'Not live' : 'Connection lost'} · ${NAME}`, icon: 'lost', count: null };
+  if (isSilent || state === 'Lost') return { title: `${isSilent ? 'Not live' : 'Connection lost'} · ${NAME}`, icon: 'lost', count: null };
   const { standing } = layOut((frame.replay ? frame.live?.alarms : frame.alarms) ?? []);
   const urgent = standing.filter((alarm) => alarm.priority !== 'advisory');
   const paused = frame.replay ? 'REPLAY · ' : frame.session.paused ? 'Paused · ' : '';
@@ -32,7 +32,7 @@ export function mount(store) {
   let shown;
 
   function draw() {
-    const badge = badgeOf(store.frame, { isSilent: store.isSilent, isMonitoring: store.isMonitoring, word: store.chain.word });
+    const badge = badgeOf(store.frame, { isSilent: store.isSilent, isMonitoring: store.isMonitoring, state: store.chain.state });
     if (document.title !== badge.title && !store.painter.drawing.isFailed) document.title = badge.title; // else undrawn.js writes it
     setAttribute(link, 'href', icons[badge.icon]);
     if (badge.count === shown) return;

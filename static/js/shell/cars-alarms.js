@@ -34,7 +34,7 @@ export class CarsAlarms {
     this.leave = html('button', { type: 'button', class: 'key' }, 'Leave it');
     this.title = html('b', { id: 'other-title' });
     this.text = html('span');
-    this.card = html('div', { class: 'snack asks other', role: 'alertdialog', 'aria-labelledby': 'other-title', 'data-f': 'other-car' },
+    this.card = html('div', { class: 'snack prompt other', role: 'alertdialog', 'aria-labelledby': 'other-title', 'data-f': 'other-car' },
       html('div', { class: 'side' }, icon('crit')), html('div', { class: 'tx' }, this.title, this.text), html('div', { class: 'ac' }, this.leave, this.open));
     const meant = (/** @type {(row: CarRow) => void} */ act) => (/** @type {Event} */ event) => {
       if (this.#shown && this.#meant.by(event)) act(this.#shown);

@@ -127,4 +127,4 @@ function drawSpeed(element, unit, { ink, value_mps }) {
 }
 
 /** A chain of which only the server is known. @type {import('../core/link.js').ChainView} */
-const NOTHING = { word: 'Lost', age_s: null, cut: 0, since_ms: null, nodes: [], sentence: '', detail: '' };
+const NOTHING = { state: 'Lost', age_s: null, cut: 0, since_ms: null, nodes: [], sentence: '', detail: '' };

@@ -57,7 +57,7 @@ export class Cars {
     document.documentElement.dataset['vehicle'] = name;
     document.querySelector('#undrawn-reload')?.setAttribute('href', `/?vehicle=${encodeURIComponent(name)}`);
     for (const sheet of /** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog[open]'))) sheet.close();
-    for (const note of document.querySelectorAll('.snack.note, .snack.asks')) note.remove();
+    for (const note of document.querySelectorAll('.snack.note, .snack.prompt')) note.remove();
     try {
       localStorage.setItem(KEPT, name);
     } catch {

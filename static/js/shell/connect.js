@@ -115,7 +115,7 @@ class ConnectScreen {
   }
 
   #drawComplaint() {
-    const message = field(this.root, 'says');
+    const message = field(this.root, 'message');
     const sentence = this.#complaint || heldWords(this.store.frame?.session.held ?? null);
     setSentence(message, sentence);
     show(message, sentence !== '');

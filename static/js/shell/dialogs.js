@@ -212,7 +212,7 @@ export function alarmInHead(monitor) {
 }
 
 /**
- * In its pane it takes no focus: whoever types a number there must not acknowledge by the next key.
+ * In its pane it takes no focus: a person who types a number there must not acknowledge by the next key.
  * @param {HTMLDialogElement} sheet
  * @param {HTMLElement} place
  */

@@ -52,7 +52,7 @@ export class FleetActs {
     }
     const [kind, fields] = COMMANDS[act];
     const isDone = await this.#send(kind, fields, item, key);
-    // Whoever has it works on it: its own tabs are opened, and nothing is armed by that.
+    // The person who has it works on it: its own tabs are opened, and nothing is armed by that.
     if (isDone && item.cars.length === 1 && (act === 'take' || act === 'over' || act === 'accept')) this.open(item.name);
     return undefined;
   }
@@ -139,7 +139,7 @@ export class FleetActs {
 
   /** @param {string} sentence @param {string} given the title @param {() => void} [onClosed] it was closed by hand */
   say(sentence, given, onClosed) {
-    const title = isMaybe(sentence) ? 'Not known' : given; // whoever tells it takes it for refused
+    const title = isMaybe(sentence) ? 'Not known' : given; // the caller takes it for refused
     const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close' }, icon('close'));
     const note = html('div', { class: 'snack note', role: 'status' }, html('div', { class: 'side' }, icon('info')),
       html('div', { class: 'tx' }, html('b', {}, ...textNodes(title)), html('span', {}, ...textNodes(sentence))), close);

@@ -20,7 +20,7 @@ export function lostChain({ lost, silence_s, cars }) {
   const silent = silence_s === Infinity ? 'no data yet' : `silent ${age(silence_s)} s`;
   const marks = lost === 'server' ? ['here', silent, 'unknown', 'unknown'] : ['here', 'answers', silent, 'unknown'];
   const nodes = NAMES.map((name, i) => ({ name: i === 3 && cars ? counted(cars, 'car') : name, mark: marks[i] ?? '', isBad: i === cut + 1, isKnown: i <= cut }));
-  return { word: 'Lost', age_s: silence_s, cut, since_ms: null, nodes, sentence: '', detail: '' };
+  return { state: 'Lost', age_s: silence_s, cut, since_ms: null, nodes, sentence: '', detail: '' };
 }
 
 /** @param {LostView} view @returns {[string, string]} what is lost, and what follows */

@@ -40,7 +40,7 @@ export const MANY = 20;
 export const MOST_ROWS = 16;
 
 /** @type {import('../core/link.js').ChainView} */
-const NO_CHAIN = { word: 'Lost', age_s: null, cut: 0, since_ms: null, nodes: [], sentence: '', detail: '' };
+const NO_CHAIN = { state: 'Lost', age_s: null, cut: 0, since_ms: null, nodes: [], sentence: '', detail: '' };
 
 /**
  * @param {Seen} seen

@@ -40,7 +40,7 @@ export class FleetView {
     this.acts = acts;
     this.press = press;
     const one = (/** @type {string} */ name) => field(root, name);
-    this.bar = { chain: one('small-chain'), word: one('word'), age: one('word-age'), unit: one('word-unit'), count: one('count'), of: one('count-unit'), clock: one('clock') };
+    this.bar = { chain: one('small-chain'), state: one('link-state'), age: one('link-age'), unit: one('link-unit'), count: one('count'), of: one('count-unit'), clock: one('clock') };
     this.line = { strip: one('strip'), text: one('strip-text'), end: one('strip-end'), more: one('strip-more') };
     this.floor = one('floor');
     this.over = one('over-words');
@@ -153,7 +153,7 @@ export class FleetView {
     const { bar, store } = this;
     const isKnown = store.cars !== null || view.lost !== null;
     const state = view.lost ? 'Lost' : isKnown ? 'Live' : 'Waiting';
-    setText(bar.word, state);
+    setText(bar.state, state);
     setText(bar.age, isKnown ? age(view.lost ? view.silence_s : store.lag_s) : '');
     setText(bar.unit, isKnown ? ' s' : '');
     drawChain(bar.chain, view.lost ? lostChain(view) : { ...lostChain(view), cut: isKnown ? null : 0 });

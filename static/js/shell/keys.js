@@ -1,4 +1,4 @@
-// The keys of the page: declared once, obeyed and shown from here. None of them orders a slow-down.
+// The keys of the page: declared once, handled and shown from here. None of them orders a slow-down.
 
 import { addSheet, closeSheet, openSheet } from './sheet.js';
 import { field, html, listen, need, setText, textNodes } from '../core/dom.js';

@@ -12,7 +12,7 @@ const SHORT = 'height < 50em';
 const LEAST = 'height < 32.5em';
 const NARROW = 'width < 43.75em';
 
-/** Asked in this way it costs no layout of the page, which innerWidth and innerHeight do. @param {string} size */
+/** Measured in this way it costs no layout of the page, which innerWidth and innerHeight do. @param {string} size */
 const is = (size) => matchMedia(`(${size})`).matches;
 
 /** On a low phone the steps of a slow-down and a warning leave no room: they come first; on its side a warning alone does. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */

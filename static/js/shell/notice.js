@@ -35,7 +35,7 @@ export function notices(root) {
   mirror(document.body, 'data-snack', isCovering, [root], { childList: true, subtree: true, attributeFilter: ['hidden'] });
   makeRoom(root);
   return (sentence, given = '', way = undefined) => {
-    const title = isMaybe(sentence) && !given.includes('Not known') ? 'Not known' : given; // whoever tells it takes it for refused
+    const title = isMaybe(sentence) && !given.includes('Not known') ? 'Not known' : given; // the caller takes it for refused
     const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close' }, icon('close'));
     const text = html('div', { class: 'tx' }, ...(title ? [html('b', {}, ...textNodes(title))] : []), html('span', {}, ...textNodes(sentence)));
     const note = html('div', { class: 'snack note', role: 'status' }, html('div', { class: 'side' }, icon('info')), text, close);

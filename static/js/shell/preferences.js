@@ -40,7 +40,7 @@ export function mount(alarmSound) {
     ...keys('unitKey', speedUnit, (unit) => chooseSpeedUnit(/** @type {import('../core/units.js').SpeedUnit} */ (unit))),
     ...keys('handKey', () => root.dataset['hand'] ?? 'right', (hand) => keep('hand', hand, 'right')),
   ];
-  const message = field(sheet(), 'sound-says');
+  const message = field(sheet(), 'sound-message');
   const draw = () => {
     for (const { key, value, now } of choices) key.setAttribute('aria-pressed', String(value === now()));
   };

@@ -50,7 +50,7 @@ const OPENED = ['sheet-menu', 'sheet-history', 'sheet-shelve', 'sheet-stop', 'sh
 
 /** @param {HTMLDialogElement} sheet */
 export function isAsked(sheet) {
-  return (sheet.dataset['asked'] !== undefined || OPENED.includes(sheet.id)) && sheet.dataset['docked'] === undefined; // what is docked covers nothing
+  return (sheet.dataset['opened'] !== undefined || OPENED.includes(sheet.id)) && sheet.dataset['docked'] === undefined; // what is docked covers nothing
 }
 
 /** Closes what stands in the view when it is left: by Escape, by another tab or screen, by a press beside it where it is no drawer. */
@@ -82,7 +82,7 @@ export function mountSheets() {
  * @returns {() => void} takes it away again
  */
 export function addSheet(sheet) {
-  sheet.dataset['asked'] = '';
+  sheet.dataset['opened'] = '';
   document.body.append(sheet);
   const stop = mountSheet(sheet);
   return () => {

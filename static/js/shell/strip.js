@@ -43,7 +43,7 @@ function modeOf(store) {
   const frame = store.heeded;
   if (!frame || !store.isMonitoring) return 'none';
   if (frame.session.paused && !store.isSilent) return 'paused';
-  if (store.chain.word === 'Lost' && store.silence_s > 2) return 'critical';
+  if (store.chain.state === 'Lost' && store.silence_s > 2) return 'critical';
   const critical = frame.alarms.filter((alarm) => alarm.priority === 'critical' && alarm.active && alarm.state !== 'SHELVED');
   if (!critical.length || store.isSilent) return 'none';
   return critical.some((alarm) => alarm.state === 'UNACKED') ? 'asking' : 'critical';

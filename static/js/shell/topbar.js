@@ -35,17 +35,17 @@ export function mount(root, store, say) {
   /** @type {boolean | null} */
   let order = null;
   const chain = field(root, 'small-chain');
-  const [link, word, wordAge, rec, recFor] = ['link', 'word', 'word-age', 'rec', 'rec-for'].map((name) => field(root, name));
+  const [link, state, linkAge, rec, recFor] = ['link', 'link-state', 'link-age', 'rec', 'rec-for'].map((name) => field(root, name));
   const [clock, speed, speedU] = ['clock', 'bar-speed', 'bar-speed-unit'].map((name) => field(root, name));
-  if (!link || !word || !wordAge || !rec || !recFor || !clock || !speed || !speedU) throw new Error('The template lacks the top bar');
+  if (!link || !state || !linkAge || !rec || !recFor || !clock || !speed || !speedU) throw new Error('The template lacks the top bar');
 
   function draw() {
     const view = store.chain;
     drawChain(chain, view);
-    const name = view.word === 'Live' && view.isWeak ? 'Weak' : view.word; // a narrow bar has no place for more
-    setText(word, name);
+    const name = view.state === 'Live' && view.isWeak ? 'Weak' : view.state; // a narrow bar has no place for more
+    setText(state, name);
     const since = view.age_s === null ? '' : ` ${age(view.age_s)} s`;
-    setSentence(wordAge, since.trim());
+    setSentence(linkAge, since.trim());
     setAttribute(link, 'aria-label', `${name}${since}: the link to the car. ${view.sentence}${view.isWeak ? ` ${view.detail}` : ''}`); // begins with what is seen
     setText(clock, timeOfDay(Date.now()));
     const speed_mps = store.signal('speed')?.value?.speed_mps;

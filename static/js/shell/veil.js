@@ -67,7 +67,7 @@ export function mount(root, store) {
     const isUnsaid = kind === null || store.painter.drawing.isFailed;
     show(chain, !isUnsaid);
     drawBigChain(chain, view);
-    setSentence(title, isUnsaid || view.age_s === null ? 'Stale' : `${view.word === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);
+    setSentence(title, isUnsaid || view.age_s === null ? 'Stale' : `${view.state === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);
     const [bold, plain] = isUnsaid ? ['The display is not updating.', 'The page or the server has stopped. Watch the car.'] : [view.sentence, detailOf(view)];
     if (written !== `${bold}|${plain}`) {
       sentence.replaceChildren(html('b', {}, ...textNodes(bold)), ' ', ...textNodes(plain));
@@ -86,7 +86,7 @@ export function mount(root, store) {
 
 /** @param {import('../core/link.js').ChainView} view */
 function detailOf(view) {
-  if (view.word === 'Silent' && view.since_ms !== null) {
+  if (view.state === 'Silent' && view.since_ms !== null) {
     return `${view.detail} Last message at ${timeOfDay(view.since_ms)}.`;
   }
   return view.detail;

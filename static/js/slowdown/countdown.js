@@ -40,7 +40,7 @@ export class Countdown {
     if (!banner.open) {
       this.#from_s = coming.left_s;
       this.#meant.moved();
-      setText(at('says'), '');
+      setText(at('message'), '');
     }
     setSentence(at('title'), coming.title);
     setSentence(at('text'), coming.text);
@@ -71,6 +71,6 @@ export class Countdown {
     if (answer.ok) {
       this.#vetoed = trigger;
       this.banner.close();
-    } else setSentence(field(this.banner, 'says'), `${answer.outcome === 'unknown' ? 'Not known whether vetoed' : 'Not vetoed'}: ${answer.reason ?? 'refused.'}`);
+    } else setSentence(field(this.banner, 'message'), `${answer.outcome === 'unknown' ? 'Not known whether vetoed' : 'Not vetoed'}: ${answer.reason ?? 'refused.'}`);
   }
 }

@@ -17,7 +17,7 @@ export class OrderSteps {
     this.store = store;
     this.steps = field(root, 'order-steps');
     this.line = field(root, 'order-line');
-    this.live = field(root, 'order-said');
+    this.live = field(root, 'order-live');
     this.rows = Array.from({ length: STEPS }, () => ({ mark: icon('unknown', 's'), label: html('span', { class: 'lab' }), value: html('b') }))
       .map((row) => ({ ...row, item: html('li', {}, row.mark, row.label, row.value) }));
     store.on('switch', () => { this.#announced = ''; }); // the other car was not released

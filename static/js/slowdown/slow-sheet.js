@@ -19,7 +19,7 @@ export function openSlow(store, control) {
   const facts = html('dl', { class: 'facts' });
   const guard = html('p', { 'data-f': 'guard' });
   const aid = html('p', { class: 'sub' });
-  const message = html('p', { class: 'bad', role: 'status', 'data-f': 'says' });
+  const message = html('p', { class: 'bad', role: 'status', 'data-f': 'message' });
   const keys = html('div', { class: 'keys' });
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-slow', 'aria-labelledby': 'slow-title', 'aria-describedby': 'slow-words' },
     html('div', { class: 'bd' }, html('h2', { id: 'slow-title' }, mark, title), html('div', { id: 'slow-words' }, text, guard, aid)), facts, html('div', { class: 'bd' }, message), keys,

@@ -23,7 +23,7 @@ export class SlowSlides {
     this.redraw = draw;
     this.slides = [.../** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('.slide[data-f="slow"]'))].map((slide) => {
       const sheet = slide.closest('dialog');
-      const message = sheet && field(sheet, 'slow-says');
+      const message = sheet && field(sheet, 'slow-message');
       /** Shows a sentence where it is readable: an alarm's sheet covers the notices. @type {Explain} */
       const explain = (sentence, title) => {
         if (!message || !sheet?.open) return say(sentence, title);

@@ -39,7 +39,7 @@ def driving(
         pytest.param(driving(5.0, 3.4), False, FAULT, id="below it"),
         pytest.param(driving(5.0, 0.0), False, FAULT, id="ordered to stop"),
         pytest.param(driving(1.5, -4.0), False, OK, id="an order to reverse is one to stop"),
-        pytest.param(driving(1.6, -4.0), False, FAULT, id="and is not obeyed"),
+        pytest.param(driving(1.6, -4.0), False, FAULT, id="and is not followed"),
         pytest.param(driving(-5.0, 0.0), False, OK, id="reversing is not judged"),
         pytest.param(driving(5.0, 0.0, -0.3), False, OK, id="slows enough"),
         pytest.param(driving(5.0, 0.0, -0.29), False, FAULT, id="slows too little"),

@@ -89,4 +89,4 @@ def test_a_reload_and_a_tap_raise_nothing_and_15_s_of_silence_do() -> None:
     assert raised(monitor, ALONE, 14.5, 18.5) == []
     assert raised(monitor, ALONE, 1.0, 33.0) == ["raised"]
     assert raised(monitor, AUDIBLE, 3.0, 34.0) == ["cleared"]
-    assert monitor.alarms["reach"].state == "RTN_UNACKED"  # whoever comes back must know
+    assert monitor.alarms["reach"].state == "RTN_UNACKED"  # who comes back must know

@@ -157,7 +157,7 @@ def test_a_drive_of_several_parts_is_one_report(parts: Path) -> None:
         *("in 2 parts", "Parts of the drive", "Part 1, s1", "Part 2, s1_p2", "1.80 km 3:00 min"),
         "22:15:20 Not recorded the car was 300 m away after it; not counted as driven 30.0 s",
         "in 1 gap, and 30.0 s not recorded",
-        *("in the second part", "told later", "2.22 per autonomous km"),
+        *("in the second part", "described later", "2.22 per autonomous km"),
     ):
         assert expected in plain, expected
     assert plain.count("Intact, head ") == 2

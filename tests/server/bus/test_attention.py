@@ -176,7 +176,7 @@ async def test_what_happened_to_items_is_there_from_all_agents() -> None:
         await north.request("ocelot", {"kind": "release_item", **ANN})
         await until(lambda: logged()[1:] == [("ocelot", "Ann gave it back: unassigned.")])
         margay = await needing(clock, "margay")
-        await margay.obeyed(BEN, "take_item")
+        await margay.accepted(BEN, "take_item")
         async with offering(margay.bus, address, "run-2", clock):
             await until(lambda: logged()[2:] == [("margay", "Assigned to Ben.")])
             await south.request("margay", {"kind": "release_item", **BEN})

@@ -1,4 +1,4 @@
-"""What only a broker can do wrong: bytes that come late, an end on either side, and whoever else is on it."""
+"""What only a broker can do wrong: bytes that come late, an end on either side, and other clients on it."""
 
 from __future__ import annotations
 

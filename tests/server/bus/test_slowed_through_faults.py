@@ -39,7 +39,7 @@ SLOWS_WITHIN_MS: Mapping[When, float] = {"before": 1000, "meanwhile": 3000, "nev
 DRIVES_MPS = 3.0
 RISE_MPS = 0.3  # of a car that is being slowed, by its own noise
 PATIENCE_S = 30.0
-# With no order in force the guard alone slows the car; what is pressed while nobody can hear it is never obeyed late.
+# With no order in force the guard alone slows the car; what is pressed while nothing receives it is not executed late.
 ORDERED: Mapping[str, When] = {"agent": "never", "frozen agent": "meanwhile"}
 
 

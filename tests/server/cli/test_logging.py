@@ -1,4 +1,4 @@
-"""One event is one line, whoever wrote the text in it."""
+"""One event is one line, of whatever origin the text in it is."""
 
 from __future__ import annotations
 

@@ -166,14 +166,14 @@ def drive(tmp_path: Path) -> Path:
 
 
 async def test_topics_can_be_renamed(drive: Path) -> None:
-    async with replaying(drive, "--port", "0", "--wait", "--remap", "/n:=/count", "--remap", "text:=said") as replay:
+    async with replaying(drive, "--port", "0", "--wait", "--remap", "/n:=/count", "--remap", "text:=note") as replay:
         async with probing(await replay.port()) as probe:
             await probe.subscribe("/count")
-            await probe.subscribe("/said")
+            await probe.subscribe("/note")
             messages = await hear_all(probe)
         code, out, _ = await replay.end()
     assert code == 0
-    assert {message["topic"] for message in messages} == {"/count", "/said"}
+    assert {message["topic"] for message in messages} == {"/count", "/note"}
     assert len(messages) == 51
     assert "/count (was /n)" in out
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from server.judge.frame_words import is_earth_fixed
+from server.judge.frame_names import is_earth_fixed
 from server.judge.sources.candidates import to_compare
 from server.judge.sources.choice import Choice, choose
 from server.judge.sources.evidence import Evidence

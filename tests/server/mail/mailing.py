@@ -40,11 +40,11 @@ class Shelf:
         return next((drive for drive in self.drives if recording in drive), [recording])
 
     async def export(
-        self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None], *, asked: Path
+        self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None], *, required: Path
     ) -> Made:
         if format == "bag":
             raise ValueError("its messages have no definition")
-        assert asked in paths
+        assert required in paths
         path = paths[0]
         self.exported.append([one.stem for one in paths])
         made = into / f"{path.stem}.{'zip' if format == 'csv' else format}"

@@ -346,7 +346,7 @@ async def test_what_is_made_can_be_cancelled(tmp_path: Path, shelf: Shelf, post:
 
     class Slow(Shelf):
         async def export(
-            self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None], *, asked: Path
+            self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None], *, required: Path
         ) -> Made:
             progress(0.5)
             begun.set()

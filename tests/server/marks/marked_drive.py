@@ -47,8 +47,8 @@ class Marked:
         assert answer.status_code == 200, answer.text
         return answer.json()
 
-    async def mark(self, mark: str, **said: Any) -> None:
-        answer = await self.client.post("/api/mark", json={"mark": mark, **said})
+    async def mark(self, mark: str, **fields: Any) -> None:
+        answer = await self.client.post("/api/mark", json={"mark": mark, **fields})
         assert answer.status_code == 200, answer.text
 
     async def send(self, mark: str, kind: str, content: bytes, headers: dict[str, str]) -> None:

@@ -29,10 +29,10 @@ class Writer:
         self.status = Status()
         self.marks: list[tuple[float, float]] = []  # each row: its time, and that of the moment, from BEGIN_MS on [s]
 
-    def own(self, channel: str, said: dict[str, Any], at_ns: int) -> None:
+    def own(self, channel: str, mark: dict[str, Any], at_ns: int) -> None:
         if channel == "marks":
             self.marks.append(
-                (round(at_ns / 1e9 - BEGIN_MS / 1000, 1), round((said["marked_ms"] - BEGIN_MS) / 1000, 1))
+                (round(at_ns / 1e9 - BEGIN_MS / 1000, 1), round((mark["marked_ms"] - BEGIN_MS) / 1000, 1))
             )
 
     def __getattr__(self, name: str) -> Any:
@@ -75,9 +75,9 @@ class World:
     def set_clock(self, by_ms: int) -> None:
         self.ahead_ms += by_ms
 
-    def deliver(self, mark: str, at_ms: float, *, age_ms: float | None = None, **said: Any) -> None:
+    def deliver(self, mark: str, at_ms: float, *, age_ms: float | None = None, **fields: Any) -> None:
         self.marks.execute(
-            PlaceMark(kind="mark", mark=mark, at_ms=at_ms, age_ms=age_ms, **said), by="Ana", source="page"
+            PlaceMark(kind="mark", mark=mark, at_ms=at_ms, age_ms=age_ms, **fields), by="Ana", source="page"
         )
 
 

@@ -31,7 +31,7 @@ async def say(client: httpx.AsyncClient, id: str, words: str) -> bool:
 
 
 def described(folder: Path, id: str) -> list[tuple[str, int]]:
-    """What each complete recording with this intervention says of it, and how often it is beside the file."""
+    """The descriptions of this intervention in each complete recording, and how often it is beside the file."""
     found = []
     for path in folder.iterdir():
         if path.name.endswith(FINISHED):

@@ -41,7 +41,7 @@ TAKEN = next(one for one in STORY if one[2]["change"] == "intervention")
 BEFORE: Sequence[Any] = [one for one in STORY if one[2]["change"] != "intervention_described"]
 
 
-def said(n: int, what: str, at_s: float = 500.0, **more: Any) -> dict[str, Any]:
+def entry(n: int, what: str, at_s: float = 500.0, **more: Any) -> dict[str, Any]:
     at_ms = BEGIN_MS + round(at_s * 1000)
     fields = {"n": n, "at_ms": at_ms, "change": "intervention_described", "alarm": None, "by": "M. R. (Tablet)"}
     return {**fields, "intervention": "i1", "what": what, "category": "object late", **more}
@@ -54,9 +54,9 @@ def beside(path: Path) -> list[str]:
 def test_the_newest_is_kept_and_only_what_the_recording_does_not_say(tmp_path: Path) -> None:
     path = recorded(tmp_path, [*BEFORE, logged(90, "intervention_described", intervention="i1", what="first")])
     annotation_store.write(path, Annotations(title="Lap"))
-    entries = [said(1, "first", category=None, by=None)]
-    assert not settle_described(path, newest(entries)), "the recording says it itself"
-    entries += [said(2, "second"), said(3, EVIL), said(4, "of another recording", intervention="i9")]
+    entries = [entry(1, "first", category=None, by=None)]
+    assert not settle_described(path, newest(entries)), "the recording has it itself"
+    entries += [entry(2, "second"), entry(3, EVIL), entry(4, "of another recording", intervention="i9")]
     assert settle_described(path, newest(entries))
     assert not settle_described(path, newest(entries))
     assert beside(path) == [EVIL]
@@ -68,7 +68,7 @@ def test_the_newest_is_kept_and_only_what_the_recording_does_not_say(tmp_path: P
 
 def test_what_is_made_of_the_recording_has_it(tmp_path: Path) -> None:
     path = recorded(tmp_path, BEFORE)
-    settle_described(path, newest([said(1, "A box.", initiated_by="operator")]))
+    settle_described(path, newest([entry(1, "A box.", initiated_by="operator")]))
     with open_recording([path]) as recording:
         write_report_json(recording, tmp_path / "r.json")
         write_report_csv(recording, tmp_path / "r.csv")
@@ -84,7 +84,7 @@ def test_what_is_made_of_the_recording_has_it(tmp_path: Path) -> None:
 
 def test_tables_bags_and_clips_have_it_too(tmp_path: Path) -> None:
     path = recorded(tmp_path, BEFORE)
-    settle_described(path, newest([said(1, EVIL)]))
+    settle_described(path, newest([entry(1, EVIL)]))
     moment_ns = TAKEN[0]
     minute = Window(at_ns=moment_ns, before_s=1.0, after_s=1.0)
     other = Window(at_ns=BEGIN_S * NS, before_s=0.0, after_s=1.0)
@@ -138,7 +138,7 @@ async def test_a_server_that_was_killed_does_it_at_its_next_start(
     path = path.rename(folder / "car_20230101T000000Z.mcap")
     for day in range(LEFT_AT_START):  # later ones, which the start looks through anyway
         record(folder / f"car_2026102{day}T000000Z.mcap", seconds=1.0)
-    events = [{"n": 1, **TAKEN[2], "moment_ms": BEGIN_MS + 80_000}, said(2, "A box.")]
+    events = [{"n": 1, **TAKEN[2], "moment_ms": BEGIN_MS + 80_000}, entry(2, "A box.")]
     changed: list[Path] = []
 
     def killed(*args: Any, **more: Any) -> None:
@@ -151,7 +151,7 @@ async def test_a_server_that_was_killed_does_it_at_its_next_start(
     for _ in range(2):
         await kept(tmp_path, events, changed)
     assert (beside(path), changed) == (["A box."], [path])
-    await kept(tmp_path, events, changed, then=said(3, "Two boxes."))
+    await kept(tmp_path, events, changed, then=entry(3, "Two boxes."))
     assert beside(path) == ["Two boxes."]
 
 
@@ -167,7 +167,7 @@ async def test_the_logbook_counts_what_came_later_at_once(tmp_path: Path) -> Non
             await one.settled()
         (drive,) = one.drives(Which())
         assert (drive["interventions"], drive["undescribed"], drive["marks"]) == (1, 1, 2)
-        settle_described(path, newest([said(1, "A box.")]))
+        settle_described(path, newest([entry(1, "A box.")]))
         annotation_store.write_marks(path, [], ["m1"])
         one.reread_annotations(path)
         (drive,) = one.drives(Which())

@@ -58,7 +58,7 @@ def event(n: int, change: str, **more: Any) -> dict[str, Any]:
     return {"n": n, "at_ms": moment(PARTS, 3_600.0), "change": change, "alarm": None, "by": None, **more}
 
 
-def said(n: int, id: str) -> dict[str, Any]:
+def entry(n: int, id: str) -> dict[str, Any]:
     return event(n, "intervention_described", intervention=id, what=f"Words on {id}.", category=None)
 
 
@@ -90,7 +90,13 @@ def words(path: Path) -> list[str]:
 async def test_each_goes_to_the_part_of_its_moment(
     part: Parts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    events: list[dict[str, Any]] = [said(1, "i-5"), said(2, "i-7"), said(3, "i-9"), said(4, "i-0"), said(5, "i-40")]
+    events: list[dict[str, Any]] = [
+        entry(1, "i-5"),
+        entry(2, "i-7"),
+        entry(3, "i-9"),
+        entry(4, "i-0"),
+        entry(5, "i-40"),
+    ]
     read: list[Path] = []
     reads = described.late_of
 
@@ -120,7 +126,7 @@ async def test_each_goes_to_the_part_of_its_moment(
 
 
 async def test_a_restart_finds_it_too(part: Parts, tmp_path: Path) -> None:
-    one = keeper(tmp_path, [event(1, "intervention", intervention="i-5", moment_ms=moment(5)), said(2, "i-5")])
+    one = keeper(tmp_path, [event(1, "intervention", intervention="i-5", moment_ms=moment(5)), entry(2, "i-5")])
     one.start()
     await one.settled()
     await one.stop()
@@ -138,7 +144,7 @@ async def test_an_intervention_in_the_part_being_written_is_not_looked_for(
         return False
 
     monkeypatch.setattr(described, "holds", holds)
-    one = keeper(tmp_path, [said(1, "i-45")])
+    one = keeper(tmp_path, [entry(1, "i-45")])
     one.start()
     one.late("car", moment(PARTS), "i-45")
     await one.settled()
@@ -162,7 +168,7 @@ async def test_what_a_full_disk_refused_is_tried_again(
             raise OSError(28, "No space left on device")
         writes(*args, **more)
 
-    one = keeper(tmp_path, [said(1, "i-5")])
+    one = keeper(tmp_path, [entry(1, "i-5")])
     one.start()
     await one.settled()
     monkeypatch.setattr(durable_file, "write", write)
@@ -193,7 +199,7 @@ async def test_a_folder_that_could_not_be_looked_through_is_tried_again(
     monkeypatch.setattr(described, "holds", look)
     monkeypatch.setattr(keeper_module, "TIDIES_S", 0.05)
     monkeypatch.setattr(keeper_module, "SETTLES_S", 0.0)
-    one = keeper(tmp_path, [said(1, "i-5")])
+    one = keeper(tmp_path, [entry(1, "i-5")])
     one.start()
     one.late("car", moment(5), "i-5")
     async with asyncio.timeout(20):

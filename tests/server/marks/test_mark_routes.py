@@ -65,7 +65,7 @@ async def test_a_mark_is_placed_changed_and_taken_back_once_each(config: Config)
 
 
 @pytest.mark.parametrize(
-    ("off_ms", "kept", "said"),
+    ("off_ms", "kept", "note"),
     [
         (3_600_000, False, "60 min ahead of the server's clock: the time it arrived counts."),
         (-3_600_000, True, "It arrived 60 min after its moment."),
@@ -74,7 +74,7 @@ async def test_a_mark_is_placed_changed_and_taken_back_once_each(config: Config)
     ],
     ids=["an hour ahead", "an hour late", "40 days old", "just now"],
 )
-async def test_a_time_that_cannot_be_is_corrected_and_said(config: Config, off_ms: int, kept: bool, said: str) -> None:
+async def test_a_time_that_cannot_be_is_corrected_and_said(config: Config, off_ms: int, kept: bool, note: str) -> None:
     async with serving(config) as base, http_client(base_url=base) as client:
         began_ms = now_ms()
         at_ms = began_ms + off_ms
@@ -83,7 +83,7 @@ async def test_a_time_that_cannot_be_is_corrected_and_said(config: Config, off_m
         (row,) = await marks(client)
         assert abs(row["marked_ms"] - at_ms) <= 1 if kept else began_ms <= row["marked_ms"] <= now_ms()
         (event,) = await mark_events(client)
-        assert event["text"].endswith(said or "Mark.")
+        assert event["text"].endswith(note or "Mark.")
 
 
 async def test_fifty_marks_in_a_moment_are_all_kept(config: Config) -> None:
@@ -110,10 +110,10 @@ async def test_a_voice_note_and_a_photo_are_kept_and_given_back(config: Config) 
             added = await client.post("/api/marks/m/photo", content=PHOTO, headers=JPEG)
             assert (added.status_code, added.json()["photo"]) == (200, True), added.text
         assert [event["change"] for event in await mark_events(client)] == ["mark_changed", "mark_changed", "mark"]
-        heard, seen = await client.get("/api/marks/m/voice"), await client.get("/api/marks/m/photo")
-        assert (heard.content, heard.headers["content-type"]) == (VOICE, "audio/webm")
+        voice, seen = await client.get("/api/marks/m/voice"), await client.get("/api/marks/m/photo")
+        assert (voice.content, voice.headers["content-type"]) == (VOICE, "audio/webm")
         assert (seen.content, seen.headers["content-type"]) == (PHOTO, "image/jpeg")
-        for answer in (heard, seen):
+        for answer in (voice, seen):
             assert answer.headers["x-content-type-options"] == "nosniff"
             assert "sandbox" in answer.headers["content-security-policy"]
             assert answer.headers["content-disposition"].startswith("inline; ")
@@ -121,7 +121,7 @@ async def test_a_voice_note_and_a_photo_are_kept_and_given_back(config: Config) 
 
 
 @pytest.mark.parametrize(
-    ("kind", "content", "type", "status", "said"),
+    ("kind", "content", "type", "status", "note"),
     [
         ("photo", bytes(50 << 20), "image/jpeg", 413, "At most 8 MB are taken."),
         ("voice", bytes(2 << 20), "audio/webm", 413, "A voice note of a mark has at most 1 MB: this one is larger."),
@@ -133,11 +133,11 @@ async def test_a_voice_note_and_a_photo_are_kept_and_given_back(config: Config) 
     ids=["photo of 50 MB", "voice of 2 MB", "svg", "html as png", "ogg as webm", "empty"],
 )
 async def test_what_is_no_voice_note_or_photo_is_refused(
-    config: Config, kind: str, content: bytes, type: str, status: int, said: str
+    config: Config, kind: str, content: bytes, type: str, status: int, note: str
 ) -> None:
     async with serving(config) as base, http_client(base_url=base) as client:
         await client.post("/api/mark", json={"mark": "m"})
         answer = await client.post(f"/api/marks/m/{kind}", content=content, headers={"content-type": type})
         assert answer.status_code == status
-        assert said in answer.json()["detail"]
+        assert note in answer.json()["detail"]
         assert not (await marks(client))[0][kind]

@@ -29,10 +29,10 @@ class World:
         event = {"at_ms": self.now_ms, "alarm": None, "change": change, "text": text, "by": by, **more}
         self.journal.append("car", [event])
 
-    def mark(self, said: dict[str, Any], marked_ms: int, at_ms: int) -> bool:
+    def mark(self, event: dict[str, Any], marked_ms: int, at_ms: int) -> bool:
         if marked_ms < self.since_ms:
             return False
-        self.recorded.append((said, at_ms))
+        self.recorded.append((event, at_ms))
         return True
 
     def past_events(self, vehicle: str, **filters: Any) -> list[dict[str, Any]]:
@@ -45,8 +45,8 @@ class World:
         return marks
 
 
-def placed(marks: Marks, mark: str, **said: Any) -> None:
-    marks.execute(PlaceMark(kind="mark", mark=mark, **said), by="Ana", source="page")
+def placed(marks: Marks, mark: str, **fields: Any) -> None:
+    marks.execute(PlaceMark(kind="mark", mark=mark, **fields), by="Ana", source="page")
 
 
 def ids(marks: Marks) -> list[str]:
@@ -121,7 +121,7 @@ def test_a_mark_is_recorded_at_its_moment_or_told_to_be_late() -> None:
     placed(marks, "in", at_ms=NOW_MS + 1000.0)
     placed(marks, "late", at_ms=NOW_MS - 1000.0)
     placed(marks, "in", words="more")
-    assert [(said["mark"], said["change"], at_ms) for said, at_ms in world.recorded] == [
+    assert [(event["mark"], event["change"], at_ms) for event, at_ms in world.recorded] == [
         ("in", "mark", NOW_MS + 1000),
         ("in", "mark_changed", NOW_MS + 10_000),
     ]

@@ -24,10 +24,10 @@ async def test_a_mark_with_its_photo_goes_through_the_node(tmp_path: Path, monke
         await read(one)
         room = one.room
 
-        async def heard() -> bool:
+        async def is_known() -> bool:
             return (await room.get("/api/marks", params={"vehicle": "ocelot"})).status_code == 200
 
-        await until(heard)
+        await until(is_known)
         start_ms = (await room.get(f"/agents/ocelot/api/recordings/{DRIVE}")).json()["started_ms"]
         placed = await room.post("/api/mark", params={"vehicle": "ocelot"}, json={"mark": "m", "words": "swerve"})
         assert placed.status_code == 200, placed.text

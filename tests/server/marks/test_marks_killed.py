@@ -33,7 +33,7 @@ PAUSE_S = 0.25  # a hundred rounds stay below the most marks of a drive, which g
 
 @dataclass
 class Answered:
-    """What the server said it has."""
+    """What the server acknowledged."""
 
     marks: set[str] = field(default_factory=set)
     voices: set[str] = field(default_factory=set)
@@ -149,9 +149,9 @@ async def check(base: str, answered: Answered, within_s: float) -> None:
             if twice := [mark for mark, count in in_recordings.items() if count != 1]:
                 return f"in more than one recording: {sorted(twice)}"
             for mark in sorted(answered.voices):
-                heard = await client.get(f"/api/marks/{mark}/voice")
-                if heard.status_code != 200 or heard.content != VOICE:
-                    return f"the voice of {mark} is answered with {heard.status_code}"
+                answer = await client.get(f"/api/marks/{mark}/voice")
+                if answer.status_code != 200 or answer.content != VOICE:
+                    return f"the voice of {mark} is answered with {answer.status_code}"
             return ""
 
         until_s = time.monotonic() + within_s

@@ -53,11 +53,11 @@ async def test_nothing_that_was_said_is_deleted_here_before_it_is_there(car: Car
         now.uploader.ask(ID, deletes=False)
         await now.stored()
         await now.until(lambda: len(s3.sent("catalogue")) == 2)
-        said: list[str] = []
+        written: list[str] = []
 
         def say(method: str, _: str) -> float:
-            if method == "PUT" and not said:  # while the deletion sends its row
-                said.append("said")
+            if method == "PUT" and not written:  # while the deletion sends its row
+                written.append(ID)
                 now.catalog.annotate(ID, weather="rain")
                 annotation_store.write_marks(path, rows, ["m-1"])
                 folder = annotation_store.media_beside(path)
@@ -68,7 +68,7 @@ async def test_nothing_that_was_said_is_deleted_here_before_it_is_there(car: Car
         s3.delay_s = say
         now.uploader.ask(ID, deletes=True)
         await now.until(lambda: not path.exists() and now.catalog.row(ID, is_trashed=True) is None)
-    assert said
+    assert written
     stored = orjson.loads(s3.keys()[f"catalogue/car/{ID}.json"])
     assert stored["weather"] == "rain"
     assert stored["stored_annotations"]["name"] == "annotations.json"

@@ -44,12 +44,12 @@ def zeros(kind: Kind, size: int) -> bytes:
     return b"".join([begin, *(pack(block) for _ in range(size >> 20)), end()])
 
 
-def bag(path: Path, kind: Kind, size: int, says: int | None = None) -> Path:
-    """A ROS 1 bag with one chunk of `size` zeros, which declares `says` bytes."""
+def bag(path: Path, kind: Kind, size: int, declared: int | None = None) -> Path:
+    """A ROS 1 bag with one chunk of `size` zeros, which declares `declared` bytes."""
     u4, u8 = struct.Struct("<I").pack, struct.Struct("<Q").pack
     at = struct.pack("<II", TIME_NS // 10**9, 0)
     packed = zeros(kind, size)
-    chunk = _header(op=b"\x05", compression=kind.encode(), size=u4(says or size)) + _sized(packed)
+    chunk = _header(op=b"\x05", compression=kind.encode(), size=u4(declared or size)) + _sized(packed)
     index = _header(op=b"\x04", ver=u4(1), conn=u4(0), count=u4(1)) + _sized(at + u4(0))
     named = _header(
         topic=b"/vel",
@@ -72,7 +72,7 @@ def mcap(
     path: Path,
     kind: Kind,
     size: int,
-    says: int | None = None,
+    declared: int | None = None,
     *,
     is_closed: bool = True,
     has_index: bool = True,
@@ -80,9 +80,9 @@ def mcap(
     chunk_at: int | None = None,
     messages: int = 1,
 ) -> Path:
-    """An MCAP file with one chunk of `size` zeros. Its index declares `says` bytes for the chunk, its place
+    """An MCAP file with one chunk of `size` zeros. Its index declares `declared` bytes for the chunk, its place
     `chunk_at`, and the number of `messages`."""
-    magic, packed, claimed = b"\x89MCAP0\r\n", zeros(kind, size), size if says is None else says
+    magic, packed, claimed = b"\x89MCAP0\r\n", zeros(kind, size), size if declared is None else declared
     times = struct.pack("<QQ", TIME_NS, TIME_NS + 10**9)
     chunk = _record(6, times + struct.pack("<QI", claimed, 0) + _text(kind) + struct.pack("<Q", len(packed)) + packed)
     written = magic + _record(1, _text(profile) + _text("by hand"))

@@ -1,7 +1,7 @@
-"""A bridge that sends what it is told to send, as a process of its own: `python -m tests.server.security.heavy_bridge`.
+"""A bridge that sends what its input names, as a process of its own: `python -m tests.server.security.heavy_bridge`.
 
 Prints its port, and to how many each message went. It publishes speed at 20 Hz on /catvehicle/vel, and a large message
-each time a line with a name of `MESSAGES` comes on its input, to whoever subscribed to its topic.
+each time a line with a name of `MESSAGES` comes on its input, to all subscribers of its topic.
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ class Bridge:
                         with self.lock:
                             self.subscribers.append((socket, operation["topic"]))
                     case "call_service":
-                        said = {"op": "service_response", "id": operation.get("id"), "service": operation["service"]}
+                        reply = {"op": "service_response", "id": operation.get("id"), "service": operation["service"]}
                         values = _values(operation["service"])
-                        self.send(socket, json.dumps(said | {"values": values, "result": values is not None}))
+                        self.send(socket, json.dumps(reply | {"values": values, "result": values is not None}))
         except ConnectionClosed:
             pass
 

@@ -40,7 +40,7 @@ class HeavyBridge:
         self.address = f"ws://127.0.0.1:{port}"
 
     async def send(self, name: str, topic: str) -> None:
-        """Sends it to whoever subscribed, once somebody has."""
+        """Sends it to the subscribers, once there is one."""
         while not await self._send(name, topic):
             await asyncio.sleep(0.1)
 

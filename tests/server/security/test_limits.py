@@ -73,7 +73,7 @@ def routes_with_bodies() -> list[tuple[str, str]]:
 
 
 async def test_no_route_takes_a_body_without_end() -> None:
-    """Told by its head, and found out while it comes."""
+    """Declared in its head, and found while it comes."""
 
     async def endless() -> AsyncIterator[bytes]:
         for _ in range(40):
@@ -240,9 +240,9 @@ async def test_orders_that_run_away_are_refused_in_words_and_the_page_lives() ->
     async with serving(Config(limits=limits)) as base, viewer(base) as one:
         await one.until(lambda: one.states)
         answers = [await one.ask(kind="retry") for _ in range(15)]
-        words = [str(answer["reason"]) for answer in answers]
-        assert sum(word.startswith("Too many commands at once") for word in words) in (4, 5)
-        assert not words[0].startswith("Too many")
+        reasons = [str(answer["reason"]) for answer in answers]
+        assert sum(reason.startswith("Too many commands at once") for reason in reasons) in (4, 5)
+        assert not reasons[0].startswith("Too many")
         await asyncio.sleep(0.5)
         assert not str((await one.ask(kind="retry"))["reason"]).startswith("Too many")
 

@@ -32,14 +32,14 @@ Make = Callable[[Path], Path]
 TOO_LARGE: dict[str, tuple[Make, str]] = {
     "bz2": (lambda to: packed.bag(to / "a.bag", "bz2", MB), r"would take more than \d+ MB, unpacked"),
     "lz4": (lambda to: packed.bag(to / "a.bag", "lz4", MB), r"would take more than \d+ MB, unpacked"),
-    "bz2 that lies": (lambda to: packed.bag(to / "a.bag", "bz2", MB, says=1000), "cannot be unpacked"),
-    "lz4 that lies": (lambda to: packed.bag(to / "a.bag", "lz4", MB, says=1000), "cannot be unpacked"),
+    "bz2 that lies": (lambda to: packed.bag(to / "a.bag", "bz2", MB, declared=1000), "cannot be unpacked"),
+    "lz4 that lies": (lambda to: packed.bag(to / "a.bag", "lz4", MB, declared=1000), "cannot be unpacked"),
     "mcap zstd": (lambda to: packed.mcap(to / "a.mcap", "zstd", MB), "larger, unpacked, than may be read"),
     "mcap lz4": (lambda to: packed.mcap(to / "a.mcap", "lz4", MB), "larger, unpacked, than may be read"),
-    "mcap zstd that lies": (lambda to: packed.mcap(to / "a.mcap", "zstd", MB, says=1000), "none of its 1 parts"),
-    "mcap lz4 that lies": (lambda to: packed.mcap(to / "a.mcap", "lz4", MB, says=1000), "none of its 1 parts"),
-    "mcap that says too much": (
-        lambda to: packed.mcap(to / "a.mcap", "zstd", MB, says=2 * MB),
+    "mcap zstd that lies": (lambda to: packed.mcap(to / "a.mcap", "zstd", MB, declared=1000), "none of its 1 parts"),
+    "mcap lz4 that lies": (lambda to: packed.mcap(to / "a.mcap", "lz4", MB, declared=1000), "none of its 1 parts"),
+    "mcap that declares too much": (
+        lambda to: packed.mcap(to / "a.mcap", "zstd", MB, declared=2 * MB),
         "larger, unpacked, than may be read",
     ),
     "mcap never closed": (
@@ -73,9 +73,9 @@ def test_a_part_beyond_the_bound_is_refused_and_said(
     make, expected = TOO_LARGE[name]
     path = make(tmp_path)
     assert main(["check", str(path)]) == 2
-    said = "".join(capsys.readouterr())
-    assert re.search(expected, said), said
-    assert "Traceback" not in said
+    output = "".join(capsys.readouterr())
+    assert re.search(expected, output), output
+    assert "Traceback" not in output
     found = survey(path)
     assert re.search(expected, str(found.get("problem"))), found
 
@@ -163,8 +163,8 @@ def test_metadata_beyond_the_bounds_are_refused(
     metadata = metadata_of(tmp_path)
     metadata.write_text(change(metadata.read_text()))
     assert main(["check", str(metadata.parent)]) == 2
-    said = "".join(capsys.readouterr())
-    assert re.search(rf"metadata\.yaml cannot be read: .*({expected})", said), said
+    output = "".join(capsys.readouterr())
+    assert re.search(rf"metadata\.yaml cannot be read: .*({expected})", output), output
 
 
 def test_a_bag_of_files_packed_one_by_one_does_not_fill_the_disk(
@@ -211,8 +211,8 @@ def test_a_message_beyond_the_bound_is_refused(tmp_path: Path, capsys: pytest.Ca
     rows.commit()
     rows.close()
     assert main(["check", str(folder)]) == 2
-    said = "".join(capsys.readouterr())
-    assert re.search(r"cannot be read: of a part of it, it would take more than \d+ MB, unpacked", said), said
+    output = "".join(capsys.readouterr())
+    assert re.search(r"cannot be read: of a part of it, it would take more than \d+ MB, unpacked", output), output
 
 
 def test_quality_of_service_beyond_the_bounds_is_not_known() -> None:

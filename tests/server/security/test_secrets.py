@@ -33,7 +33,7 @@ class Life:
     """A server in the field, as a process."""
 
     def __init__(self, folder: Path) -> None:
-        self.data, self.out = folder / "data", folder / "said"
+        self.data, self.out = folder / "data", folder / "output"
         self._file = self.out.open("w")
         self._process = subprocess.Popen(
             [sys.executable, "-m", "server", "serve", "--host", "0.0.0.0", "--tls", "off", "--port", "0",
@@ -69,9 +69,9 @@ async def test_no_secret_leaves_its_place(tmp_path: Path) -> None:
         life.end()
         await bridge.stop()
     assert len(secrets) >= 7
-    said = life.out.read_text()
+    output = life.out.read_text()
     for name, secret in secrets.items():
-        assert not _stands_in(secret, said), f"{name} is printed"
+        assert not _stands_in(secret, output), f"{name} is printed"
         for path, text in answers.items():
             assert not _stands_in(secret, text), f"{name} is answered by {path}"
     _look_through(life.data, secrets)

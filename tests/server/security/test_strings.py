@@ -82,11 +82,11 @@ def _filled(path: str, text: str) -> str:
     return re.sub(r"\{[^}]*\}", lambda _: text, path)
 
 
-async def _tried(base: str, asked: list[tuple[str, str]]) -> AsyncIterator[tuple[str, str, int, bytes, str]]:
+async def _tried(base: str, requests: list[tuple[str, str]]) -> AsyncIterator[tuple[str, str, int, bytes, str]]:
     """Each path as it stands on the wire: nothing makes it plainer. Status, body and where the answer leads."""
     host, _, port = base.removeprefix("http://").partition(":")
     reader, writer = await asyncio.open_connection(host, int(port))
-    for method, path in asked:
+    for method, path in requests:
         body = "{}" if method in ("POST", "PUT", "PATCH") else ""
         head = f"{method} {path} HTTP/1.1\r\nHost: {host}:{port}\r\nContent-Type: application/json\r\n"
         writer.write(f"{head}Content-Length: {len(body)}\r\n\r\n{body}".encode())
@@ -100,15 +100,15 @@ async def _tried(base: str, asked: list[tuple[str, str]]) -> AsyncIterator[tuple
 
 async def test_no_path_leads_out(data: Path) -> None:
     async with serving(Config(data=data)) as base:
-        asked = []
+        requests = []
         for method, path in routes_with_names():
             for text in TRAVERSAL:
-                asked.append((method, _filled(path, quote(text, safe=""))))
+                requests.append((method, _filled(path, quote(text, safe=""))))
                 raw = _filled(path, text)
                 if raw.isascii() and raw.isprintable() and not set(" ?#") & set(raw):
-                    asked.append((method, raw))
-        assert len(asked) > 2000
-        async for method, path, status, body, place in _tried(base, asked):
+                    requests.append((method, raw))
+        assert len(requests) > 2000
+        async for method, path, status, body, place in _tried(base, requests):
             assert 300 <= status < 500, (method, path, status, body[:200])
             assert not any(treasure.encode() in body for treasure in TREASURES), (method, path)
             assert not place or place.startswith(f"{base}/"), (method, path, place)
@@ -148,14 +148,14 @@ def test_no_such_address_is_dialled(typed: str) -> None:
     try:
         found = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM, flags=socket.AI_NUMERICHOST)
     except socket.gaierror:
-        pytest.fail(f"{address.host} would be asked of a name server")
+        pytest.fail(f"{address.host} would be looked up at a name server")
     for entry in found:
         with pytest.raises(BadAddress, match="never dialled"):
             refuse_forbidden(str(entry[4][0]))
 
 
 async def test_a_name_that_changes_its_mind_is_looked_at_when_it_is_dialled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its address is proper when asked first, forbidden later. What was looked at is what is dialled, as a number."""
+    """Its address is proper when first looked up, forbidden later. What was checked is what is dialled, as a number."""
     loop = asyncio.get_running_loop()
     dialled: list[Any] = []
     turns = iter(["10.255.255.1"] + ["224.0.0.1"] * 1000)
@@ -192,7 +192,7 @@ async def test_a_redirect_is_not_followed() -> None:
     async def redirect(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with contextlib.suppress(asyncio.IncompleteReadError):
             await reader.readuntil(b"\r\n\r\n")
-        seen.append("asked")
+        seen.append("requested")
         writer.write(f"HTTP/1.1 302 Found\r\nLocation: ws://127.0.0.1:{port}/\r\nContent-Length: 0\r\n\r\n".encode())
         await writer.drain()
         writer.close()
@@ -201,10 +201,10 @@ async def test_a_redirect_is_not_followed() -> None:
         async with viewer(base) as page:
             await page.ask(kind="connect", address=f"127.0.0.1:{first}")
             await page.state(
-                lambda s: s["link"]["attempts"] >= 2 if "attempts" in s["link"] else seen.count("asked") >= 2
+                lambda s: s["link"]["attempts"] >= 2 if "attempts" in s["link"] else seen.count("requested") >= 2
             )
     assert "followed" not in seen
-    assert "asked" in seen
+    assert "requested" in seen
 
 
 async def test_with_an_allow_list_nothing_else_is_dialled() -> None:

@@ -1,4 +1,4 @@
-"""Text from car, phone, page or file is clean in the alarm log; a page's message says only what a page may."""
+"""Text from car, phone, page or file is clean in the alarm log; a page's message has only what a page may send."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ class Attended:
         assert answer["ok"] is False, answer
         return str(answer["reason"])
 
-    async def obeyed(self, who: Mapping[str, Any], kind: str, **more: Any) -> None:
+    async def accepted(self, who: Mapping[str, Any], kind: str, **more: Any) -> None:
         answer = await self.ask(who, kind, **more)
         assert answer["ok"] is True, answer
 

@@ -54,7 +54,7 @@ class CarSource:
             self._marks.open(self._now())
         self._listener.link_opened()
 
-    def stop(self, *, has_last_word: bool = False) -> None:
+    def stop(self, *, is_flushed: bool = False) -> None:
         self.is_open = False
 
     def retry_now(self) -> None:

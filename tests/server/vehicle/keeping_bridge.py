@@ -122,7 +122,7 @@ class KeepingBridge:
     def start(self) -> None:
         asyncio.get_running_loop().call_soon(self.open)
 
-    def stop(self, *, has_last_word: bool = False) -> None:
+    def stop(self, *, is_flushed: bool = False) -> None:
         self.is_open = False
 
     def retry_now(self) -> None:

@@ -49,7 +49,7 @@ async def test_an_item_begins_with_an_alarm(priority: Priority, escalates_ms: in
 async def test_it_stays_while_an_alarm_is_active_or_unacknowledged() -> None:
     car = needing(Priority.WARNING)
     alarm = car.summary["worst"]
-    await car.obeyed(ANN, "acknowledge", alarm=alarm["id"], occurrence=alarm["occurrence"])
+    await car.accepted(ANN, "acknowledge", alarm=alarm["id"], occurrence=alarm["occurrence"])
     assert car.item is not None, "it is active"
     car.faults = set()
     car.tick(1.0)
@@ -63,25 +63,25 @@ async def test_two_people_take_hand_over_and_release_and_the_log_names_them() ->
     car = needing()
     for page in (ANN, BEN):
         car.report(page)
-    await car.obeyed(ANN, "take_item")
+    await car.accepted(ANN, "take_item")
     assert car.item is not None
     assert car.item["assigned"] == {"name": "Ann", "page": "page-a", "since_ms": WALL_MS + 1000}
     assert car.item["escalates_ms"] is None
     assert await car.refused(BEN, "take_item") == "This car is assigned to Ann: take it over, or ask."
     assert car.summary["people"] == [{"page": "page-a", "name": "Ann"}, {"page": "page-b", "name": "Ben"}]
-    await car.obeyed(ANN, "offer_item", to="page-b", vehicle="ocelot")
+    await car.accepted(ANN, "offer_item", to="page-b", vehicle="ocelot")
     assert car.item["assigned"]["name"] == "Ann"
     assert car.item["offered"] == {"by": "Ann", "name": "Ben", "page": "page-b", "since_ms": WALL_MS + 1000}
     assert await car.refused(ANN, "answer_item", accept=True) == "You have no offer to take over."
-    await car.obeyed(BEN, "answer_item", accept=True)
+    await car.accepted(BEN, "answer_item", accept=True)
     assert (car.item["assigned"]["name"], car.item["offered"]) == ("Ben", None)
     assert await car.refused(ANN, "release_item") == "This car is assigned to Ben."
-    await car.obeyed(ANN, "take_item", over=True)
-    await car.obeyed(ANN, "offer_item", to="page-b")
-    await car.obeyed(BEN, "answer_item", accept=False)
-    await car.obeyed(ANN, "offer_item", to="page-b")
-    await car.obeyed(ANN, "withdraw_item")
-    await car.obeyed(ANN, "release_item")
+    await car.accepted(ANN, "take_item", over=True)
+    await car.accepted(ANN, "offer_item", to="page-b")
+    await car.accepted(BEN, "answer_item", accept=False)
+    await car.accepted(ANN, "offer_item", to="page-b")
+    await car.accepted(ANN, "withdraw_item")
+    await car.accepted(ANN, "release_item")
     assert car.item["assigned"] is None
     logged = [(event["act"], event["by"], event["holder"], event["before"]) for event in car.log]
     assert logged == [
@@ -108,13 +108,13 @@ async def test_nobody_takes_it_and_it_is_escalated_once() -> None:
     assert car.item is not None
     assert car.item["escalates_ms"] is None
     assert car.item["escalated_ms"] == pytest.approx(car.item["since_ms"] + 30_000, abs=60)
-    await car.obeyed(BEN, "take_item")
+    await car.accepted(BEN, "take_item")
     assert car.item["escalated_ms"] is None
 
 
 async def test_a_page_that_falls_silent_loses_it_after_10_s() -> None:
     car = needing()
-    await car.obeyed(ANN, "take_item")
+    await car.accepted(ANN, "take_item")
     car.tick(100.0, reporting=(ANN,))
     assert [event["act"] for event in car.log] == ["taken"]
     car.tick(9.0, reporting=(BEN,))
@@ -131,26 +131,26 @@ async def test_a_page_that_falls_silent_loses_it_after_10_s() -> None:
 async def test_a_page_that_leaves_has_10_s_to_come_back() -> None:
     """As over a reload; that of the car itself as well."""
     car = needing()
-    await car.obeyed(ANN, "present", visible=True, sound="ready", awake="ready")
-    await car.obeyed(ANN, "take_item")
-    await car.obeyed(ANN, "present", visible=False, sound="asks", awake="asks", leaves=True)
+    await car.accepted(ANN, "present", visible=True, sound="ready", awake="ready")
+    await car.accepted(ANN, "take_item")
+    await car.accepted(ANN, "present", visible=False, sound="asks", awake="asks", leaves=True)
     car.tick(9.0)
-    await car.obeyed(ANN, "present", visible=True, sound="ready", awake="ready")
+    await car.accepted(ANN, "present", visible=True, sound="ready", awake="ready")
     car.tick(9.0)
     assert [event["act"] for event in car.log] == ["taken"]
-    await car.obeyed(ANN, "present", visible=False, sound="asks", awake="asks", leaves=True)
+    await car.accepted(ANN, "present", visible=False, sound="asks", awake="asks", leaves=True)
     car.tick(11.0)
     assert [event["act"] for event in car.log] == ["taken", "unassigned"]
 
 
 async def test_the_assignment_ends_with_the_item() -> None:
     car = needing()
-    await car.obeyed(ANN, "take_item")
+    await car.accepted(ANN, "take_item")
     alarm = car.summary["worst"]
     car.faults = set()
     car.tick(1.0)
     if car.item is not None:
-        await car.obeyed(ANN, "acknowledge", alarm=alarm["id"], occurrence=alarm["occurrence"])
+        await car.accepted(ANN, "acknowledge", alarm=alarm["id"], occurrence=alarm["occurrence"])
     assert car.item is None
     assert await car.refused(ANN, "release_item") == "This car needs nobody now."
     car.faults = {Priority.CRITICAL}
@@ -161,10 +161,10 @@ async def test_the_assignment_ends_with_the_item() -> None:
 
 async def test_a_program_has_it_while_it_takes_it_again() -> None:
     car = needing()
-    await car.obeyed(PROGRAM, "take_item")
+    await car.accepted(PROGRAM, "take_item")
     for _ in range(4):
         car.tick(8.0)
-        await car.obeyed(PROGRAM, "take_item")
+        await car.accepted(PROGRAM, "take_item")
     assert car.item is not None
     assert car.item["assigned"]["name"] == "dispatch"
     assert [event["act"] for event in car.log] == ["taken"]
@@ -176,12 +176,12 @@ async def test_a_program_has_it_while_it_takes_it_again() -> None:
 async def test_only_a_page_that_is_seen_gets_an_offer() -> None:
     car = needing()
     car.report(ANN)
-    await car.obeyed(ANN, "take_item")
+    await car.accepted(ANN, "take_item")
     assert await car.refused(ANN, "offer_item", to="page-b") == "That page is closed or not visible."
     car.report({**BEN, "visible": False})
     assert await car.refused(ANN, "offer_item", to="page-b") == "That page is closed or not visible."
     car.report(BEN)
-    await car.obeyed(ANN, "offer_item", to="page-b")
+    await car.accepted(ANN, "offer_item", to="page-b")
 
 
 @pytest.mark.parametrize("kind", ITEM)
@@ -225,13 +225,13 @@ async def test_a_summary_stays_within_its_bound_whoever_is_there() -> None:
     for page in pages:
         car.report(page)
     assert (await car.ask(pages[0], "present", visible=True, sound="ready", awake="ready"))["ok"]
-    await car.obeyed(pages[0], "control", do="take")
-    await car.obeyed(pages[0], "take_item")
-    await car.obeyed(pages[0], "offer_item", to=pages[1]["page"])
+    await car.accepted(pages[0], "control", do="take")
+    await car.accepted(pages[0], "take_item")
+    await car.accepted(pages[0], "offer_item", to=pages[1]["page"])
     car.faults.add(Priority.WARNING)
     car.tick(0.5)
     person = {"name": "A" + widest[:29], "role": "operator"}
-    await car.obeyed(pages[0] | {"person": person}, "acknowledge", alarm="test_warning", occurrence=1)
+    await car.accepted(pages[0] | {"person": person}, "acknowledge", alarm="test_warning", occurrence=1)
     car.report(pages[1] | {"duties": {person["name"]: WALL_MS}})
     car.say_what = '"' * 10_000
     car.tick(0.5)

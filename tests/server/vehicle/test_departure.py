@@ -34,8 +34,8 @@ LIST = [
 
 async def begun() -> Attended:
     car = Attended()
-    await car.obeyed(BEN, "set_departure_list", items=LIST)
-    await car.obeyed(BEN, "begin_departure")
+    await car.accepted(BEN, "set_departure_list", items=LIST)
+    await car.accepted(BEN, "begin_departure")
     return car
 
 
@@ -58,15 +58,15 @@ async def signed() -> Attended:
     log = car.session._parts.event_log
     log._wall_ms = lambda wall_ms=log._wall_ms: wall_ms() + 7  # what happened is logged a moment later
     car.tick(2.5)  # nobody would hear an alarm
-    await car.obeyed(ANN, "present", visible=True, sound="ready", awake="ready")
+    await car.accepted(ANN, "present", visible=True, sound="ready", awake="ready")
     car.tick(1.5, reporting=(ANN,))
     press_brake(car, 31.0)
-    await car.obeyed(ANN | AK, "set_departure_item", item="doors", result="done")
-    await car.obeyed(ANN, "set_departure_item", item="tyres", result="failed", note="worn")
-    await car.obeyed(
+    await car.accepted(ANN | AK, "set_departure_item", item="doors", result="done")
+    await car.accepted(ANN, "set_departure_item", item="tyres", result="failed", note="worn")
+    await car.accepted(
         ANN | AK, "set_departure_item", item="tyres", result="not_applicable", note="Seen by somebody else"
     )
-    await car.obeyed(ANN | AK, "sign_departure", check=(await answer(car))["check"])
+    await car.accepted(ANN | AK, "sign_departure", check=(await answer(car))["check"])
     return car
 
 
@@ -141,14 +141,14 @@ async def test_each_drive_has_a_check_of_its_own() -> None:
     car.session.connect("ws://127.0.0.1:9091", by="Ann")
     assert (await answer(car))["state"] == "open"
     assert [event["step"] for event in log(car)][-1] == "begun"
-    await car.obeyed(ANN, "disconnect")
+    await car.accepted(ANN, "disconnect")
     assert (await answer(car))["state"] == "none"
     assert restore.recall_departure(car.bus, car.name).id is None
-    await car.obeyed(ANN, "begin_departure")
-    await car.obeyed(ANN, "set_departure_item", item="doors", result="done")
+    await car.accepted(ANN, "begin_departure")
+    await car.accepted(ANN, "set_departure_item", item="doors", result="done")
     car.session.connect("ws://127.0.0.1:9090", by="Ann")
     assert (await answer(car))["done"] == 1, "what was begun before the car was dialled is of its drive"
-    await car.obeyed(ANN, "begin_departure")
+    await car.accepted(ANN, "begin_departure")
     assert (await answer(car))["done"] == 0, "by hand it begins again"
 
 
@@ -175,8 +175,8 @@ async def test_the_list_is_edited_kept_and_refused_with_a_sentence(tmp_path: Pat
     path = tmp_path / "settings" / "car.departure.toml"
     car = await begun()
     car.session._parts.departure._file._path = path
-    await car.obeyed(ANN, "set_departure_item", item="doors", result="done")
-    await car.obeyed(BEN, "set_departure_list", items=[LIST[2], LIST[0]])
+    await car.accepted(ANN, "set_departure_item", item="doors", result="done")
+    await car.accepted(BEN, "set_departure_list", items=[LIST[2], LIST[0]])
     shown = await answer(car)
     assert [(row["id"], row["result"]) for row in shown["items"]] == [("sound", "open"), ("doors", "done")]
     assert not shown["is_default"]
@@ -185,7 +185,7 @@ async def test_the_list_is_edited_kept_and_refused_with_a_sentence(tmp_path: Pat
     assert [one.id for one in kept.items] == ["sound", "doors"]
     refused = await car.refused(BEN, "set_departure_list", items=[{"id": "a", "title": "A", "kind": "dance"}])
     assert refused.startswith("Item 1, “A”: a kind is one of manual, check")
-    await car.obeyed(BEN, "set_departure_list", items=None)
+    await car.accepted(BEN, "set_departure_list", items=None)
     assert not path.exists()
     assert (await answer(car))["is_default"]
     texts = [event["text"] for event in car.bus.past_events(car.name, change="settings") if event["by"] == "Ben"]
@@ -215,7 +215,7 @@ async def test_a_file_that_cannot_be_used_is_set_aside_before_the_list_is_kept(
     path.write_bytes(b"[[item")
     car = Attended()
     car.session._parts.departure._file = DepartureFile(path)
-    await car.obeyed(BEN, "set_departure_list", items=items)
+    await car.accepted(BEN, "set_departure_list", items=items)
     assert (tmp_path / "car.departure.unusable.toml").read_bytes() == b"[[item"
     assert path.exists() == (items is not None)
     assert (await answer(car))["complaint"] is None

@@ -68,10 +68,10 @@ async def test_what_a_person_does_is_logged_with_their_name_and_role() -> None:
     car.tick(0.5)
     car.faults = {Priority.WARNING}
     car.tick(0.5, reporting=(ANN,))
-    await car.obeyed(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
+    await car.accepted(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
     assert car.session.frame()["alarms"][0]["acknowledged_by"] == "A. K. (Ann)"
-    await car.obeyed(BEN, "shelve", alarm="test_warning", occurrence=1, minutes=5.0)
-    await car.obeyed(PROGRAM | AK, "unshelve", alarm="test_warning")
+    await car.accepted(BEN, "shelve", alarm="test_warning", occurrence=1, minutes=5.0)
+    await car.accepted(PROGRAM | AK, "unshelve", alarm="test_warning")
     events = {event["change"]: event for event in car.bus.past_events(car.name) if event["by"]}
     assert events["acknowledged"]["by"] == "A. K. (Ann)"
     assert (events["acknowledged"]["person"], events["acknowledged"]["role"]) == ("A. K.", "operator")
@@ -81,8 +81,8 @@ async def test_what_a_person_does_is_logged_with_their_name_and_role() -> None:
 
 async def test_a_mark_bears_the_person_who_made_it() -> None:
     car = Attended()
-    await car.obeyed(ANN | AK, "mark", mark="m-1", at_ms=WALL_MS)
-    await car.obeyed(BEN, "mark", mark="m-2", at_ms=WALL_MS)
+    await car.accepted(ANN | AK, "mark", mark="m-1", at_ms=WALL_MS)
+    await car.accepted(BEN, "mark", mark="m-2", at_ms=WALL_MS)
     second, first = car.bus.past_events(car.name, change="mark")
     assert (first["by"], first["person"], first["role"]) == ("A. K. (Ann)", "A. K.", "operator")
     assert (second["by"], "person" in second) == ("Ben", False)
@@ -124,7 +124,7 @@ async def slowed() -> list[tuple[str, str, str, str]]:
 async def test_coming_and_going_at_a_page_of_the_car_is_logged_once() -> None:
     car = Attended()
     for who in (ANN, ANN | AK, ANN | AK, ANN | MR, ANN):
-        await car.obeyed(SEEN | who, "present")
+        await car.accepted(SEEN | who, "present")
     texts = [event["text"] for event in reversed(car.bus.past_events(car.name, change="duty"))]
     assert texts == [
         "A. K. is on duty as operator at Ann.",
@@ -137,13 +137,13 @@ async def test_coming_and_going_at_a_page_of_the_car_is_logged_once() -> None:
 async def test_a_request_for_control_is_in_the_summary_until_it_is_answered() -> None:
     car = Attended()
     for who in (ANN | AK, BEN):
-        await car.obeyed(SEEN | who, "present")
-    await car.obeyed(ANN | AK, "control", do="take")
+        await car.accepted(SEEN | who, "present")
+    await car.accepted(ANN | AK, "control", do="take")
     assert car.summary["requests"] == []
-    await car.obeyed(BEN, "control", do="request")
+    await car.accepted(BEN, "control", do="request")
     assert car.summary["holder"] == "A. K. (Ann)"
     assert car.summary["requests"] == [{"page": "page-b", "name": "Ben", "left_s": 10.0}]
-    await car.obeyed(ANN | AK, "control", do="keep", to="page-b")
+    await car.accepted(ANN | AK, "control", do="keep", to="page-b")
     assert car.summary["requests"] == []
 
 
@@ -153,8 +153,8 @@ async def test_shelved_and_acknowledged_alarms_are_lines_of_the_hand_over() -> N
     car = shift.car
     car.faults = {Priority.WARNING, Priority.ADVISORY}
     car.tick(0.5)
-    await car.obeyed(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
-    await car.obeyed(ANN | AK, "shelve", alarm="test_advisory", occurrence=1, minutes=5.0)
+    await car.accepted(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
+    await car.accepted(ANN | AK, "shelve", alarm="test_advisory", occurrence=1, minutes=5.0)
     await shift.begin()
     assert shift.state is not None
     warning, advisory = (line for line in shift.state["lines"] if line["kind"] in ("alarm", "shelved"))
@@ -173,12 +173,12 @@ class Shift:
 
     async def begin(self) -> None:
         await self.seen()
-        await self.car.obeyed(ANN | AK, "control", do="take")
-        await self.car.obeyed(ANN | AK, "offer_control", to="page-b")
+        await self.car.accepted(ANN | AK, "control", do="take")
+        await self.car.accepted(ANN | AK, "offer_control", to="page-b")
 
     async def seen(self) -> None:
         for who in (ANN | AK, BEN | MR):
-            await self.car.obeyed(SEEN | who, "present")
+            await self.car.accepted(SEEN | who, "present")
 
     @property
     def state(self) -> dict[str, Any] | None:
@@ -188,7 +188,7 @@ class Shift:
     async def read_all(self) -> None:
         assert self.state is not None
         for line in self.state["lines"]:
-            await self.car.obeyed(BEN | MR, "read_back", line=line["key"])
+            await self.car.accepted(BEN | MR, "read_back", line=line["key"])
 
     async def accept(self) -> dict[str, Any]:
         assert self.state is not None
@@ -228,21 +228,21 @@ async def test_a_new_alarm_during_the_read_back_adds_a_line() -> None:
 async def test_limits_that_differ_from_their_default_are_read_back() -> None:
     shift = Shift()
     await shift.begin()
-    await shift.car.obeyed(ANN | AK, "set", values={"speed_limit.max_mps": 9.0})
+    await shift.car.accepted(ANN | AK, "set", values={"speed_limit.max_mps": 9.0})
     assert shift.state is not None
     (limit,) = (line for line in shift.state["lines"] if line["kind"] == "limit")
     assert (limit["title"], limit["text"]) == ("Speed limit: 9 m/s", "Default: 11 m/s")
     await shift.read_all()
-    await shift.car.obeyed(ANN | AK, "set", values={"speed_limit.max_mps": 8.0})  # another limit is another line
+    await shift.car.accepted(ANN | AK, "set", values={"speed_limit.max_mps": 8.0})  # another limit is another line
     assert (await shift.accept())["reason"] == "One line is not read back yet: Speed limit: 8 m/s."
 
 
 async def test_an_offer_answers_a_request_that_silence_would_grant() -> None:
     shift = Shift()
     await shift.seen()
-    await shift.car.obeyed(ANN | AK, "control", do="take")
-    await shift.car.obeyed(BEN | MR, "control", do="request")
-    await shift.car.obeyed(ANN | AK, "offer_control", to="page-b")
+    await shift.car.accepted(ANN | AK, "control", do="take")
+    await shift.car.accepted(BEN | MR, "control", do="request")
+    await shift.car.accepted(ANN | AK, "offer_control", to="page-b")
     for _ in range(12):
         await shift.seen()
         shift.car.tick(1.0)
@@ -253,7 +253,7 @@ async def test_an_offer_answers_a_request_that_silence_would_grant() -> None:
 async def test_taking_control_over_ends_the_hand_over() -> None:
     shift = Shift()
     await shift.begin()
-    await shift.car.obeyed(BEN | MR, "control", do="take_over")
+    await shift.car.accepted(BEN | MR, "control", do="take_over")
     shift.car.tick(0.1)
     assert shift.state is None
     assert await shift.car.refused(BEN | MR, "read_back", line="alarms:none") == "Control is not offered to this page."
@@ -263,7 +263,7 @@ async def test_an_offer_is_declined_or_taken_back() -> None:
     for who, step in ((BEN | MR, "declined"), (ANN | AK, "withdrawn")):
         shift = Shift()
         await shift.begin()
-        await shift.car.obeyed(who, "end_offer")
+        await shift.car.accepted(who, "end_offer")
         assert shift.state is None
         assert shift.car.bus.past_events("ocelot", change="hand_over")[0]["step"] == step
 
@@ -292,7 +292,7 @@ async def test_who_takes_over_owns_what_they_read_back() -> None:
     car = shift.car
     car.faults = {Priority.WARNING, Priority.ADVISORY}
     car.tick(0.5)
-    await car.obeyed(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
+    await car.accepted(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
     before = car.session.frame()["alarms"][0]
     await handed_over(shift)
     after = {one["id"]: one for one in car.session.frame()["alarms"]}
@@ -311,7 +311,7 @@ async def test_what_the_taker_has_not_read_back_waits_for_them() -> None:
     car = shift.car
     car.faults = {Priority.WARNING}
     car.tick(0.5)
-    await car.obeyed(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
+    await car.accepted(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
     alarms = car.session.judgement.monitor.alarms
     alarms["test_warning"] = replace(alarms["test_warning"], suppressed_by=("another",))
     await handed_over(shift)
@@ -321,7 +321,7 @@ async def test_what_the_taker_has_not_read_back_waits_for_them() -> None:
     (alarm,) = car.session.frame()["alarms"]
     assert (alarm["state"], alarm["occurrence"], alarm["acknowledged_by"]) == ("UNACKED", 2, None)
     assert "again meanwhile" in await car.refused(BEN | MR, "acknowledge", alarm="test_warning", occurrence=1)
-    await car.obeyed(BEN | MR, "acknowledge", alarm="test_warning", occurrence=2)
+    await car.accepted(BEN | MR, "acknowledge", alarm="test_warning", occurrence=2)
 
 
 async def test_what_the_taker_had_acknowledged_stays_as_it_is() -> None:
@@ -329,7 +329,7 @@ async def test_what_the_taker_had_acknowledged_stays_as_it_is() -> None:
     await shift.seen()
     shift.car.faults = {Priority.WARNING}
     shift.car.tick(0.5)
-    await shift.car.obeyed(BEN | MR, "acknowledge", alarm="test_warning", occurrence=1)
+    await shift.car.accepted(BEN | MR, "acknowledge", alarm="test_warning", occurrence=1)
     await handed_over(shift)
     assert changes(shift.car) == []
 
@@ -339,10 +339,10 @@ async def test_an_offer_that_is_declined_changes_no_owner() -> None:
     await shift.seen()
     shift.car.faults = {Priority.WARNING}
     shift.car.tick(0.5)
-    await shift.car.obeyed(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
+    await shift.car.accepted(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
     await shift.begin()
     await shift.read_all()
-    await shift.car.obeyed(BEN | MR, "end_offer")
+    await shift.car.accepted(BEN | MR, "end_offer")
     assert shift.car.session.frame()["alarms"][0]["acknowledged_by"] == "A. K. (Ann)"
     assert changes(shift.car) == []
 
@@ -354,7 +354,7 @@ async def test_the_owner_survives_a_restart() -> None:
     car.faults = {Priority.WARNING, Priority.ADVISORY}
     car.tick(0.5)
     for name in ("test_warning", "test_advisory"):
-        await car.obeyed(ANN | AK, "acknowledge", alarm=name, occurrence=1)
+        await car.accepted(ANN | AK, "acknowledge", alarm=name, occurrence=1)
     alarms = car.session.judgement.monitor.alarms
     alarms["test_advisory"] = replace(alarms["test_advisory"], suppressed_by=("another",))
     await handed_over(shift)
@@ -371,7 +371,7 @@ async def test_an_alarm_that_is_one_of_many_in_a_line_was_not_seen_by_itself(mon
     shift.car.faults = {Priority.WARNING, Priority.ADVISORY}
     shift.car.tick(0.5)
     for name in ("test_warning", "test_advisory"):
-        await shift.car.obeyed(ANN | AK, "acknowledge", alarm=name, occurrence=1)
+        await shift.car.accepted(ANN | AK, "acknowledge", alarm=name, occurrence=1)
     await handed_over(shift)
     assert changes(shift.car) == [
         ("test_warning", "handed_over", "M. R. (Ben)", False),

@@ -23,14 +23,14 @@ async def in_control() -> Attended:
     """Ann is in control of a car whose checks are about its link."""
     car = Attended(scope=Scope.LINK)
     for who in (ANN | AK, BEN):
-        await car.obeyed(SEEN | who, "present")
-    await car.obeyed(ANN | AK, "control", do="take")
+        await car.accepted(SEEN | who, "present")
+    await car.accepted(ANN | AK, "control", do="take")
     return car
 
 
 async def stopped() -> Attended:
     car = await in_control()
-    await car.obeyed(ANN | AK, "planned_stop", reason="workshop")
+    await car.accepted(ANN | AK, "planned_stop", reason="workshop")
     return car
 
 
@@ -113,7 +113,7 @@ async def test_alarms_sound_again_when_it_ends() -> None:
     car = await stopped()
     car.faults = {Priority.WARNING}
     car.tick(1.0)
-    await car.obeyed(BEN, "end_planned_stop")  # who is not in control may end it
+    await car.accepted(BEN, "end_planned_stop")  # who is not in control may end it
     assert stop_of(car) is None
     assert alarms(car) == {"test_warning": ("medium", False, "UNACKED")}
     assert [(one["change"], one["by"]) for one in logged(car)] == [
@@ -126,7 +126,7 @@ async def test_what_stood_before_is_marked_and_its_age_goes_on() -> None:
     car.faults = {Priority.WARNING}
     car.tick(3.0)
     before = car.session.frame()["alarms"][0]
-    await car.obeyed(ANN | AK, "planned_stop", reason="parked")
+    await car.accepted(ANN | AK, "planned_stop", reason="parked")
     after = car.session.frame()["alarms"][0]
     assert (before.get("planned_stop"), after.get("planned_stop")) == (False, True)
     assert (after["raised_ms"], after["occurrence"]) == (before["raised_ms"], before["occurrence"])
@@ -181,7 +181,7 @@ async def test_another_reason_replaces_it_and_the_same_again_changes_nothing() -
     car = await stopped()
     car.tick(5.0)
     for reason in ("workshop", "charging"):
-        await car.obeyed(ANN | AK, "planned_stop", reason=reason)
+        await car.accepted(ANN | AK, "planned_stop", reason=reason)
     assert [(one["reason"], one["person"]) for one in logged(car)] == [("workshop", "A. K."), ("charging", "A. K.")]
 
 
@@ -194,7 +194,7 @@ async def test_the_end_of_monitoring_ends_it() -> None:
 
 async def test_it_is_read_back_at_a_hand_over() -> None:
     car = await stopped()
-    await car.obeyed(ANN | AK, "offer_control", to="page-b")
+    await car.accepted(ANN | AK, "offer_control", to="page-b")
     handover = car.session.frame()["control"].get("handover")
     assert handover is not None
     (line,) = (one for one in handover["lines"] if one["kind"] == "planned_stop")

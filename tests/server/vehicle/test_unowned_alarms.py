@@ -27,15 +27,15 @@ async def acknowledged(by: dict[str, Any] = ANN | AK) -> Attended:
     car.faults = {Priority.WARNING}
     car.tick(0.5, reporting=(ANN,))
     for who in (ANN | AK | BOTH, BEN | MR | BOTH):
-        await car.obeyed(SEEN | who, "present")
-    await car.obeyed(by, "acknowledge", **TAKE)
+        await car.accepted(SEEN | who, "present")
+    await car.accepted(by, "acknowledge", **TAKE)
     return car
 
 
 async def left() -> Attended:
     """The same after the duty of who acknowledged it ended; no page reports that they left."""
     car = await acknowledged()
-    await car.obeyed(SEEN | BEN | MR | LEFT, "present")
+    await car.accepted(SEEN | BEN | MR | LEFT, "present")
     car.tick(0.5)
     return car
 
@@ -53,15 +53,15 @@ async def test_it_says_since_when_its_owner_is_off_duty() -> None:
     car = await left()
     assert listed(car) == ("ACKED", "A. K. (Ann)", OFF_MS)
     assert car.summary["unowned"] == {"count": 1, "by": "A. K. (Ann)", "since_ms": OFF_MS}
-    await car.obeyed(SEEN | BEN | MR | {"duties": {"M. R.": None}}, "present")  # removed from the list of people
+    await car.accepted(SEEN | BEN | MR | {"duties": {"M. R.": None}}, "present")  # removed from the list of people
     assert listed(car)[2] == OFF_MS
-    await car.obeyed(SEEN | ANN | AK | BOTH, "present")  # back on duty: it is theirs
+    await car.accepted(SEEN | ANN | AK | BOTH, "present")  # back on duty: it is theirs
     assert listed(car)[2] is None
 
 
 async def test_the_log_says_when_an_owner_goes_off_duty_and_comes_back() -> None:
     car = await left()
-    await car.obeyed(SEEN | ANN | AK | BOTH, "present")
+    await car.accepted(SEEN | ANN | AK | BOTH, "present")
     car.tick(0.5)
     events = [
         (event["text"], event["owner"], event["off_duty_ms"])
@@ -84,15 +84,15 @@ async def test_the_page_of_another_car_says_it_too() -> None:
 )
 async def test_what_cannot_be_read_changes_nothing(stated: dict[str, Any]) -> None:
     car = await acknowledged()
-    await car.obeyed(SEEN | BEN | MR | stated, "present")
+    await car.accepted(SEEN | BEN | MR | stated, "present")
     assert listed(car) == ("ACKED", "A. K. (Ann)", None)
 
 
 async def test_it_is_a_line_of_the_hand_over() -> None:
     car = await left()
-    await car.obeyed(BEN | MR, "control", do="take")
-    await car.obeyed(SEEN | ANN | LEFT, "present")
-    await car.obeyed(BEN | MR, "offer_control", to="page-a")
+    await car.accepted(BEN | MR, "control", do="take")
+    await car.accepted(SEEN | ANN | LEFT, "present")
+    await car.accepted(BEN | MR, "offer_control", to="page-a")
     offered: Any = car.session.frame()["control"]["handover"]
     (line,) = (one for one in offered["lines"] if one["kind"] == "alarm")
     assert line["text"].endswith("Acknowledged by A. K. (Ann).")
@@ -101,7 +101,7 @@ async def test_it_is_a_line_of_the_hand_over() -> None:
 
 async def test_who_takes_it_is_its_owner_also_after_a_restart() -> None:
     car = await left()
-    await car.obeyed(BEN | MR, "take_alarm", **TAKE)
+    await car.accepted(BEN | MR, "take_alarm", **TAKE)
     assert listed(car) == ("ACKED", "M. R. (Ben)", None)
     car.tick(0.5)
     assert car.summary["unowned"] is None
@@ -123,18 +123,18 @@ async def test_only_who_is_on_duty_takes_it_while_people_sign_on(who: dict[str, 
     car = await left()
     assert "Sign on first" in await car.refused(who, "take_alarm", **TAKE)
     assert listed(car)[2] == OFF_MS
-    await car.obeyed(SEEN | BEN | {"duties": {}}, "present")  # the list is empty: nobody can sign on
-    await car.obeyed(who, "take_alarm", **TAKE)
+    await car.accepted(SEEN | BEN | {"duties": {}}, "present")  # the list is empty: nobody can sign on
+    await car.accepted(who, "take_alarm", **TAKE)
     assert listed(car)[2] is None
 
 
 async def test_once_the_list_is_emptied_who_never_signed_on_takes_it() -> None:
     """Who was removed is still stated as off duty, and nobody can sign on."""
     car = await left()
-    await car.obeyed(SEEN | BEN | {"duties": {"A. K.": OFF_MS}, "listed": 1}, "present")
+    await car.accepted(SEEN | BEN | {"duties": {"A. K.": OFF_MS}, "listed": 1}, "present")
     assert "Sign on first" in await car.refused(BEN, "take_alarm", **TAKE)
-    await car.obeyed(SEEN | BEN | {"duties": {"A. K.": OFF_MS}, "listed": 0}, "present")
-    await car.obeyed(BEN, "take_alarm", **TAKE)
+    await car.accepted(SEEN | BEN | {"duties": {"A. K.": OFF_MS}, "listed": 0}, "present")
+    await car.accepted(BEN, "take_alarm", **TAKE)
     assert listed(car)[:2] == ("ACKED", "Ben")
 
 
@@ -142,7 +142,7 @@ async def test_nobody_takes_what_has_an_owner_or_was_raised_again() -> None:
     car = await acknowledged()
     assert "is not off duty" in await car.refused(BEN | MR, "take_alarm", **TAKE)
     car = await acknowledged(by=PROGRAM)  # a program is never on duty
-    await car.obeyed(SEEN | BEN | MR | LEFT, "present")
+    await car.accepted(SEEN | BEN | MR | LEFT, "present")
     assert "is not off duty" in await car.refused(BEN | MR, "take_alarm", **TAKE)
     car = await left()
     gone = "This alarm is not an acknowledged one any more: look at the list again."
@@ -156,7 +156,7 @@ async def test_another_moment_of_the_same_end_is_not_logged_again() -> None:
     """Two web nodes whose clocks or lists differ state it in turn."""
     car = await left()
     for off_ms in (OFF_MS + 2000, OFF_MS, OFF_MS + 2000):
-        await car.obeyed(SEEN | BEN | MR | {"duties": {"A. K.": off_ms, "M. R.": None}}, "present")
+        await car.accepted(SEEN | BEN | MR | {"duties": {"A. K.": off_ms, "M. R.": None}}, "present")
         car.tick(0.5)
         assert listed(car)[2] == off_ms
     assert len(car.bus.past_events("ocelot", change="owner")) == 1

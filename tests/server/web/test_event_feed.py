@@ -21,14 +21,14 @@ class Agent:
     """A bus whose events are elsewhere; the first question is not answered."""
 
     def __init__(self) -> None:
-        self.asked = 0
+        self.requests = 0
 
     def recent_events(self, vehicle: str, n: int, limit: int = 100) -> None:
         return None
 
     async def events_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
-        self.asked += 1
-        if self.asked == 1:
+        self.requests += 1
+        if self.requests == 1:
             raise NotServed("nothing from car for 3 s")
         return [{"n": n + 1}]
 
@@ -43,7 +43,7 @@ async def test_what_an_agent_did_not_answer_is_asked_again(monkeypatch: pytest.M
     feed = EventFeed(cast(PageBus, agent), "car", time.monotonic, look)
     look()
     await until(lambda: found)
-    assert (found, agent.asked) == ([{"n": 5}], 2)
+    assert (found, agent.requests) == ([{"n": 5}], 2)
     feed.close()
 
 
@@ -52,7 +52,7 @@ async def test_a_page_that_has_left_asks_no_more(monkeypatch: pytest.MonkeyPatch
     agent, woken = Agent(), list[int]()
     feed = EventFeed(cast(PageBus, agent), "car", time.monotonic, lambda: woken.append(1))
     feed.after(4)
-    await until(lambda: agent.asked)
+    await until(lambda: agent.requests)
     await asyncio.sleep(0)
     feed.close()
     await asyncio.sleep(0.05)

@@ -54,7 +54,7 @@ class Socket:
         self._from_page = asyncio.Queue[dict[str, Any]]()
         self.got: list[dict[str, Any]] = []
 
-    def says(self, **message: object) -> None:
+    def sends(self, **message: object) -> None:
         self._from_page.put_nowait({"type": "websocket.receive", "text": json.dumps(message)})
 
     def ends(self) -> None:
@@ -102,7 +102,7 @@ class Pages:
         socket, hello = Socket(), cast(Hello, {"kind": "hello"})
         serving = self._hub.serve(cast(WebSocket, socket), "car", lambda: hello, principal=LOCAL)
         self.tasks.append(asyncio.create_task(serving))
-        socket.says(kind="hello", page="page-ann", build="1")
+        socket.sends(kind="hello", page="page-ann", build="1")
         return socket
 
     @property
@@ -128,7 +128,7 @@ def writers() -> int:
 async def test_a_connection_that_ends_by_itself_is_not_interrupted() -> None:
     async with serving_pages() as pages:
         old = pages.connect()
-        old.says(kind="replay", do="open", recording="street", id="1")
+        old.sends(kind="replay", do="open", recording="street", id="1")
         await asyncio.sleep(LONG_S)
         old.ends()
         await asyncio.sleep(0.1)
@@ -143,7 +143,7 @@ async def test_a_connection_that_ends_by_itself_is_not_interrupted() -> None:
 async def test_a_command_that_takes_long_is_carried_out_and_answered_over_the_connection_on_which_it_came() -> None:
     async with serving_pages() as pages:
         old = pages.connect()
-        old.says(kind="pause", id="1")
+        old.sends(kind="pause", id="1")
         await asyncio.sleep(LONG_S - 0.2)
         pages.connect()
         await asyncio.sleep(QUIET_S)

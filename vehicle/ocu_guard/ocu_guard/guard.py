@@ -1,7 +1,7 @@
 """What the guard decides, without ROS: which command reaches the car, and when it slows the car by itself.
 
 Three may command, in this order: the guard's own ramp, the operator, the controllers. Once the operator or the guard
-has begun to slow the car, no controller is heard until the hold is released by its number; the ramp never rises
+has begun to slow the car, no controller passes until the hold is released by its number; the ramp never rises
 meanwhile.
 Speeds are m/s along the car, angles the tyre angle in rad, times seconds of one monotonic clock.
 """
@@ -70,7 +70,7 @@ class Guard:
         self._ramp_s = 0.0
         self._sign = 1.0
 
-    # -- what is heard -----------------------------------------------------------------------------------------------
+    # -- received ----------------------------------------------------------------------------------------------------
 
     def controller(self, now_s: float, speed_mps: float, angle_rad: float) -> Command | None:
         """A controller commands: it passes at once, or is swallowed while the car is held."""

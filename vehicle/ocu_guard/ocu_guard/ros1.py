@@ -10,7 +10,7 @@ import rospy
 from geometry_msgs.msg import Twist
 from std_msgs.msg import String, UInt32
 
-from ocu_guard import words
+from ocu_guard import interface
 from ocu_guard.guard import DECELERATION_MPS2, HEARTBEAT_S, Command, Guard
 
 
@@ -25,21 +25,21 @@ class Node:
             float(rospy.get_param("~heartbeat_s", HEARTBEAT_S)),
         )
         self._lock = threading.Lock()
-        self._cmd_vel = rospy.Publisher(words.CMD_VEL, Twist, queue_size=1)
-        self._state = rospy.Publisher(words.STATE, String, queue_size=1, latch=True)
+        self._cmd_vel = rospy.Publisher(interface.CMD_VEL, Twist, queue_size=1)
+        self._state = rospy.Publisher(interface.STATE, String, queue_size=1, latch=True)
         for topic, kind, hear in (
-            (words.CONTROLLER, Twist, self._controller),
-            (words.OPERATOR, Twist, self._operator),
-            (words.HEARTBEAT, UInt32, self._heartbeat),
-            (words.RELEASE, UInt32, self._release),
-            (words.SPEED, Twist, self._speed),
+            (interface.CONTROLLER, Twist, self._controller),
+            (interface.OPERATOR, Twist, self._operator),
+            (interface.HEARTBEAT, UInt32, self._heartbeat),
+            (interface.RELEASE, UInt32, self._release),
+            (interface.SPEED, Twist, self._speed),
         ):
             rospy.Subscriber(topic, kind, hear, queue_size=1, tcp_nodelay=True)
 
     def run(self) -> None:
         """Ticks until ROS ends."""
         next_s = time.monotonic()
-        said_s = -1.0
+        published_s = -1.0
         was = ""
         while not rospy.is_shutdown():
             now_s = time.monotonic()
@@ -47,10 +47,10 @@ class Node:
                 self._publish(self._guard.tick(now_s))
                 state = self._guard.state(now_s)
                 report = self._guard.report(now_s)
-            if state != was or now_s - said_s >= 1 / words.STATE_HZ:
-                was, said_s = state, now_s
+            if state != was or now_s - published_s >= 1 / interface.STATE_HZ:
+                was, published_s = state, now_s
                 self._state.publish(json.dumps(report))
-            next_s = max(next_s + 1 / words.TICK_HZ, now_s)
+            next_s = max(next_s + 1 / interface.TICK_HZ, now_s)
             time.sleep(max(0.0, next_s - time.monotonic()))
 
     def _controller(self, message: Twist) -> None:

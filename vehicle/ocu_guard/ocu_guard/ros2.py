@@ -14,7 +14,7 @@ from rclpy.node import Node as RosNode
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String, UInt32
 
-from ocu_guard import words
+from ocu_guard import interface
 from ocu_guard.guard import DECELERATION_MPS2, HEARTBEAT_S, Command, Guard
 
 
@@ -36,28 +36,28 @@ class Node(RosNode):
             float(self.get_parameter("deceleration_mps2").value), float(self.get_parameter("heartbeat_s").value)
         )
         self._was = ""
-        self._said_s = -1.0
-        self._cmd_vel = self.create_publisher(Twist, words.CMD_VEL, 1)
+        self._published_s = -1.0
+        self._cmd_vel = self.create_publisher(Twist, interface.CMD_VEL, 1)
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._state = self.create_publisher(String, words.STATE, kept)
+        self._state = self.create_publisher(String, interface.STATE, kept)
         reliable = QoSProfile(depth=1)
         best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
         for topic, kind, receive, qos in (
-            (words.CONTROLLER, Twist, self._controller, best_effort),
-            (words.OPERATOR, Twist, self._operator, reliable),
-            (words.HEARTBEAT, UInt32, self._heartbeat, reliable),
-            (words.RELEASE, UInt32, self._release, reliable),
-            (words.SPEED, Twist, self._speed, best_effort),
+            (interface.CONTROLLER, Twist, self._controller, best_effort),
+            (interface.OPERATOR, Twist, self._operator, reliable),
+            (interface.HEARTBEAT, UInt32, self._heartbeat, reliable),
+            (interface.RELEASE, UInt32, self._release, reliable),
+            (interface.SPEED, Twist, self._speed, best_effort),
         ):
             self.create_subscription(kind, topic, receive, qos)
-        self.create_timer(1 / words.TICK_HZ, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(1 / interface.TICK_HZ, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _tick(self) -> None:
         now_s = time.monotonic()
         self._publish(self._guard.tick(now_s))
         state = self._guard.state(now_s)
-        if state != self._was or now_s - self._said_s >= 1 / words.STATE_HZ:
-            self._was, self._said_s = state, now_s
+        if state != self._was or now_s - self._published_s >= 1 / interface.STATE_HZ:
+            self._was, self._published_s = state, now_s
             message = String()
             message.data = json.dumps(self._guard.report(now_s))
             self._state.publish(message)

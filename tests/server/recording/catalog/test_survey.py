@@ -119,7 +119,7 @@ def test_the_real_drive(inside: tuple[str, ...]) -> None:
         pytest.skip("the recorded drives are not here")
     path = next(DATA.glob("/".join(inside)))
     found = survey(path)
-    assert found["alarms"] is None, "whoever recorded it recorded no alarms: not the same as none"
+    assert found["alarms"] is None, "its recorder recorded no alarms: not the same as none"
     assert found["length_s"] == pytest.approx(55.9, abs=0.1)
     assert found["distance_m"] == pytest.approx(75.7, abs=1.5)
     assert found["top_speed_mps"] == pytest.approx(4.23, abs=0.01)

@@ -139,7 +139,7 @@ LATER: Sequence[Own] = (
     logged(150.5, "acknowledged", "gps_drift", by="M. R. (Tablet)", state="ACKED"),
     mode(170.0, "manual", "autonomous"),
     logged(170.0, "intervention", intervention="i2", kind_of="to_manual", speed_mps=10.0, active=[], before=BEFORE),
-    logged(175.0, "intervention_described", intervention="i1", what="told later", by="A. K. (Pixel)"),
+    logged(175.0, "intervention_described", intervention="i1", what="described later", by="A. K. (Pixel)"),
     mark(180.0, "m9", words="in the second part"),
     logged(190.0, "raised", "speed_limit", text="12.0 m/s", state="UNACKED"),
 )

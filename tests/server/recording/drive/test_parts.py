@@ -70,7 +70,7 @@ def test_the_time_between_two_parts_is_reported_and_neither_driven_nor_lost(driv
 def test_what_begins_in_one_part_goes_on_in_the_next(log: DriveLog) -> None:
     assert [(one.alarm, one.to_acknowledge_s) for one in log.alarms[2:]] == [("gps_drift", 32.5), ("speed_limit", None)]
     described = {one.intervention: one.what for one in log.interventions}
-    assert described["i1"] == "told later"
+    assert described["i1"] == "described later"
     assert list(described) == ["i1", "i2"]
     assert [row["mark"] for row in log.marks] == ["m1", "m3", "m9"]
     assert log.departure.state == "signed"

@@ -179,7 +179,7 @@ def scanned(*_: object, **__: object) -> object:
 
 
 def test_a_whole_index_saves_reading_the_records(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An hour's recording opens by its summary, whoever wrote it."""
+    """An hour's recording opens by its summary, of any writer."""
     theirs, ours = tmp_path / "theirs.mcap", tmp_path / "ours.mcap"
     messages = tuple((n % 3, n) for n in range(1, 200))
     variant = Variant(

@@ -156,13 +156,13 @@ def test_what_cannot_be_read_with_the_requested_file_is_named(tmp_path: Path) ->
     spoilt = tmp_path / "3.mcap"
     spoilt.write_bytes(b"spoilt")
     for named, other, version in ((one, two, 1), (two, one, 2), (spoilt, two, 1)):
-        with open_recording([one, two, spoilt], asked=named) as recording:
+        with open_recording([one, two, spoilt], required=named) as recording:
             assert (recording.ros_version, recording.topics["/n"].count) == (version, 9)
             damaged, mixed = recording.damage
             assert damaged.startswith("3.mcap ")
             assert mixed == f"{other.name} is of another version of ROS and cannot be read with {named.name}"
     with pytest.raises(RecordingUnreadable):
-        open_recording([spoilt], asked=spoilt)
+        open_recording([spoilt], required=spoilt)
 
 
 def test_a_file_without_messages_of_the_car_has_no_version(tmp_path: Path) -> None:

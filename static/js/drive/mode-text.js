@@ -1,4 +1,4 @@
-// Who drives and what is known of an intervention, in words: pure functions of what the server told.
+// Who drives and what is known of an intervention, as texts: pure functions of the server's state.
 
 import { distanceWords, duration, fixed } from '../core/format.js';
 
@@ -19,7 +19,7 @@ export const KINDS = {
   steer: { title: 'Steered', ask: 'Describe steering' },
 };
 
-/** What made somebody intervene: the word of the log, and the word on the key. @type {readonly (readonly [string, string])[]} */
+/** What made somebody intervene: the name in the log, and the label of the key. @type {readonly (readonly [string, string])[]} */
 export const CATEGORIES = [
   ['object_late', 'Object late'], ['path_wrong', 'Path wrong'], ['too_fast', 'Too fast'],
   ['other_traffic', 'Other traffic'], ['planned', 'Planned'], ['system_fault', 'System fault'],
@@ -30,7 +30,7 @@ export const STARTERS = [['driver', 'Driver'], ['operator', 'Operator'], ['syste
 /**
  * @param {ModeState | null | undefined} mode null: nothing is known of the car
  * @param {number} now_ms the server's time of day
- * @param {boolean} isLinked the car is heard
+ * @param {boolean} isLinked data comes from the car
  * @returns {Shown}
  */
 export function modeWords(mode, now_ms, isLinked) {
