@@ -100,6 +100,7 @@ export class FreshPanel {
   /** @param {string} id */
   #open(id) {
     this.#id = id;
+    setAttribute(this.element, 'data-mark', id);
     show(this.element, true);
     clearInterval(this.#clock);
     this.#clock = setInterval(() => quietly(() => this.draw()), DRAWS_EVERY_MS);
@@ -119,7 +120,7 @@ export class FreshPanel {
     if (voice) this.#drawVoice(voice);
     else {
       this.ring.draw(left_ms / STAYS_MS, String(Math.ceil(left_ms / 1000)));
-      setSentence(this.more, storedWords(mark, this.#speed));
+      setSentence(this.more, storedWords(mark, this.#speed, this.marks));
     }
   }
 
@@ -149,10 +150,10 @@ function levelPath(levels) {
   return levels.map((level, i) => `M${i * BAR_PX + 2} ${(23 - 3 - 20 * level).toFixed(1)}V${(23 + 3 + 20 * level).toFixed(1)}`).join('');
 }
 
-/** What became of a mark so far. @param {import('./mark-model.js').Mark} mark @param {string} speed */
-function storedWords(mark, speed) {
+/** What became of a mark so far. @param {import('./mark-model.js').Mark} mark @param {string} speed @param {import('./marks.js').Marks} marks */
+function storedWords(mark, speed, marks) {
   const { voice, photo } = mark;
   const with_ = [...(voice ? [voice.note || `${fixed(voice.length_s)} s of voice`] : []), ...(photo ? [photo.note || 'with a photo'] : []), ...(speed ? [speed] : [])];
-  const where = refusedWords(mark) || (stepOf(mark) === null ? 'stored' : mark.stored ? 'being stored' : 'stored on this device');
+  const where = refusedWords(mark) || (stepOf(mark) === null ? 'stored' : !marks.isDurable ? 'until the page closes' : mark.stored || !marks.isKept(mark.id) ? 'being stored' : 'stored on this device');
   return [...with_, where].join(' · ');
 }

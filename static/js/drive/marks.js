@@ -95,6 +95,11 @@ export class Marks {
     return this.#marks.get(id) ?? null;
   }
 
+  /** It is on the disk of this device. @param {string} id */
+  isKept(id) {
+    return this.#kept.has(id);
+  }
+
   /** The server can take a mark now. */
   get isServerThere() {
     return isThere(this.store);
