@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Delivery } from '../../static/js/drive/mark-delivery.js';
 import { MarkClock } from '../../static/js/drive/mark-clock.js';
-import { corrected, headWords, markedAt, moreWords, newMark, outdated, stepOf, waitWords, waitingOf, waitingWords } from '../../static/js/drive/mark-model.js';
+import { corrected, headWords, markedAt, moreWords, newMark, outdated, stepOf, storageText, waitWords, waitingOf, waitingWords } from '../../static/js/drive/mark-model.js';
 import { courseOf, linePath, xOf } from '../../static/js/drive/mark-plot.js';
 import { HELD_MS, PULL_PX, Press } from '../../static/js/drive/press.js';
 import { MOST_POINTS, scaled, smallerWords } from '../../static/js/drive/photo.js';
@@ -290,6 +290,16 @@ test('rows of this phone come before those of the server, each mark once', () =>
   const rows = rowsOf([mark('a', { words: 'newer here' }), mark('w')], [stored, { ...stored, mark: 'c', source: 'car', by: null, marked_ms: AT_MS + 9000 }]);
   assert.deepEqual(rows.map(({ id, isWaiting }) => [id, isWaiting]), [['a', true], ['w', true], ['c', false]]);
   assert.deepEqual(rows[2]?.more, ['by the car’s button']);
+});
+
+test('a mark is stored on this device once it is on its disk, and nothing else is called stored', () => {
+  const fresh = mark('a');
+  assert.equal(storageText(fresh, false, true), 'being stored');
+  assert.equal(storageText(fresh, true, true), 'stored on this device');
+  assert.equal(storageText(fresh, false, false), 'until the page closes');
+  assert.equal(storageText({ ...fresh, stored: 1, version: 2 }, true, true), 'being stored');
+  assert.equal(storageText({ ...fresh, stored: 1 }, false, false), 'stored');
+  assert.equal(storageText({ ...fresh, refused: 'Too old.' }, true, true), 'not stored: Too old.');
 });
 
 test('a photo has at most two million points and keeps its shape', () => {

@@ -3,7 +3,7 @@
 import { Ring, shape } from './drive-parts.js';
 import { html, listen, setAttribute, setText, setSentence, show, svg } from '../core/dom.js';
 import { fixed, timeOfDay } from '../core/format.js';
-import { markedAt, refusedWords, stepOf } from './mark-model.js';
+import { markedAt, storageText } from './mark-model.js';
 import { pickPhoto } from './photo-input.js';
 import { quietly } from './marks.js';
 import { LONGEST_MS } from './voice.js';
@@ -154,6 +154,5 @@ function levelPath(levels) {
 function storedWords(mark, speed, marks) {
   const { voice, photo } = mark;
   const with_ = [...(voice ? [voice.note || `${fixed(voice.length_s)} s of voice`] : []), ...(photo ? [photo.note || 'with a photo'] : []), ...(speed ? [speed] : [])];
-  const where = refusedWords(mark) || (stepOf(mark) === null ? 'stored' : !marks.isDurable ? 'until the page closes' : mark.stored || !marks.isKept(mark.id) ? 'being stored' : 'stored on this device');
-  return [...with_, where].join(' · ');
+  return [...with_, storageText(mark, marks.isKept(mark.id), marks.isDurable)].join(' · ');
 }

@@ -145,6 +145,14 @@ export function refusedWords(mark) {
   return `${stepOf(mark) === null ? 'not taken back' : 'not stored'}: ${mark.refused}`;
 }
 
+/** Where a mark is by now. @param {Mark} mark @param {boolean} isKept on the disk of this device @param {boolean} isDurable this device stores marks */
+export function storageText(mark, isKept, isDurable) {
+  if (mark.refused) return refusedWords(mark);
+  if (stepOf(mark) === null) return 'stored';
+  if (!isDurable) return 'until the page closes';
+  return mark.stored || !isKept ? 'being stored' : 'stored on this device';
+}
+
 /** What stands on the Mark key when the server is away: "3 wait". @param {number} count */
 export function waitWords(count) {
   return count === 0 ? '' : count === 1 ? '1 waits' : `${count} wait`;
