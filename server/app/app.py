@@ -104,7 +104,7 @@ def create_app(
     app.add_middleware(Throttle, limits=config.limits, now=now)
     app.add_middleware(Guard, access=running.access)
     errors.install(app)
-    pages.install(app)
+    app.state.page_files = pages.install(app)
     return app
 
 

@@ -32,6 +32,7 @@ from server.tls.setup import Probe, SetupAddresses
 from server.web.maps import map_options
 from server.web.maps.mbtiles import MapRefused
 from server.web.middleware import http_protocol
+from server.web.routes.pages import PageFiles
 from server.web.services import Services
 
 log = logging.getLogger("catgraph.serving")
@@ -137,11 +138,19 @@ async def serve(config: Config) -> int:
     )
     _announce(config, port, secured, explainer, app.state.services)
     _settle_memory()
+    warming = asyncio.create_task(_warm(server.begun, app.state.page_files), name="warm the page")
     if secured is None:
         await server.serve(sockets=[listening])
     else:
         await serve_secured(secured, server, config, listening, explainer)
+    warming.cancel()  # of a server that did not start
     return 0
+
+
+async def _warm(begun: asyncio.Event, files: PageFiles) -> None:
+    """Prepare the first page once the server listens, in a thread: neither the start nor the event loop waits."""
+    await begun.wait()
+    await asyncio.to_thread(files.warm)
 
 
 def _settle_memory() -> None:

@@ -12,7 +12,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -117,7 +117,7 @@ def _join_entry(tools: Path, static: Path, script: str, styles: tuple[str, ...],
 def find(static: Path) -> Built | None:
     """The bundles, or None if they are not of the current sources."""
     try:
-        stamps = tuple((str(path), path.stat().st_mtime_ns) for path in _sources(static))
+        stamps = tuple(sorted([*_stamps(f"{static}/js"), *_stamps(f"{static}/css")]))
         listed_ns = (static / FOLDER / _LIST).stat().st_mtime_ns
     except OSError:
         return None
@@ -150,6 +150,16 @@ def _find(static: Path, stamps: tuple[tuple[str, int], ...], listed_ns: int) -> 
 
 def _entry_of(listed: dict[str, Any]) -> Entry:
     return Entry(script=listed["script"], style=listed["style"], needed=tuple(listed["needed"]))
+
+
+def _stamps(folder: str) -> Iterator[tuple[str, int]]:
+    """Each source below `folder` and when it changed; not by pathlib, which takes ten times as long, for each page."""
+    with os.scandir(folder) as entries:
+        for one in entries:
+            if one.is_dir():
+                yield from _stamps(one.path)
+            elif one.name.endswith((".js", ".css")):
+                yield one.path, one.stat().st_mtime_ns
 
 
 def _sources(static: Path) -> list[Path]:
