@@ -1,13 +1,16 @@
-"""One alarm after ISA-18.2: independent flags, and a state derived from them. `monitor.alarm_life` moves it on."""
+"""One alarm after ISA-18.2: independent flags, and a state derived from them. `monitor.alarm_life` moves it on.
+
+Announced alarms are also marks on the time line of a drive: bounded, the most urgent kept.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Literal
 
-from monitor.alarm_spec import Action, AlarmSpec, Place, Sound
+from monitor.alarm_spec import Action, AlarmSpec, Place, Priority, Sound
 from monitor.check import Finding
 
 Change = Literal[
@@ -207,3 +210,38 @@ def rebased(alarm: Alarm, now_s: float) -> Alarm:
         silenced_until_s=moved(alarm.silenced_until_s),
         announced=tuple((name, at_s + shift_s) for name, at_s in alarm.announced),
     )
+
+
+MOST_MARKS = 2000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlarmMark:
+    """One announcement. `at_s` is on the clock of its transition."""
+
+    at_s: float
+    alarm: str
+    title: str
+    priority: Priority
+
+
+class AlarmMarks:
+    """The alarms that were announced in one drive, in the order of time."""
+
+    def __init__(self) -> None:
+        self._marks: list[AlarmMark] = []
+        self.left_out = 0
+
+    def add(self, transition: Transition, at_s: float) -> None:
+        """Mark it, if it announces an alarm. Beyond `MOST_MARKS` the oldest of the least urgent is dropped."""
+        if not transition.announces:
+            return
+        spec = transition.spec
+        mark = AlarmMark(at_s=at_s, alarm=transition.alarm_id, title=spec.title, priority=spec.priority)
+        self._marks.append(mark)
+        if len(self._marks) > MOST_MARKS:
+            self._marks.remove(max(self._marks, key=lambda one: (one.priority.rank, -one.at_s)))
+            self.left_out += 1
+
+    def __iter__(self) -> Iterator[AlarmMark]:
+        return iter(self._marks)

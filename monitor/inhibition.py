@@ -56,10 +56,6 @@ class CauseTable:
         held = self._held
         return tuple(name for name in self._closure[alarm_id] if name in held) if held else ()
 
-    def remembers(self, alarm_id: str) -> bool:
-        """Whether this alarm has ever held, so that `note` has something to follow even when it is at rest."""
-        return alarm_id in self._gone_at_s
-
     def clear(self) -> None:
         self._gone_at_s.clear()
         self._held_s = None

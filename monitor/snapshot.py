@@ -12,12 +12,11 @@ from monitor.gps_watch import GpsWatch
 from monitor.immutable import immutable
 from monitor.phones import NO_PHONE, PhoneView
 from monitor.rates import Rate
-from monitor.reading import Extent, Reading
+from monitor.reading import Extent, Reading, Unusable
 from monitor.shell_facts import LinkFacts, ReachFacts, RecorderFacts, SlowingFacts
 from monitor.signals import SIGNALS
 from monitor.slow_proof import NOTHING_SHOWN, SlowProof
 from monitor.tracks import TrackPoint
-from monitor.unusable import Unusable
 from monitor.values import (
     Acceleration,
     Bearing,

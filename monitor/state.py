@@ -12,7 +12,16 @@ from monitor.components import Components
 from monitor.derived_signals import SOURCES, DerivedSignals, forget
 from monitor.freeze_detection import Wheels
 from monitor.phones import PhoneReport, Phones
-from monitor.reading import Extent, Freshness, Reading, ReadingHistory, ReadingTable
+from monitor.reading import (
+    Extent,
+    Freshness,
+    Reading,
+    ReadingHistory,
+    ReadingTable,
+    Unusable,
+    with_unusable,
+    without_unusable,
+)
 from monitor.scan_shape import Scans
 from monitor.shell_facts import LinkFacts, Phase, ReachFacts, RecorderFacts, SlowingFacts
 from monitor.signal_stats import MeasuredRates, SignalStats, extend, keep
@@ -20,7 +29,6 @@ from monitor.signals import SIGNALS
 from monitor.slow_proof import ProofFollower
 from monitor.snapshot import NotFresh, ReceivedModes, Snapshot
 from monitor.tracks import TrackPoint
-from monitor.unusable import Unusable, refused, without
 from monitor.values import Diagnostics, DriveMode, GpsFix, LaserScan, Twist, Value
 
 __all__ = ["Extent", "Freshness", "LinkFacts", "NotFresh", "Phase", "Reading", "Snapshot", "State", "TrackPoint"]
@@ -84,7 +92,7 @@ class State:
             self._follow_clock(received_s)
         self._heard_s = received_s
         if signal in self._unusable:
-            self._unusable = without(self._unusable, signal)
+            self._unusable = without_unusable(self._unusable, signal)
         kind = type(value)
         if kind is Twist:
             self._wheels.add(received_s, value.speed_mps)  # type: ignore[union-attr, arg-type]
@@ -133,7 +141,7 @@ class State:
         meter = self._stats[signal].meter
         meter.receive(received_s)
         self._heard_s = received_s
-        self._unusable = refused(
+        self._unusable = with_unusable(
             self._unusable, signal, reason, received_s, meter.horizon_s, meter.period_s, is_declared=is_declared
         )
 

@@ -11,8 +11,6 @@ import math
 from monitor.check import Limits, threshold
 
 # The German regulation on remote driving (StVFernLV) accepts 200 ms at 50 km/h: that is 2.78 m.
-KEPT_M = 2.78
-LATE_ABOVE_S = 0.2
 HEADING = "Metres unseen"
 
 
@@ -52,14 +50,6 @@ def unseen_m(speed_mps: float | None, age_s: float | None, acceleration_mps2: fl
     found_m = abs(speed_mps) * age_s + acceleration_mps2 * age_s * age_s / 2
     is_known = math.isfinite(found_m) and math.isfinite(speed_mps) and age_s >= 0.0 and acceleration_mps2 > 0.0
     return found_m if is_known else None
-
-
-def kept_speed_mps(late_s: float | None) -> float | None:
-    """The constant speed at which the car drives KEPT_M while a value is on its way; None: it is on time, or that is
-    not known."""
-    if late_s is None or not LATE_ABOVE_S < late_s < math.inf:
-        return None
-    return KEPT_M / late_s
 
 
 def unseen_words(metres: float | None) -> str:

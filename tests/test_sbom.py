@@ -12,7 +12,7 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from server.web.assets.third_party import parts
+from server.web.routes.about import parts
 from tests.tree import PROJECT
 
 

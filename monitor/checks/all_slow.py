@@ -15,7 +15,7 @@ from monitor.check import (
     fault,
     ok,
 )
-from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
+from monitor.checks.signal_slow import GROUP, SignalLimits, SlowLimits, set_hz
 from monitor.signals import SIGNALS
 from monitor.snapshot import Snapshot
 

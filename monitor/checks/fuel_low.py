@@ -17,12 +17,12 @@ from monitor.check import (
     Quantity,
     Sound,
     absent,
+    beside,
     fault,
     ok,
     threshold,
     unknown,
 )
-from monitor.figures import beside
 from monitor.snapshot import Snapshot
 
 

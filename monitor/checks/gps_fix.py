@@ -19,12 +19,12 @@ from monitor.check import (
     Quantity,
     Sound,
     absent,
+    beside,
     fault,
     ok,
     threshold,
     unknown,
 )
-from monitor.figures import beside
 from monitor.snapshot import Snapshot
 from monitor.values import STATUS_UNSET
 

@@ -19,12 +19,12 @@ from monitor.check import (
     Quantity,
     Sound,
     absent,
+    beside,
     fault,
     ok,
     threshold,
     unknown,
 )
-from monitor.figures import beside
 from monitor.gps_watch import FIXES
 from monitor.motion import STANDS_BELOW_MPS
 from monitor.snapshot import Snapshot

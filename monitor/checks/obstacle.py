@@ -19,11 +19,11 @@ from monitor.check import (
     Sound,
     Verdict,
     absent,
+    beside,
     fault,
     ok,
     unknown,
 )
-from monitor.figures import beside
 from monitor.instruments import ObstacleLimits, stopping_m
 from monitor.obstacle_view import corridor_ahead, is_blind, look_ahead, sweep_ahead, tyre_angle_rad, why_unseen
 from monitor.scan import within_half_turn

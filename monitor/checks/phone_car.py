@@ -18,14 +18,14 @@ from monitor.check import (
     Quantity,
     Sound,
     absent,
+    beside,
     fault,
     ok,
     threshold,
     unknown,
 )
-from monitor.figures import beside
+from monitor.checks.phone_missing import name_of, why_text
 from monitor.motion import MOVES_ABOVE_MPS
-from monitor.phone_text import name_of, why_text
 from monitor.phones import FIX_LIVES_S
 from monitor.snapshot import Snapshot
 

@@ -21,13 +21,13 @@ from monitor.check import (
     Quantity,
     Sound,
     absent,
+    beside,
     fault,
     ok,
     threshold,
     unknown,
 )
 from monitor.compared import SIGMA_UNKNOWN_M, Other
-from monitor.figures import beside
 from monitor.geo import offset_m
 from monitor.reading import Reading
 from monitor.snapshot import Snapshot

@@ -26,10 +26,10 @@ from monitor.check import (
     ok,
     unknown,
 )
+from monitor.checks.signal_slow import GROUP, SignalLimits, SlowLimits
 from monitor.freeze_detection import Repeats
 from monitor.motion import MOVES_ABOVE_MPS
 from monitor.reading import Reading
-from monitor.signal_limits import GROUP, SignalLimits, SlowLimits
 from monitor.signals import SIGNALS, Signal
 from monitor.snapshot import Snapshot
 from monitor.values import GpsFix, LaserScan

@@ -20,13 +20,13 @@ from monitor.check import (
     ok,
     unknown,
 )
+from monitor.checks.car_silent import FALTERS_AT, is_heard, silence
+from monitor.checks.signal_slow import GROUP, SignalLimits, SlowLimits, set_hz
 from monitor.components import SELDOM_S
 from monitor.inhibition import GRACE_S
-from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
+from monitor.reading import Unusable
 from monitor.signals import SIGNALS, Signal
 from monitor.snapshot import Snapshot
-from monitor.staleness import FALTERS_AT, is_heard, silence
-from monitor.unusable import Unusable
 
 NEVER_AFTER_S = 5.0  # as long as the whole car is given for its first message
 

@@ -20,10 +20,10 @@ from monitor.check import (
     ok,
     unknown,
 )
+from monitor.checks.car_silent import CROWD, FAST_HORIZON_S
 from monitor.inhibition import GRACE_S
 from monitor.signals import SIGNALS, Signal
 from monitor.snapshot import Snapshot
-from monitor.staleness import CROWD, FAST_HORIZON_S
 
 AFTER_S = 1.0  # in a row: single odd messages are counted, not alarmed
 AT_LEAST = 2

@@ -16,12 +16,12 @@ from monitor.check import (
     Priority,
     Quantity,
     Sound,
+    beside,
     fault,
     ok,
     threshold,
     unknown,
 )
-from monitor.figures import beside
 from monitor.snapshot import Snapshot
 
 

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from server.access import pending_invitations, secret_file
+from server.access import invitations, secret_file
 from server.access.active_connections import ActiveConnections
 from server.access.credentials import Cookies, Keys, Tickets
 from server.access.devices import Device, Devices
@@ -104,20 +104,12 @@ class Access:
         """One more, for a device that an operator wants to pair."""
         return self._invitations.new(role, now_s=self._now())
 
-    def invite(self, role: Role = Role.OPERATOR) -> str:
-        """The token of the pairing link `https://HOST:PORT/#pair=TOKEN`."""
-        return self.invitation(role).token
-
-    def pin(self, role: Role = Role.OPERATOR) -> str:
-        """The six-digit PIN of the same invitation."""
-        return self.invitation(role).pin
-
     def listens_at(self, address: str) -> None:
         """`address`: where phones reach this server, `https://192.168.4.1:8000/`. Kept for `catgraph pair`."""
         self.address = address
         if self._folder is not None and not self.is_open:
             try:
-                pending_invitations.announce(self._folder, address)
+                invitations.announce_server(self._folder, address)
             except OSError as why:
                 log.warning("catgraph pair will not find this server: %s", why)
 
@@ -147,7 +139,7 @@ class Access:
         if self._folder is None:
             return
         now_s = self._now()
-        collect = partial(pending_invitations.collect, self._folder, now_s=now_s, wall_ms=self._wall_ms())
+        collect = partial(invitations.collect_invitations, self._folder, now_s=now_s, wall_ms=self._wall_ms())
         for invitation in collect() if self._storage is None else await self._storage.run(collect):
             self._invitations.add(invitation, now_s=now_s)
 
@@ -259,10 +251,6 @@ class Access:
         """The Set-Cookie for a device that was just paired."""
         return self._cookies.header(device.id, secret, is_secure=self.is_secure(scheme, host))
 
-    def no_cookie(self, *, scheme: str, host: str) -> str:
-        """The Set-Cookie that deletes it."""
-        return self._cookies.gone(is_secure=self.is_secure(scheme, host))
-
     def _read_cookie(self, headers: Mapping[str, str], scheme: str) -> tuple[str, str, bool] | None:
         is_secure = self.is_secure(scheme, headers.get("host", ""))
         return self._cookies.read(headers.get("cookie", ""), is_secure=is_secure)
@@ -287,7 +275,7 @@ class Access:
             self.devices.save_seen(now_ms=self._wall_ms())
         if self._folder is None:
             return
-        retire = partial(pending_invitations.retire, self._folder)
+        retire = partial(invitations.retire_server, self._folder)
         if self._storage is None:
             retire()
         else:
@@ -310,8 +298,3 @@ def _peer(address: str) -> str:
             return str(found.ipv4_mapped)
         return str(ipaddress.ip_network((found, 64), strict=False))
     return str(found)
-
-
-def this_task() -> object:
-    """The task that answers the request which is answered now."""
-    return asyncio.current_task()

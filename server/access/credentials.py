@@ -55,11 +55,6 @@ class Cookies:
         kept = f"Path=/; Max-Age={COOKIE_LASTS_S}; HttpOnly; SameSite=Strict"
         return f"{self.name(is_secure)}={value}; {kept}{'; Secure' if is_secure else ''}"
 
-    def gone(self, *, is_secure: bool) -> str:
-        """The value of Set-Cookie that deletes it."""
-        kept = "Path=/; Max-Age=0; HttpOnly; SameSite=Strict"
-        return f"{self.name(is_secure)}=; {kept}{'; Secure' if is_secure else ''}"
-
     def read(self, header: str, *, is_secure: bool) -> tuple[str, str, bool] | None:
         """Id, secret and whether the cookie is due for renewal; None: missing, forged or expired."""
         for part in header.split(";"):

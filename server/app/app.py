@@ -21,10 +21,10 @@ from server.web.middleware.headers import SecurityHeaders
 from server.web.middleware.methods import HeadAsGet
 from server.web.middleware.throttle import Throttle
 from server.web.routes import (
+    about,
     alarms,
     commands,
     devices,
-    docs,
     exports,
     log,
     logbook,
@@ -33,7 +33,6 @@ from server.web.routes import (
     marks,
     metrics,
     off_vehicles,
-    page_socket,
     pages,
     people,
     recorded_marks,
@@ -41,7 +40,6 @@ from server.web.routes import (
     settings,
     state,
     stored,
-    third_party,
 )
 
 # In the order in which the reference of the interface shows them. Their models are built once for all applications of a
@@ -54,7 +52,6 @@ for _module in (
     alarms,
     marks,
     settings,
-    page_socket,
     devices,
     people,
     log,
@@ -66,10 +63,10 @@ for _module in (
     mail,
     metrics,
     map,
-    third_party,
-    docs,
+    about,
 ):
     ROUTES.include_router(_module.router)
+ROUTES.include_router(pages.socket)
 
 
 def create_app(

@@ -6,12 +6,11 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from server.cli import broker_options
-from server.cli import serve as serve_command
+from server.cli import serve
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    broker_options.add_arguments(parser)
+    serve.add_broker_arguments(parser)
     parser.add_argument(
         "--require-signed",
         action=argparse.BooleanOptionalAction,
@@ -24,17 +23,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="take signed orders of the devices in this list only: a key and a name a line",
     )
-    serve_command.add_arguments(parser)
+    serve.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Serves until it is ended, with or without the broker; 2 when it cannot start."""
-    return serve_command.run_with(
+    return serve.run_with(
         lambda: replace(
-            serve_command.common_config(args),
-            vehicles=broker_options.named(serve_command.vehicles_of(args)),
+            serve.common_config(args),
+            vehicles=serve.ascii_names(serve.vehicles_of(args)),
             allowed_hosts=tuple(args.only),
-            broker=broker_options.read(args),
+            broker=serve.read_broker(args),
             requires_signed=args.require_signed,
             known_devices=args.known_devices,
         )

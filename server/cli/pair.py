@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from server.access import pending_invitations
+from server.access import invitations
 from server.access.access import FOLDER
 from server.access.identity import Role
 from server.access.invitations import LASTS_S
@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
     folder = args.data / FOLDER
     role = Role.VIEWER if args.viewer else Role.OPERATOR
     try:
-        address = pending_invitations.running(folder)
+        address = invitations.running_server(folder)
         if address is None:
             print(
                 f"catgraph: no server with pairing uses the data folder {args.data}. It does when it is "
@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
                 file=sys.stderr,
             )
             return 2
-        made = pending_invitations.lay(folder, role, wall_ms=time.time_ns() // 1_000_000)
+        made = invitations.lay_invitation(folder, role, wall_ms=time.time_ns() // 1_000_000)
     except OSError as why:
         reason = why.strerror or why
         print(f"catgraph: the data folder {args.data} cannot be used: {reason}. Ask its owner.", file=sys.stderr)

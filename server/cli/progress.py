@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import TextIO
 
 FIRST_AFTER_S = 0.5  # a short job shows nothing
 EVERY_S = 0.1
@@ -14,10 +13,10 @@ _WIDTH = 30
 class Progress:
     """Writes only to a terminal, and wipes its line in the end."""
 
-    def __init__(self, what: str, stream: TextIO | None = None) -> None:
+    def __init__(self, what: str) -> None:
         self._what = what
-        self._stream = sys.stderr if stream is None else stream
-        self._is_terminal = self._stream is not None and self._stream.isatty()  # None: it was closed
+        self._stream = sys.stderr  # None: it was closed
+        self._is_terminal = self._stream is not None and self._stream.isatty()
         self._started_s = time.monotonic()
         self._next_s = self._started_s + FIRST_AFTER_S
         self._shown = False

@@ -1,4 +1,4 @@
-"""`catgraph serve`: monitor cars and serve the page."""
+"""`catgraph serve`: monitor cars and serve the page; and the options that agents and web nodes have as well."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from urllib.parse import urlsplit
 
 from server.access.credentials import keys_from
 from server.app import store, tls_process
 from server.app.config import Config
 from server.app.process import CannotServe, add_common_arguments, serve
 from server.app.process import run as run_server
+from server.bus.broker import Broker
 from server.cli import logging
 from server.vehicle.vehicle import Vehicle, vehicle_from_text
 from server.web.maps import map_options
@@ -75,3 +79,44 @@ def run_with(make: Callable[[], Config]) -> int:
     except (CannotServe, ValueError) as why:
         print(f"catgraph: {why}", file=sys.stderr)
         return 2
+
+
+def add_broker_arguments(parser: argparse.ArgumentParser) -> None:
+    """`--broker`, `--key` and `--broker-ca` of agents and web nodes."""
+    parser.add_argument(
+        "--broker",
+        required=True,
+        metavar="tls://HOST:4222",
+        help="the NATS broker; nats://HOST:4222 without encryption",
+    )
+    parser.add_argument("--key", type=Path, metavar="FILE", help="the key that `catgraph fleet add` printed")
+    parser.add_argument(
+        "--broker-ca",
+        type=Path,
+        metavar="FILE",
+        help="the certificate (PEM) that signed the broker's (default: those of the system)",
+    )
+
+
+def read_broker(args: argparse.Namespace) -> Broker:
+    """What the options of `add_broker_arguments` state. Raises ValueError with one sentence."""
+    if find_spec("nats") is None or find_spec("nkeys") is None:
+        raise ValueError("The client of the broker is not installed: pip install 'catgraph[fleet]'.")
+    try:
+        address = urlsplit(args.broker)
+        is_one = address.scheme in ("nats", "tls") and address.hostname and (address.port or True)
+    except ValueError:
+        is_one = False
+    if not is_one:
+        raise ValueError(f"“{args.broker[:80]}” is no address of a broker: use tls://HOST:4222 or nats://HOST:4222.")
+    if args.broker_ca is not None and not args.broker.startswith("tls:"):
+        raise ValueError("--broker-ca has no effect without tls://.")
+    return Broker(address=args.broker, key=args.key, authority=args.broker_ca)
+
+
+def ascii_names(vehicles: tuple[Vehicle, ...]) -> tuple[Vehicle, ...]:
+    """As they are, where each has a name of ASCII that the broker can carry. Raises ValueError with one sentence."""
+    for vehicle in vehicles:
+        if not vehicle.name.isascii():
+            raise ValueError(f"At a broker the name of a vehicle is of ASCII letters: “{vehicle.name}” is not.")
+    return vehicles

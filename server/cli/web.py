@@ -6,12 +6,11 @@ import argparse
 from dataclasses import replace
 
 from server.app.process import add_common_arguments
-from server.cli import broker_options, logging
-from server.cli import serve as serve_command
+from server.cli import logging, serve
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    broker_options.add_arguments(parser)
+    serve.add_broker_arguments(parser)
     parser.add_argument(
         "--expect",
         action="append",
@@ -32,11 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serves until it is ended; 2 when it cannot start."""
-    return serve_command.run_with(
+    return serve.run_with(
         lambda: replace(
-            serve_command.common_config(args),
+            serve.common_config(args),
             vehicles=(),
-            broker=broker_options.read(args),
+            broker=serve.read_broker(args),
             is_node=True,
             expected=tuple(args.expect),
             forgotten=tuple(args.forget),

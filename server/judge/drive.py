@@ -14,12 +14,11 @@ from server.judge.message import Json, RosVersion
 from server.judge.recorded_events import NewSettings, RecordedEvents
 from server.judge.recording_survey import RecordedTransforms, Surveyed, survey
 from server.judge.ros_names import BadName, canonical_name
+from server.judge.run_state import ClockStep
 from server.judge.settings import BadSetting
-from server.judge.sources import survey as source_survey
 from server.judge.sources.candidates import follow
 from server.judge.sources.choice import Choice, choose
-from server.judge.sources.evidence import Evidence
-from server.judge.stamp_steps import ClockStep
+from server.judge.sources.evidence import Evidence, gather
 from server.judge.topics import Source
 from server.judge.unit_evidence import Evidence as UnitEvidence
 from server.judge.unit_watch import Key, UnitBasis
@@ -237,5 +236,5 @@ class Drive:
                 name for topic, name in self._names.items() if getattr(found[topic], "count", 1) == 0
             )
             if evidence.is_to_gather:
-                self.evidence = source_survey.survey(self._source, self._names, evidence)
+                self.evidence = gather(self._source, self._names, evidence)
         return self.evidence

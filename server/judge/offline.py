@@ -9,18 +9,25 @@ from copy import deepcopy
 from typing import Any
 
 from monitor.alarm import Transition
+from monitor.checks.signal_slow import expected_rates
 from monitor.phones import PhoneReport
 from monitor.restoring import restore
 from monitor.runner import Monitor, Refused
-from monitor.signal_limits import expected_rates
 from monitor.state import LinkFacts, State
 from monitor.trends import Trends
 from server.judge import pipeline
 from server.judge.drive import Drive, MessageSource, Row, SettingsEpoch
 from server.judge.pipeline import TICK_S
 from server.judge.reception_stats import Reception
-from server.judge.recorded_answers import answered
-from server.judge.recorded_events import ChosenPhone, NewSettings, OwnerChange, Pause, SlowDownEvent, StopChange
+from server.judge.recorded_events import (
+    ChosenPhone,
+    NewSettings,
+    OwnerChange,
+    Pause,
+    SlowDownEvent,
+    StopChange,
+    answered,
+)
 from server.judge.run_state import RunState
 from server.judge.unit_watch import UnitWatch
 from server.judge.units import Unit

@@ -12,6 +12,8 @@ from monitor.alarm import Transition
 from monitor.checks.slow_down import SlowDownLimits
 from monitor.phones import PhoneReport
 from monitor.planned_stop import PlannedStop
+from monitor.response import SHELVE_AT_MOST_MIN
+from monitor.runner import Monitor
 from monitor.shell_facts import SlowingFacts
 from server.protocol import serialize
 from server.protocol.slow_down_state import SlowDownOrder, SlowDownPhase, SlowDownState
@@ -233,3 +235,24 @@ class RecordedEvents:
     settings: str | None = None  # that were in force at its start; None: unknown
     clock_was_set: bool = False  # of the server, while it recorded
     notes: tuple[str, ...] = field(default=())
+
+
+def answered(monitor: Monitor, event: Transition, now_s: float) -> tuple[Transition, ...]:
+    """Do again what an operator did about an alarm then, to the alarms of a re-evaluation: what it brings about here.
+
+    Raises Refused.
+    """
+    alarm_id, by = event.alarm_id, event.by or ""
+    match event.change:
+        case "acknowledged":
+            return monitor.acknowledge(alarm_id, event.occurrence, by, now_s)
+        case "silenced":
+            return monitor.silence(alarm_id, event.occurrence, by, now_s)
+        case "shelved" if event.shelved_until_s is not None:
+            minutes = min((event.shelved_until_s - now_s) / 60, SHELVE_AT_MOST_MIN)  # the log has whole ms
+            return monitor.shelve(alarm_id, event.occurrence, minutes, by, now_s)
+        case "unshelved":
+            return monitor.unshelve(alarm_id, by, now_s)
+        case "handed_over" | "unacknowledged":
+            return monitor.take_over(alarm_id, by, now_s, is_read_back=event.change == "handed_over")
+    return ()

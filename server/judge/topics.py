@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 from server.judge.signals import TOPICS
-from server.judge.sources.choice import choose
 from server.judge.sources.source import BY_SIGNAL, COMMAND, Source, plain_type
 from server.protocol.questions import TopicOffer
 
-__all__ = ["BY_SIGNAL", "COMMAND", "Source", "candidates", "could_carry", "map_signals", "plain_type", "ros_version"]
+__all__ = ["BY_SIGNAL", "COMMAND", "Source", "candidates", "could_carry", "plain_type", "ros_version"]
 
 
 def ros_version(types: Mapping[str, str]) -> int | None:
@@ -31,14 +30,6 @@ def candidates(found: Mapping[str, str]) -> dict[str, list[TopicOffer]]:
         ]
         fitting[row.signal] = [{"topic": name, "type": kind} for _, name, kind in sorted(rows)]
     return fitting
-
-
-def map_signals(
-    found: Mapping[str, str], chosen: Mapping[str, str] | None = None, unpublished: Collection[str] = ()
-) -> dict[str, Source]:
-    """Signal → Source for a car's topics (topic → type), by names and types alone; see `sources.choice.choose`.
-    `chosen` are the operator's choices, signal → topic."""
-    return dict(choose(found, chosen, unpublished).sources)
 
 
 def could_carry(found: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> set[str]:

@@ -282,7 +282,16 @@ _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discrimin
 
 
 class NotUnderstood(ValueError):
-    """The command does not fit its model; `str()` is one sentence."""
+    """A command or an order does not fit its model; `str()` is one sentence."""
+
+    @classmethod
+    def of(cls, error: ValidationError, *, whole: str, no_such: str) -> NotUnderstood:
+        """From the first fault that pydantic found; `whole`: what it is called where the fault is in no field."""
+        first = error.errors(include_url=False, include_context=False, include_input=False)[0]
+        if first["type"] in ("union_tag_invalid", "union_tag_not_found"):
+            return cls(no_such)
+        where = ".".join(str(part) for part in first["loc"][1:]) or whole
+        return cls(f"{where}: {first['msg']}.")
 
 
 def comes_within_s(message: Mapping[str, Any]) -> float | None:
@@ -321,8 +330,4 @@ def read(command: Any) -> Command:
     try:
         return _COMMANDS.validate_python(command)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False, include_input=False)[0]
-        if first["type"] in ("union_tag_invalid", "union_tag_not_found"):
-            raise NotUnderstood(NO_SUCH) from None
-        where = ".".join(str(part) for part in first["loc"][1:]) or "the command"
-        raise NotUnderstood(f"{where}: {first['msg']}.") from None
+        raise NotUnderstood.of(error, whole="the command", no_such=NO_SUCH) from None

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from typing_extensions import TypedDict
 
-from monitor.alarm_marks import AlarmMark
+from monitor.alarm import AlarmMark
 from monitor.alarm_spec import Priority
 from monitor.drive_trends import DriveTrends, Span
 from monitor.signals import CHARTED, SIGNALS

@@ -109,12 +109,6 @@ class TrashList(TypedDict):
     all: Total
 
 
-class StoredMedia(TypedDict):
-    """A voice note or a photo was stored."""
-
-    ok: bool
-
-
 class MapLayer(TypedDict):
     """Tiles below the map."""
 

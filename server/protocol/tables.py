@@ -17,8 +17,7 @@ from server.protocol.answers import Answers
 from server.protocol.command_base import OF_PAGE, Prompt
 from server.protocol.commands import BY_KIND
 from server.protocol.messages import Message
-from server.protocol.page_messages import PageMessage
-from server.protocol.replay_commands import ReplayOrder
+from server.protocol.page_messages import PageMessage, ReplayOrder
 from server.protocol.signal_state import SignalState
 
 COMMAND = "Command"  # ends the names of commands here: `Record` and `Set` have another meaning in TypeScript

@@ -15,8 +15,7 @@ from collections.abc import Callable, Sequence
 from types import MappingProxyType
 from typing import Any, cast
 
-from monitor.alarm import Transition
-from monitor.alarm_marks import AlarmMarks
+from monitor.alarm import AlarmMarks, Transition
 from monitor.catalog import CHECKS
 from monitor.drive_trends import DriveTrends
 from monitor.state import State

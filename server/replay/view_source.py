@@ -11,7 +11,7 @@ import orjson
 
 from server.bus.bus import ALL, Frame, NotServed, PageBus
 from server.protocol.messages import FrameKind
-from server.protocol.replay_commands import OpenBeside, OpenReplay, ReplayOrder
+from server.protocol.page_messages import OpenBeside, OpenReplay, ReplayOrder
 from server.protocol.state import LiveSummary, ServerState
 from server.replay.manager import NoReplay, ReplayClient, ReplayManager, summary
 

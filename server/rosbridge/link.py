@@ -11,6 +11,8 @@ versions in `ASSUMPTIONS`, which lists each assumption; each has its own test. W
 
 from __future__ import annotations
 
+import asyncio
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -20,11 +22,10 @@ from server.rosbridge.connection_errors import Problem
 from server.rosbridge.dialer import RosClient
 from server.rosbridge.frame_reader import Answer, FrameReader, InvalidFrame, Publish, Status, TooLarge
 from server.rosbridge.link_listener import LinkListener, Marks, SafeCalls
-from server.rosbridge.live_source import LinkDown, NoWebSocket
+from server.rosbridge.live_source import CallFailed, LinkDown, NoWebSocket, Refusal
 from server.rosbridge.outgoing import NotAllowed, Outgoing
 from server.rosbridge.raw_frame import RawFrame, topic_of
 from server.rosbridge.sent_rows import SentRows
-from server.rosbridge.service_calls import ServiceCalls
 from server.rosbridge.subscription import Subscription, operation_of
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES, BridgeProtocol
 from server.system.clean_text import short_text
@@ -41,6 +42,7 @@ ASSUMPTIONS = {
 }
 
 FLUSH_S = 0.2
+MAX_PENDING_CALLS = 64
 
 
 class RosLink:
@@ -286,3 +288,52 @@ def _problem_of_end(socket: BridgeProtocol, address: Address, *, has_sent: bool)
     if socket.is_dismissed and not socket.has_spoken and has_sent:
         return connection_errors.login_wanted(address)
     return connection_errors.closed_by_bridge(address, short_text(socket.remoteCloseReason, 200))
+
+
+class ServiceCalls:
+    """Calls of services whose answers come on the same connection; of one link.
+
+    `send` writes an operation at once; raises LinkDown, NotAllowed.
+    """
+
+    def __init__(self, send: Callable[[dict[str, Any]], None]) -> None:
+        self._send = send
+        self._pending: dict[str, asyncio.Future[Any]] = {}
+        self._ids = itertools.count(1)
+
+    async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any:
+        """The values a service answers. Raises LinkDown, also where the link breaks before the answer, or CallFailed
+        with the bridge's text."""
+        if len(self._pending) >= MAX_PENDING_CALLS:
+            raise CallFailed("too many calls are unanswered")
+        identity = f"call:{service}:{next(self._ids)}"
+        answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        try:
+            self._send({"op": "call_service", "id": identity, "service": service, "args": arguments or {}})
+        except NotAllowed as why:
+            raise CallFailed(f"not sent: {why}") from None
+        self._pending[identity] = answer
+        try:
+            async with asyncio.timeout(timeout_s):
+                return await answer
+        except TimeoutError:
+            raise CallFailed(f"{service} did not answer within {timeout_s:g} s") from None
+        finally:
+            self._pending.pop(identity, None)
+
+    def answered(self, operation: dict[str, Any]) -> None:
+        """Resolve the call that a `service_response` belongs to."""
+        identity = operation.get("id")
+        answer = self._pending.get(identity) if isinstance(identity, str) else None
+        if answer is None or answer.done():
+            return  # late: the caller has given up
+        if operation.get("result") is False:
+            answer.set_exception(Refusal(short_text(operation.get("values"), 300)))
+        else:
+            answer.set_result(operation.get("values"))
+
+    def fail_all(self, why: str) -> None:
+        """No answer comes any more."""
+        for answer in list(self._pending.values()):
+            if not answer.done():
+                answer.set_exception(LinkDown(why))

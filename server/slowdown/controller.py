@@ -18,9 +18,8 @@ from server.protocol.slow_down_state import SlowDownState
 from server.rosbridge.live_source import CommandChannel
 from server.slowdown.command_target import CommandTarget
 from server.slowdown.countdown import Countdown
-from server.slowdown.frame import facts, slow_down_frame
 from server.slowdown.guard_client import GuardClient
-from server.slowdown.order import BY_HAND, DESERTED_S, SlowDown
+from server.slowdown.order import BY_HAND, DESERTED_S, SlowDown, slow_down_frame, slowing_facts
 from server.slowdown.order_log import OrderLog, Response, commanded, never_raising, recording_safely
 from server.slowdown.sender import MeasuredCar, Sender
 
@@ -264,7 +263,7 @@ class SlowDownController:
     # -- what others see ---------------------------------------------------------------------------------------------
 
     def _facts(self) -> SlowingFacts:
-        return facts(self._life, self.sender.target, self.competing_publishers)
+        return slowing_facts(self._life, self.sender.target, self.competing_publishers)
 
     def frame(self) -> SlowDownState:
         """The `decelerate` of a state frame."""

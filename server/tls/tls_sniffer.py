@@ -16,7 +16,7 @@ import ssl
 from collections import Counter
 from collections.abc import Callable
 
-from server.web.middleware import http_protocol
+from server.system import loopback
 
 log = logging.getLogger("catgraph.tls")
 
@@ -83,7 +83,7 @@ class TlsSniffer:
 
     def _has_too_many(self, address: str) -> bool:
         """A handshake that does not come to its end is a connection like any other. This machine's are not counted."""
-        return not http_protocol.is_loopback(address) and self._from[address] + self._connected(address) >= self._most
+        return not loopback.is_loopback(address) and self._from[address] + self._connected(address) >= self._most
 
     async def _enter(self, sock: socket.socket) -> None:
         sock.setblocking(False)

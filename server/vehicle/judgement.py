@@ -6,13 +6,12 @@ import logging
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
-from monitor.alarm import Transition
-from monitor.alarm_marks import AlarmMarks
+from monitor.alarm import AlarmMarks, Transition
 from monitor.catalog import AnyCheck
+from monitor.checks.signal_slow import expected_rates
 from monitor.drive_trends import DriveTrends
 from monitor.load import AlarmLoad, RecentLoad
 from monitor.runner import Monitor
-from monitor.signal_limits import expected_rates
 from monitor.state import Snapshot, State
 from monitor.transport import TransportDelay
 from monitor.trends import CheckMinute, Trends

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from monitor.agreement import phone_sigma_m
-from monitor.phone_text import why_text
+from monitor.checks.phone_missing import why_text
 from monitor.phones import PhoneView
 from monitor.state import Snapshot
 from server.protocol import serialize

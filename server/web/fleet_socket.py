@@ -1,4 +1,4 @@
-"""The connection of a page of all cars, from its acceptance to its end, and its writer; see docs/protocol.md.
+"""The connection of a page of all cars, from its acceptance to its end, its writer, its commands; see docs/protocol.md.
 
 The writer offers frames, at most one of them unanswered, and sends replies and what happened to items.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import orjson
@@ -16,18 +16,118 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from server.access.identity import Principal
 from server.access.people import NOBODY, People
 from server.bus.bus import ALL, PageBus
-from server.protocol import messages
+from server.control import display_name
+from server.protocol import commands, messages
 from server.protocol.messages import Hello
-from server.protocol.rate_limit import Limits
+from server.protocol.rate_limit import Allowance, Limits
 from server.web import page_inbox
 from server.web.cars_board import FLEET, CarsBoard
 from server.web.fair_wakeup import FairWakeup
-from server.web.fleet_commands import FleetCommands
 from server.web.fleet_log import FleetLog
+from server.web.page_commands import LEAVES, NO_HELLO, NOT_A_VIEWERS, TOO_MANY, Announcements, passed_on
 from server.web.page_inbox import PageInbox
 from server.web.page_sender import PageSender
-from server.web.page_socket import GOING_AWAY
 from server.web.page_writer import MAX_REPLIES
+
+NOT_FROM_HERE = "Open the car's own page for this."
+UNNAMED = "Name the car that is meant."
+PAGE_ONLY = {"announces", "id", "kind"}  # of a status: not for the cars
+
+
+class FleetCommands:
+    """Has each command of one page carried out by the session of the car that it names.
+
+    `send` queues a reply; `complain` counts a message that is invalid, and answers why.
+    """
+
+    def __init__(
+        self,
+        bus: PageBus,
+        principal: Principal,
+        limits: Limits,
+        *,
+        now: Callable[[], float],
+        send: Callable[[messages.ToPage], None],
+        complain: Callable[[str], None],
+        people: People = NOBODY,
+    ) -> None:
+        self._bus = bus
+        self._now = now
+        self._send = send
+        self._complain = complain
+        self._sender = PageSender(principal, people, signs=bus.grows)
+        self._orders = Allowance(limits.commands, now())
+        self._announcements = Announcements(bus)
+
+    @property
+    def sender(self) -> PageSender:
+        return self._sender
+
+    def begin(self, message: Mapping[str, Any]) -> None:
+        """The page's hello."""
+        self._sender.begin(message)
+        self.send_duty()
+
+    def send_duty(self) -> None:
+        """Send the page who is on duty, after its hello."""
+        if self._sender.has_begun:
+            self._send(self._sender.duty)
+
+    async def command(self, message: dict[str, Any]) -> None:
+        """Has the session of the car carry out a command, and answers."""
+        id = message.get("id")
+        if not isinstance(id, str) or len(id) > 80:
+            self._complain("A command needs an id of at most 80 characters.")
+            return
+        vehicle = message.get("vehicle")
+        reason = self._refusal(message.get("kind"), vehicle)
+        if reason is not None or not isinstance(vehicle, str):
+            self._send(messages.refusal(id, reason or UNNAMED))
+            return
+        order = message | self._sender.as_json()
+        self._send(messages.reply(id, await passed_on(self._bus, vehicle, order, fleet=True)))
+
+    def _refusal(self, kind: object, vehicle: object) -> str | None:
+        """Why a command does not reach a session; None: it does."""
+        if not self._sender.is_operator:
+            return NOT_A_VIEWERS
+        if not self._sender.has_begun:
+            return NO_HELLO
+        command = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
+        if command is None:
+            return commands.NO_SUCH
+        if not self._orders.takes(self._now()):
+            return TOO_MANY
+        if not command.from_fleet:
+            return NOT_FROM_HERE
+        if not isinstance(vehicle, str) or not vehicle:
+            return UNNAMED
+        if vehicle not in self._bus.vehicles:
+            return f"No car is named {display_name.clean(vehicle)}."
+        return None
+
+    async def present(self, message: Mapping[str, Any]) -> None:
+        """Pass on the page's status, once a second, to every car: without a reply, not of a viewer's page, and not
+        before its hello: it would be counted under another id."""
+        if not self._sender.is_operator or not self._sender.has_begun:
+            return
+        self._sender.note_key(message)
+        try:
+            command = commands.read(message)
+        except commands.NotUnderstood as why:
+            self._complain(str(why))
+            return
+        status = command.model_dump(exclude=PAGE_ONLY)
+        self._announcements.forward(status, self._sender.as_json(), () if status["leaves"] else self._bus.vehicles)
+
+    async def leave(self) -> None:
+        """The page is closed: it is not counted on to announce alarms any more."""
+        await self._announcements.forwarded()
+        await self.present(LEAVES)
+        await self._announcements.forwarded()
+
+    async def close(self) -> None:
+        await self._announcements.close()
 
 
 class FleetWriter:
@@ -189,24 +289,13 @@ class FleetPage:
             leave_people()
             await self._commands.close()
 
+        read = self._inbox.serve(
+            self._socket, self._handle, is_full=lambda: self._writer.is_full, on_leave=self._commands.leave
+        )
         try:
-            await page_inbox.run_tasks(
-                self._socket, read=self._read(), write=self._writer.run(self._hello), leave=leave
-            )
+            await page_inbox.run_tasks(self._socket, read=read, write=self._writer.run(self._hello), leave=leave)
         finally:
             self._writer.close()
-
-    async def _read(self) -> None:
-        while not self._inbox.is_hopeless and not self._writer.is_full:
-            received = await self._inbox.receive(self._socket)
-            if received["type"] == "websocket.disconnect":
-                if received.get("code") == GOING_AWAY:
-                    await self._commands.leave()
-                return
-            message = self._inbox.read(received.get("text"))
-            if message is not None:
-                await self._handle(message)
-        await self._socket.close(code=1008, reason="too many invalid messages")
 
     async def _handle(self, message: dict[str, Any]) -> None:
         match message.get("kind"):

@@ -11,7 +11,7 @@ from starlette.websockets import WebSocket
 from server.access.identity import LOCAL, Principal
 from server.access.people import NOBODY, People
 from server.bus.bus import PageBus
-from server.protocol import replay_commands
+from server.protocol import page_messages
 from server.protocol.cars_state import OffOnPurpose
 from server.protocol.messages import Hello
 from server.protocol.rate_limit import Limits
@@ -75,7 +75,7 @@ class Hub:
         hello: Callable[[], Hello],
         *,
         principal: Principal,
-        replay: replay_commands.OpenReplay | None = None,
+        replay: page_messages.OpenReplay | None = None,
     ) -> None:
         """Serves one page until it leaves; `replay`: the recording it begins with."""
         if await self._accept(socket, principal):

@@ -12,7 +12,7 @@ from fastapi import FastAPI
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.json_schema import models_json_schema
 
-from server.access.rules import Needs, needs_of
+from server.access.identity import Needs, needs_of
 
 PROBLEM_TYPE = "application/problem+json"
 _SCHEMAS = "#/components/schemas/"

@@ -5,18 +5,17 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from server.access.identity import Principal
 from server.access.people import NOBODY, People
 from server.bus.bus import NotServed, PageBus
-from server.protocol import commands, messages, replay_commands
+from server.protocol import commands, messages, page_messages
 from server.protocol.rate_limit import Allowance, Limits
 from server.replay.manager import NoReplay
 from server.replay.view_source import ViewSource
 from server.system import log_context
-from server.web.announcements import LEAVES, Announcements
 from server.web.page_sender import PageSender
 
 log = logging.getLogger("catgraph.web")
@@ -153,19 +152,19 @@ class PageCommands:
             self._send(messages.refusal(id, TOO_MANY))
             return
         try:
-            order = replay_commands.read(message)
-        except replay_commands.NotUnderstood as why:
+            order = page_messages.read_replay_order(message)
+        except commands.NotUnderstood as why:
             self._send(messages.refusal(id, str(why)))
             return
         match order:
-            case replay_commands.OpenReplay() | replay_commands.OpenBeside() if self._is_opening:
+            case page_messages.OpenReplay() | page_messages.OpenBeside() if self._is_opening:
                 self._send(messages.refusal(id, "A recording is already being opened."))
-            case replay_commands.OpenReplay() | replay_commands.OpenBeside():
+            case page_messages.OpenReplay() | page_messages.OpenBeside():
                 self.open_replay(order, id)
-            case replay_commands.CloseBeside():
+            case page_messages.CloseBeside():
                 await self._view.close_beside()
                 self._send(messages.reply(id, {"ok": True}))
-            case replay_commands.LeaveReplay():
+            case page_messages.LeaveReplay():
                 await self._view.leave()
                 self._send(messages.reply(id, {"ok": True}))
             case _:
@@ -175,18 +174,16 @@ class PageCommands:
     def _is_opening(self) -> bool:
         return self._opening is not None and not self._opening.done()
 
-    def open_replay(
-        self, order: replay_commands.OpenReplay | replay_commands.OpenBeside, id: str | None = None
-    ) -> None:
+    def open_replay(self, order: page_messages.OpenReplay | page_messages.OpenBeside, id: str | None = None) -> None:
         """Open a recording, which takes a second; meanwhile the page continues with live data.
 
         `id` None: the recording is from the page's address, and only an error is sent.
         """
         self._opening = asyncio.create_task(self._open(id, order), name="open a replay")
 
-    async def _open(self, id: str | None, order: replay_commands.OpenReplay | replay_commands.OpenBeside) -> None:
+    async def _open(self, id: str | None, order: page_messages.OpenReplay | page_messages.OpenBeside) -> None:
         try:
-            if isinstance(order, replay_commands.OpenBeside):
+            if isinstance(order, page_messages.OpenBeside):
                 await self._view.open_beside(order)
             else:
                 await self._view.open(order)
@@ -212,3 +209,54 @@ class PageCommands:
             return id
         self._complain("A command needs an id of at most 80 characters.")
         return None
+
+
+LEAVES = {"kind": "present", "visible": False, "sound": "asks", "awake": "asks", "leaves": True}
+FORWARD_WITHIN_S = 1.0  # to another car whose alarms this page announces
+AT_ONCE = 8  # cars; between them others on the loop have their turn
+
+
+class Announcements:
+    """What one page that announces the alarms of other cars reports to their sessions."""
+
+    def __init__(self, bus: PageBus) -> None:
+        self._bus = bus
+        self._announced: set[str] = set()  # cars whose alarms it announces
+        self._forwarding: asyncio.Task[None] | None = None
+
+    def forward(self, status: Mapping[str, Any], sender: Mapping[str, Any], cars: Collection[str]) -> None:
+        """Pass a page's status on to the cars whose alarms it announces, and once to those that it did.
+
+        Meanwhile the page is served: another car may be lost.
+        """
+        if self._forwarding is not None and not self._forwarding.done():
+            return  # the page states it every second
+        now = set(cars)
+        before, self._announced = self._announced, now
+        statuses = {
+            vehicle: {**status, "kind": "announces", "leaves": vehicle not in now, **sender} for vehicle in now | before
+        }
+        if statuses:
+            self._forwarding = asyncio.create_task(self._forward_all(statuses), name="announce")
+
+    async def _forward_all(self, statuses: Mapping[str, Mapping[str, Any]]) -> None:
+        async def forward_to(vehicle: str, status: Mapping[str, Any]) -> None:
+            with contextlib.suppress(NotServed):
+                await self._bus.request(vehicle, status, deadline_s=FORWARD_WITHIN_S)
+
+        async with asyncio.TaskGroup() as group:
+            for number, (vehicle, status) in enumerate(statuses.items(), 1):
+                group.create_task(forward_to(vehicle, status))
+                if number % AT_ONCE == 0:
+                    await asyncio.sleep(0)
+
+    async def forwarded(self) -> None:
+        """Wait until it was passed on."""
+        if self._forwarding is not None:
+            await asyncio.gather(self._forwarding, return_exceptions=True)
+
+    async def close(self) -> None:
+        """End what is being passed on."""
+        if self._forwarding is not None:
+            self._forwarding.cancel()
+            await self.forwarded()

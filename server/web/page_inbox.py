@@ -20,6 +20,7 @@ from server.protocol.rate_limit import MAX_DEPTH, Allowance, Limits, nests_deepe
 
 log = logging.getLogger("catgraph.hub")
 MAX_COMPLAINTS = 200  # a page that sends nothing sensible is closed
+GOING_AWAY = 1001  # a browser closes so when its page is closed, and not when its phone falls asleep (RFC 6455, 7.4.1)
 LONGEST_SLOW_DOWN = 400  # letters of an order to slow the car
 
 _GONE = (WebSocketDisconnect, RuntimeError, OSError)  # it left, perhaps while something was being sent
@@ -52,6 +53,30 @@ class PageInbox:
             return await socket.receive()
         finally:
             self._waits_s = None
+
+    async def serve(
+        self,
+        socket: WebSocket,
+        handle: Callable[[dict[str, Any]], Awaitable[None]],
+        *,
+        is_full: Callable[[], bool],
+        on_leave: Callable[[], Awaitable[None]],
+    ) -> None:
+        """Hand each message of the page to `handle` until its connection ends.
+
+        Closed is a page that sends too many invalid messages, or requests without reading replies (`is_full`).
+        `on_leave` is called where the browser closed the page.
+        """
+        while not self.is_hopeless and not is_full():
+            received = await self.receive(socket)
+            if received["type"] == "websocket.disconnect":
+                if received.get("code") == GOING_AWAY:
+                    await on_leave()
+                return
+            message = self.read(received.get("text"))
+            if message is not None:
+                await handle(message)
+        await socket.close(code=1008, reason="too many invalid messages")
 
     def complain(self, reason: str) -> None:
         self._complaints += 1

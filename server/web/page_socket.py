@@ -10,7 +10,7 @@ from starlette.websockets import WebSocket
 from server.access.identity import Principal
 from server.access.people import NOBODY, People
 from server.bus.bus import PageBus
-from server.protocol import replay_commands
+from server.protocol import page_messages
 from server.protocol.messages import Hello
 from server.protocol.rate_limit import Limits
 from server.protocol.state import ServerState
@@ -23,8 +23,6 @@ from server.web.page_commands import PageCommands
 from server.web.page_inbox import PageInbox
 from server.web.page_sender import PageSender
 from server.web.page_writer import PageWriter
-
-GOING_AWAY = 1001  # a browser closes so when its page is closed, and not when its phone falls asleep (RFC 6455, 7.4.1)
 
 
 class Page:
@@ -45,7 +43,7 @@ class Page:
         wall_ms: Callable[[], int],
         wakeup: FairWakeup,
         cars: CarsBoard,
-        replay: replay_commands.OpenReplay | None = None,
+        replay: page_messages.OpenReplay | None = None,
         people: People = NOBODY,
     ):
         """`wakeup`: of all pages, for what is new to all. `replay`: the recording with which the page begins."""
@@ -108,25 +106,14 @@ class Page:
             leave_people()
             await self._commands.close()
 
+        read = self._inbox.serve(
+            self._socket, self._handle, is_full=lambda: self._writer.is_full, on_leave=self._commands.leave
+        )
         try:
-            await page_inbox.run_tasks(
-                self._socket, read=self._read(), write=self._writer.run(self._hello), leave=leave
-            )
+            await page_inbox.run_tasks(self._socket, read=read, write=self._writer.run(self._hello), leave=leave)
         finally:
             self._writer.close()
             await self._view.leave()
-
-    async def _read(self) -> None:
-        while not self._inbox.is_hopeless and not self._writer.is_full:
-            received = await self._inbox.receive(self._socket)
-            if received["type"] == "websocket.disconnect":
-                if received.get("code") == GOING_AWAY:
-                    await self._commands.leave()
-                return
-            message = self._inbox.read(received.get("text"))
-            if message is not None:
-                await self._handle(message)
-        await self._socket.close(code=1008, reason="too many invalid messages")
 
     async def _handle(self, message: dict[str, Any]) -> None:
         match message.get("kind"):

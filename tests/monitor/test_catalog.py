@@ -11,8 +11,8 @@ from monitor import catalog
 from monitor.alarm_spec import Action, Place, Priority, Sound
 from monitor.catalog import CHECKS, AllLimits, AnyCheck
 from monitor.check import OK, Check, Limits, Scope, threshold
+from monitor.checks.signal_slow import expected_rates
 from monitor.runner import IMPAIRED_SPEC, Monitor
-from monitor.signal_limits import expected_rates
 from monitor.signals import SIGNALS
 from tests.monitor.test_alarm import SPEC
 

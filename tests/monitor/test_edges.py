@@ -12,16 +12,15 @@ from monitor.alarm import Alarm
 from monitor.alarm_spec import Priority
 from monitor.car_clock import AHEAD_S, CONTRADICTION_S, IN_TIME_S, SAME_JUMP_S, SAMPLES, CarClock, StampedDelay, merged
 from monitor.catalog import AllLimits, changed
+from monitor.checks.signal_slow import expected_rates, set_hz
 from monitor.components import FORGOTTEN_AFTER_S, ONE_INTERVAL_S, SILENT_AFTER_S, Components
 from monitor.freeze_detection import Repeats
 from monitor.inhibition import CauseTable, standing, suppressed, table_of
 from monitor.instruments import ObstacleLimits, stopping_m, time_gap_s
 from monitor.motion import Slope
 from monitor.obstacle_view import corridor_ahead
-from monitor.reading import AT_MOST_S, BEFORE_S, Reading, ReadingHistory
-from monitor.signal_limits import expected_rates, set_hz
+from monitor.reading import AT_MOST_S, BEFORE_S, Reading, ReadingHistory, Unusable, with_unusable, without_unusable
 from monitor.snapshot import NotFresh
-from monitor.unusable import Unusable, refused, without
 from monitor.values import Component, Diagnostics, Steering, Twist
 from tests.monitor.checks.known import known
 from tests.monitor.test_alarm import BAD, SPEC
@@ -63,8 +62,6 @@ def test_two_inhibitors_of_one_alarm_both_explain_it_and_so_do_theirs() -> None:
     for name in ("one", "two", "root"):
         table.note(alarm(name, condition=True), 1.0)
     assert table.holding("effect", 1.0) == ("one", "root", "two")
-    assert table.remembers("two")
-    assert not table.remembers("effect")
     spec = replace(SPEC, inhibited_by=("cause",))
     of = table_of([alarm("cause", condition=True), replace(alarm("effect"), spec=spec)])
     of.note(alarm("cause", condition=True), 1.0)
@@ -139,15 +136,15 @@ def test_stamps_that_step_back_count_again_after_the_next_answer() -> None:
 
 
 def test_unusable_messages_are_counted_in_a_row() -> None:
-    one = refused({}, "speed", "x is not a number", 1.0, 0.5, 0.1)
+    one = with_unusable({}, "speed", "x is not a number", 1.0, 0.5, 0.1)
     assert dict(one) == {
         "speed": Unusable(reason="x is not a number", at_s=1.0, since_s=1.0, count=1, horizon_s=0.5, period_s=0.1)
     }
-    two = refused(one, "speed", "no field x", 2.0, 0.5, None)
+    two = with_unusable(one, "speed", "no field x", 2.0, 0.5, None)
     assert two["speed"] == Unusable(reason="no field x", at_s=2.0, since_s=1.0, count=2, horizon_s=0.5, period_s=None)
-    both = refused(two, "brake", "no field x", 3.0, 0.5, None)
+    both = with_unusable(two, "brake", "no field x", 3.0, 0.5, None)
     assert (both["brake"].count, both["speed"].count) == (1, 2)
-    assert set(without(both, "speed")) == {"brake"}
+    assert set(without_unusable(both, "speed")) == {"brake"}
     assert [two["speed"].is_coming(now_s) for now_s in (2.5, 2.501)] == [True, False]
 
 
@@ -160,7 +157,7 @@ def test_unusable_messages_are_counted_in_a_row() -> None:
     ],
 )
 def test_the_reason_as_it_follows_a_name(reason: str, text: str) -> None:
-    assert replace(refused({}, "speed", reason, 1.0, 0.5, None)["speed"]).text == text
+    assert replace(with_unusable({}, "speed", reason, 1.0, 0.5, None)["speed"]).text == text
 
 
 @pytest.mark.parametrize(
@@ -318,7 +315,7 @@ def test_why_a_value_is_not_there(
 ) -> None:
     snapshot = known(age_s=age_s, speed=Twist(speed_mps=3.0) if has_value else None)
     if is_unusable:
-        snapshot = replace(snapshot, unusable=refused({}, "speed", "x is not a number", 100.0, 1.0, None))
+        snapshot = replace(snapshot, unusable=with_unusable({}, "speed", "x is not a number", 100.0, 1.0, None))
     if why is None:
         assert snapshot.need("speed").speed_mps == 3.0
         return

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from monitor.figures import beside
+from monitor.check import beside
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ import pytest
 from monitor import catalog
 from monitor.alarm import AlarmState
 from monitor.catalog import CHECKS, AllLimits
+from monitor.checks.signal_slow import expected_rates
 from monitor.runner import Monitor
-from monitor.signal_limits import expected_rates
 from monitor.values import Diagnostics, Twist
 from tests.monitor.drive import REAL_HZ, Drive
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from monitor.catalog import AllLimits, flat, schema
-from monitor.unseen import KEPT_M, LATE_ABOVE_S, kept_speed_mps, unseen_m, unseen_words
+from monitor.unseen import unseen_m, unseen_words
 
 TABLE = json.loads(Path(__file__).with_name("unseen.json").read_text(encoding="utf-8"))
 SPEEDS = st.floats(-60.0, 60.0)
@@ -45,7 +45,6 @@ def test_what_is_not_known_is_not_zero(odd: float | None) -> None:
     assert unseen_m(1.0, odd, 3.0) is None
     assert unseen_m(1.0, 1.0, odd) is None
     assert unseen_m(odd, 0.0, 3.0) is None
-    assert kept_speed_mps(odd) is None
     assert unseen_words(None) == "metres unseen not known"
 
 
@@ -57,22 +56,11 @@ def test_words_are_never_less_than_the_bound(metres: float) -> None:
     assert metres <= shown_m <= metres + {"m": 1.0, "km": 100.1}[unit]
 
 
-@given(st.floats(LATE_ABOVE_S, 60.0, exclude_min=True))
-def test_the_proposed_speed_keeps_the_metres(late_s: float) -> None:
-    kept_mps = kept_speed_mps(late_s)
-    assert kept_mps is not None
-    assert kept_mps * late_s == pytest.approx(KEPT_M)
-    assert kept_speed_mps(LATE_ABOVE_S) is None
-
-
 def test_the_page_counts_as_the_server_does() -> None:
     """tests/page/unseen.test.js reads the same table."""
-    assert (KEPT_M, LATE_ABOVE_S) == (TABLE["kept_m"], TABLE["late_above_s"])
     for speed_mps, age_s, limit, metres, text in TABLE["ways"]:
         assert unseen_m(speed_mps, age_s, limit) == metres
         assert unseen_words(metres) == text
-    for late_s, kept_mps in TABLE["kept"]:
-        assert kept_speed_mps(late_s) == kept_mps
 
 
 def test_the_proposal_is_a_setting_that_is_off_by_default() -> None:

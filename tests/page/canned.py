@@ -28,7 +28,7 @@ from server.vehicle.car_departure import CarDeparture
 from server.vehicle.departure_file import DepartureFile
 from server.web.assets.bundle import find
 from server.web.assets.static_files import StaticText
-from server.web.compression import PageSocket
+from server.web.middleware.http_protocol import PageSocket
 from server.web.routes.pages import PageFiles
 from server.web.routes.recordings import listed_formats
 from tests.page.canned_drive import CannedDrive

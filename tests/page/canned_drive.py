@@ -6,7 +6,7 @@ import math
 import time
 from typing import Any
 
-from monitor.alarm_marks import AlarmMark
+from monitor.alarm import AlarmMark
 from monitor.alarm_spec import Priority
 from monitor.catalog import AllLimits, changed
 from monitor.drive_trends import DriveTrends

@@ -16,7 +16,7 @@ from server.analysis.faults import Faults
 from server.judge import pipeline, profiles
 from server.judge.comparisons import comparison_sources
 from server.judge.reception_stats import Reception
-from server.judge.topics import map_signals
+from server.judge.sources.choice import choose
 from server.simulator.car import SimulatedCar
 from server.simulator.scenarios import Planned
 
@@ -49,7 +49,7 @@ def judged(
     bridge = Faults([one for one in plan if one.scenario.bridge is not None])
     car = SimulatedCar(seed=seed, plan=own)
     offered = {p.topic: p.type for p in car.published}
-    chosen = map_signals(offered)
+    chosen = choose(offered).sources
     kind = profiles.choose(profiles.load(), offered, 1)  # its pedals have the unit of their kind of car
     sources = pipeline.by_topic((*chosen.values(), *comparison_sources(offered, chosen)))
     monitor = Monitor(limits=catalog.changed(AllLimits(), limits or {}))

@@ -17,7 +17,7 @@ from server.judge import pipeline
 from server.judge.phone_report import phone_report
 from server.judge.profiles import GENERIC, Profile
 from server.judge.reception_stats import Reception
-from server.judge.topics import map_signals
+from server.judge.sources.choice import choose
 from server.protocol import commands
 from server.simulator.car import SimulatedCar
 from server.simulator.lap import metres_per_degree
@@ -115,7 +115,7 @@ def ride(
     car = SimulatedCar(seed=seed, plan=plan)
     sources = pipeline.by_topic(
         source
-        for source in map_signals({p.topic: p.type for p in car.published}).values()
+        for source in choose({p.topic: p.type for p in car.published}).sources.values()
         if source.signal in ("speed", "position")
     )
     checks = [check for check in CHECKS if check.id in WATCHED]

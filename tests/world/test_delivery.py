@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from server.cli import doctor
-from server.judge.topics import could_carry, map_signals
+from server.judge.sources import choice
+from server.judge.topics import could_carry
 from server.recording.recorded_topics import choose
 from server.vehicle.delivery import AT_ONCE, Delivery
 from server.vehicle.discovery import Offer
@@ -249,7 +250,7 @@ FOUND = {
 
 @pytest.mark.world(n=9)
 def test_a_signal_is_mapped_to_a_topic_with_a_publisher() -> None:
-    sources = map_signals(FOUND, {}, {"/catvehicle/vel", "/fix_of_drone", "/fuel"})
+    sources = choice.choose(FOUND, {}, {"/catvehicle/vel", "/fix_of_drone", "/fuel"}).sources
     assert sources["speed"].topic == "/vel"
     assert sources["speed"].decode is not None
     for signal, topic in (("position", "/fix_of_drone"), ("fuel", "/fuel")):
@@ -259,15 +260,15 @@ def test_a_signal_is_mapped_to_a_topic_with_a_publisher() -> None:
 
 @pytest.mark.world(n=9)
 def test_a_topic_that_the_operator_picked_is_kept_and_explained() -> None:
-    sources = map_signals(FOUND, {"speed": "/catvehicle/vel"}, {"/catvehicle/vel"})
+    sources = choice.choose(FOUND, {"speed": "/catvehicle/vel"}, {"/catvehicle/vel"}).sources
     assert (sources["speed"].topic, sources["speed"].decode) == ("/catvehicle/vel", None)
     assert sources["speed"].note == "no node publishes it"
-    assert map_signals(FOUND, {"speed": "/catvehicle/vel"}, set())["speed"].decode is not None
+    assert choice.choose(FOUND, {"speed": "/catvehicle/vel"}, set()).sources["speed"].decode is not None
 
 
 @pytest.mark.world(n=9)
 def test_the_car_is_commanded_where_it_listens_though_nobody_publishes_there() -> None:
-    source = map_signals(FOUND, {}, {"/catvehicle/cmd_vel"})["command"]
+    source = choice.choose(FOUND, {}, {"/catvehicle/cmd_vel"}).sources["command"]
     assert (source.topic, source.type, source.decode) == ("/catvehicle/cmd_vel", "geometry_msgs/Twist", None)
 
 

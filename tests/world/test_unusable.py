@@ -9,7 +9,7 @@ from monitor.values import Effort, Twist
 from server.judge import pipeline
 from server.judge.profiles import GENERIC
 from server.judge.reception_stats import Reception
-from server.judge.topics import map_signals
+from server.judge.sources.choice import choose
 from tests.monitor.drive import REAL_HZ, Drive
 
 pytestmark = pytest.mark.world(n=7)
@@ -55,7 +55,7 @@ def test_a_message_that_cannot_be_used_is_counted_as_one_that_came() -> None:
     state = State()
     state.link(LinkFacts(phase="monitoring", since_s=0.0, connected_s=0.0, published=frozenset({"speed"})))
     reception = Reception()
-    sources = tuple(map_signals({"/vel": "geometry_msgs/Twist"}).values())
+    sources = tuple(choose({"/vel": "geometry_msgs/Twist"}).sources.values())
     for n in range(100):
         pipeline.receive(
             sources,

@@ -1,12 +1,17 @@
-"""What the messages of candidate topics show of them: frames, velocities, poses, and whether they agree. Pure."""
+"""What the messages of candidate topics show of them: frames, velocities, poses, and whether they agree. Pure.
+
+`gather` reads parts of a recording for it, before the recording is judged.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from itertools import islice
+from typing import Any, Protocol
 
 from monitor.values import LaserScan
+from server.judge.message import Json
 from server.judge.message_fields import Rejected, inner, number, stamp_s, text
 from server.judge.signals.scan import laser_scan
 from server.judge.signals.speed import SIDEWAYS
@@ -249,3 +254,72 @@ class Evidence:
 
     def _near(self, at_s: float, within_s: float) -> Iterable[TopicEvidence]:
         return (t for t in self._topics.values() if t.velocity is not None and at_s - t.velocity[0] <= within_s)
+
+
+# Where it reads, as parts of the length: a car may stand still at the beginning, for minutes.
+PLACES = (0.0, 0.03, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
+WINDOW_S = 15.0
+MOST_ROWS = 6000  # of all topics, in one place
+MOST_TAKEN = 1000  # of the topics that compete, in one place
+
+
+Row = tuple[float, str, str, Json]
+
+
+class Rows(Protocol):
+    """Messages with their times, as `server.judge.drive.MessageSource`."""
+
+    start_s: float
+    duration_s: float
+
+    def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]: ...
+
+
+def gather(source: Rows, names: Mapping[str, str], evidence: Evidence) -> Evidence:
+    """Lets the messages of the topics that the evidence follows count, until they are enough.
+
+    `names`: topic as the recording spells it → as a bridge would.
+    """
+    followed = evidence.followed
+    wanted = frozenset(name for name, offered in names.items() if offered in followed)
+    rejected: dict[str, int] = getattr(source, "rejected", {})
+    before = dict(rejected)
+    for part in PLACES:
+        if part and source.duration_s * part < WINDOW_S:
+            continue
+        if _read_window(source, source.duration_s * part, names, wanted, evidence):
+            break
+    rejected.clear()
+    rejected.update(before)
+    return evidence
+
+
+def _read_window(
+    source: Rows, at_s: float, names: Mapping[str, str], wanted: frozenset[str], evidence: Evidence
+) -> bool:
+    """Reads on from one place for a while; whether all is known."""
+    end_s = source.start_s + at_s + WINDOW_S
+    taken = 0
+    for row_s, topic, _, message in islice(_rows_until_damage(source, at_s, wanted), MOST_ROWS):
+        if row_s > end_s or taken >= MOST_TAKEN:
+            break
+        if topic in wanted:
+            taken += 1
+            if evidence.receive(names[topic], message, row_s) and evidence.is_enough:
+                return True
+    return evidence.is_enough
+
+
+def _rows_until_damage(source: Rows, at_s: float, wanted: frozenset[str]) -> Iterator[Row]:
+    """Messages up to the first unreadable one; the run that judges the recording reports the error."""
+    rows = source.rows(at_s, wanted)
+    while True:
+        try:
+            row = next(rows, None)
+        except MemoryError:
+            raise
+        except Exception:  # readers of damaged files fail in every way there is
+            return
+        if row is None:
+            return
+        yield row

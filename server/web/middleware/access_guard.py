@@ -16,8 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.access.access import Access, Admitted
 from server.access.active_connections import ActiveConnection
-from server.access.identity import SCOPE_KEY
-from server.access.rules import Needs, is_enough, needs_of
+from server.access.identity import SCOPE_KEY, Needs, is_enough, needs_of
 from server.web.middleware.errors import problem
 
 ENDED = 4401  # the code with which a socket of a device is closed that may not go on as it was

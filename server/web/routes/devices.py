@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Annotated, Any
 
 import segno
@@ -9,7 +10,6 @@ from fastapi import APIRouter, Body, HTTPException, Path, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from server.access.access import NotPaired
-from server.access.access import this_task as answering
 from server.access.credentials import TICKET_LASTS_S as TICKET_LASTS_S
 from server.access.devices import Device
 from server.access.identity import Principal, Role, principal_of
@@ -142,7 +142,7 @@ async def invite(request: Request, body: Annotated[InviteRequest, Body()]) -> In
 )
 async def change(request: Request, id: DeviceId, body: Annotated[DeviceChange, Body()]) -> DeviceRow:
     try:
-        device = await services(request).access.change(id, role=body.role, name=body.name, but=answering())
+        device = await services(request).access.change(id, role=body.role, name=body.name, but=asyncio.current_task())
     except OSError as why:
         raise HTTPException(503, f"{_NOT_KEPT}: {why.strerror or why}.") from None
     return _listed(request, _there(device))
@@ -158,7 +158,7 @@ async def remove(request: Request, id: DeviceId) -> Done:
     access = services(request).access
     who = principal_of(request)
     try:
-        _there(await access.remove(id, by="itself" if who.id == id else who.name, but=answering()))
+        _there(await access.remove(id, by="itself" if who.id == id else who.name, but=asyncio.current_task()))
     except OSError as why:
         detail = f"Its access ended, but it returns after a restart. {_NOT_KEPT}: {why.strerror or why}."
         raise HTTPException(503, detail) from None

@@ -6,22 +6,24 @@ import hashlib
 import json
 import logging
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
-from fastapi import APIRouter, FastAPI, Request
+from fastapi import APIRouter, FastAPI, Request, WebSocket
 from fastapi.responses import HTMLResponse, Response
 from fastapi.templating import Jinja2Templates
 from markupsafe import Markup
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse
 
-from server.access.identity import is_known
+from server.access.identity import is_known, principal_of
+from server.protocol import page_messages
+from server.protocol.messages import Hello, Identity, RoleName
 from server.system.page_files import check_vendor, static_dir, templates_dir
 from server.web.assets.bundle import EARLY, ENTRY, FLEET_ENTRY, FLEET_STYLES, STYLES, Built, find
 from server.web.assets.icons import FOLDER as DRAWN
 from server.web.assets.icons import WITHOUT, are_drawn
-from server.web.assets.manifest import manifest as manifest_of
+from server.web.assets.icons import manifest as manifest_of
 from server.web.assets.service_worker import OFFLINE, WORKER, Shell, build_of, shell_of, withdrawn
 from server.web.assets.static_files import StaticText, answer, packed
 from server.web.middleware.headers import policy_of
@@ -181,3 +183,36 @@ def _install_routes(files: PageFiles) -> APIRouter:
         return FileResponse(path, media_type="image/png", headers={"Cache-Control": "no-cache"})
 
     return router
+
+
+socket = APIRouter()
+
+
+@socket.websocket("/ws")
+async def page_socket(
+    socket: WebSocket,
+    vehicle: str | None = None,
+    replay: str | None = None,
+    t: str | None = None,
+    fleet: str | None = None,
+) -> None:
+    """The page's socket; docs/protocol.md. `replay`: the recording it begins with, `t` seconds after its beginning.
+    `fleet` "1": of a page of all cars."""
+    app = services(socket)
+    principal = principal_of(socket)
+    role: RoleName = "operator" if principal.is_operator else "viewer"
+    name = vehicle if vehicle is not None else next(iter(app.vehicles), None)
+    if fleet != "1" and (name is None or not app.may_be(name)):
+        await socket.close(code=1008, reason="no such vehicle")
+        return
+    with app.access.next_ticket(principal) as ticket:
+
+        def hello(name: str) -> Hello:
+            who: Identity = {"id": principal.id, "name": principal.name, "role": role}
+            return {**app.hello(name), "who": who, "ticket": ticket}
+
+        if fleet == "1" or name is None:
+            await app.hub.serve_fleet(socket, partial(hello, ""), principal=principal)
+        else:
+            opening = page_messages.opening(replay, t)
+            await app.hub.serve(socket, name, partial(hello, name), principal=principal, replay=opening)

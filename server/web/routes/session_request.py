@@ -35,6 +35,7 @@ VehicleName = Annotated[str | None, Query(description="Which vehicle; the first 
 MeantVehicle = Annotated[
     str | None, Query(description="Which vehicle; required where there are several", max_length=40)
 ]
+TOML = "application/toml"
 OF_VEHICLE = raises(404, 409, 422, 503)  # of a route that sends a request to a session, as `ask` raises them
 ReplayToken = Annotated[str | None, Query(description="Of a page's replay, as its state names it", max_length=40)]
 
@@ -142,3 +143,12 @@ async def ask_either(
 
 def as_json(body: Any) -> Response:
     return Response(orjson.dumps(body), media_type="application/json")
+
+
+def as_toml(text: str, name: str) -> Response:
+    """A file of this name to keep."""
+    return Response(
+        text,
+        media_type=f"{TOML}; charset=utf-8",
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )

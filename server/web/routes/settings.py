@@ -11,8 +11,7 @@ from server.protocol import commands
 from server.protocol.answers import SettingsAnswer
 from server.web.interface import files, takes
 from server.web.routes.commands import body_of
-from server.web.routes.session_request import OF_VEHICLE, VehicleName, as_json, ask, vehicle_of
-from server.web.routes.state import TOML
+from server.web.routes.session_request import OF_VEHICLE, TOML, VehicleName, as_json, as_toml, ask, vehicle_of
 from server.web.services import services
 
 router = APIRouter(tags=["settings"], responses=OF_VEHICLE)
@@ -43,12 +42,7 @@ async def change_settings(
 )
 async def export_settings(request: Request, vehicle: VehicleName = None) -> Response:
     body = await ask(request, vehicle, {"kind": "settings"})
-    name = f"catgraph-{vehicle_of(services(request), vehicle)}.toml"
-    return Response(
-        body["toml"],
-        media_type=f"{TOML}; charset=utf-8",
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
+    return as_toml(body["toml"], f"catgraph-{vehicle_of(services(request), vehicle)}.toml")
 
 
 @router.put(

@@ -20,11 +20,21 @@ from server.protocol.http_answers import Health, Track, VehicleList, VehicleRow
 from server.protocol.state import LiveState, Trends
 from server.web.interface import files
 from server.web.middleware.errors import Problem
-from server.web.routes.session_request import OF_VEHICLE, ReplayToken, VehicleName, as_json, ask, ask_either, vehicle_of
+from server.web.routes.session_request import (
+    OF_VEHICLE,
+    TOML,
+    ReplayToken,
+    VehicleName,
+    as_json,
+    as_toml,
+    ask,
+    ask_either,
+    vehicle_of,
+)
 from server.web.services import Services, services
 
 router = APIRouter()
-TOML = "application/toml"
+of_vehicle = APIRouter(tags=["vehicle"], responses=OF_VEHICLE)
 AGENT_WITHIN_S = 1.0  # an agent that has not answered then is called lost
 COUNTED_WITHIN_S = 2.0  # a health check must work while the disk hangs
 
@@ -99,44 +109,36 @@ async def vehicles(request: Request) -> VehicleList:
     }
 
 
-@router.get(
+@of_vehicle.get(
     "/api/state",
     response_model=LiveState,
-    responses=OF_VEHICLE,
-    tags=["vehicle"],
     summary="Everything known of a vehicle now",
 )
 async def state(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json(await ask(request, vehicle, {"kind": "state"}))
 
 
-@router.get(
+@of_vehicle.get(
     "/api/signals",
     response_model=SignalsAnswer,
-    responses=OF_VEHICLE,
-    tags=["vehicle"],
     summary="Topics for each signal and beyond, what was rejected and why",
 )
 async def signals(request: Request, vehicle: VehicleName = None, replay: ReplayToken = None) -> Response:
     return as_json(await ask_either(request, vehicle, replay, {"kind": "signals"}))
 
 
-@router.get(
+@of_vehicle.get(
     "/api/driving",
     response_model=DrivingAnswer,
-    responses=OF_VEHICLE,
-    tags=["vehicle"],
     summary="Time and distance in each mode, interventions and alarms a km",
 )
 async def driving(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json(await ask(request, vehicle, {"kind": "driving"}))
 
 
-@router.get(
+@of_vehicle.get(
     "/api/interventions/{intervention}",
     response_model=InterventionAnswer,
-    responses=OF_VEHICLE,
-    tags=["vehicle"],
     summary="One intervention, with the 16 s about it",
 )
 async def intervention(
@@ -145,50 +147,38 @@ async def intervention(
     return as_json(await ask(request, vehicle, {"kind": "intervention", "intervention": intervention}))
 
 
-@router.get(
+@of_vehicle.get(
     "/api/departure",
     response_model=DepartureAnswer,
-    responses=OF_VEHICLE,
-    tags=["vehicle"],
     summary="The departure check: its list, what became of it, who signed",
 )
 async def departure(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json(await ask(request, vehicle, {"kind": "departure"}))
 
 
-@router.get(
+@of_vehicle.get(
     "/api/departure.toml",
     response_class=Response,
-    responses=OF_VEHICLE | files(TOML),
-    tags=["vehicle"],
+    responses=files(TOML),
     summary="The list of the departure check, as a TOML file",
 )
 async def departure_list(request: Request, vehicle: VehicleName = None) -> Response:
     body = await ask(request, vehicle, {"kind": "departure"})
-    name = f"{vehicle_of(services(request), vehicle)}.departure.toml"
-    return Response(
-        body["toml"],
-        media_type=f"{TOML}; charset=utf-8",
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
+    return as_toml(body["toml"], f"{vehicle_of(services(request), vehicle)}.departure.toml")
 
 
-@router.get(
+@of_vehicle.get(
     "/api/track",
     response_model=Track,
-    responses=OF_VEHICLE,
-    tags=["vehicle"],
     summary="The track since connecting, as GeoJSON",
 )
 async def track(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json(await ask(request, vehicle, {"kind": "track"}))
 
 
-@router.get(
+@of_vehicle.get(
     "/api/track/points",
     response_model=TrackPoints,
-    responses=OF_VEHICLE,
-    tags=["vehicle"],
     summary="The track's points beyond one, with their numbers",
 )
 async def track_points(
@@ -200,11 +190,9 @@ async def track_points(
     return as_json(await ask_either(request, vehicle, replay, {"kind": "track_points", "after": after}))
 
 
-@router.get(
+@of_vehicle.get(
     "/api/trends",
     response_model=Trends,
-    responses=OF_VEHICLE,
-    tags=["vehicle"],
     summary="The last minute of speed, pedals, steering and distance",
 )
 async def trends(
@@ -216,11 +204,9 @@ async def trends(
     return as_json(await ask_either(request, vehicle, replay, {"kind": "trends", "after": after}))
 
 
-@router.get(
+@of_vehicle.get(
     "/api/trends/drive",
     response_model=DriveTrendsAnswer,
-    responses=OF_VEHICLE,
-    tags=["vehicle"],
     summary="Signals over the whole drive, lowest and highest in buckets",
 )
 async def drive_trends(
@@ -244,3 +230,6 @@ async def drive_trends(
         raise Problem(422, "The range ends before it begins.", field="to_s")
     wanted = {"signals": names, "from_s": from_s, "to_s": to_s, "buckets": buckets}
     return as_json(await ask_either(request, vehicle, replay, {"kind": "drive_trends", **wanted}))
+
+
+router.include_router(of_vehicle)

@@ -19,10 +19,10 @@ from monitor.car_clock import ClockJump
 from monitor.catalog import CHECKS
 from monitor.check import Finding
 from monitor.phones import Why
+from monitor.reading import Unusable
 from monitor.shell_facts import ReachFacts
 from monitor.slow_proof import SlowProof
 from monitor.snapshot import Snapshot
-from monitor.unusable import Unusable
 from monitor.values import Bearing, Effort, Level, Twist
 from tests.monitor.checks.known import ask, known
 from tests.monitor.checks.test_obstacle import before, estimated

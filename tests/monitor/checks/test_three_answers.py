@@ -19,10 +19,10 @@ from monitor.check import Verdict
 from monitor.freeze_detection import Repeats
 from monitor.gps_watch import GpsWatch
 from monitor.rates import Rate
+from monitor.reading import Unusable
 from monitor.shell_facts import LinkFacts, ReachFacts, RecorderFacts, SlowingFacts
 from monitor.slow_proof import SlowProof
 from monitor.state import Reading, Snapshot
-from monitor.unusable import Unusable
 from monitor.values import (
     Component,
     Diagnostics,

@@ -51,7 +51,7 @@ class Served:
     async def paired(self, role: Role, name: str = "Pixel 7") -> AsyncIterator[httpx.AsyncClient]:
         """A browser that was paired; its cookie is in it."""
         async with self.browser() as browser:
-            answer = await browser.post("/api/pair", json={"token": self.access.invite(role), "name": name})
+            answer = await browser.post("/api/pair", json={"token": self.access.invitation(role).token, "name": name})
             assert answer.status_code == 200, answer.text
             yield browser
 

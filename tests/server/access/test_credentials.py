@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from server.access import pending_invitations, secret_file
+from server.access import invitations, secret_file
 from server.access.credentials import BadKey, Cookies, Tickets, keys_from, keys_of
 from server.access.identity import Role
 from server.access.invitations import FEW, LASTS_S, MANY, MOST_STANDING, Invitations, PinThrottle
@@ -53,7 +53,7 @@ async def test_the_terminal_shows_the_same_until_it_is_used_or_old() -> None:
     paired: list[tuple[str, Role]] = []
     access.on_paired = lambda name, role: paired.append((name, role))
     first = access.invitation()
-    assert (access.invite(), access.pin()) == (first.token, first.pin)
+    assert (access.invitation().token, access.invitation().pin) == (first.token, first.pin)
     await access.pair(token=first.token, pin=None, name="Pixel", peer="10.0.0.9")
     assert paired == [("Pixel", Role.OPERATOR)]
     second = access.invitation()
@@ -218,30 +218,30 @@ def test_under_tls_the_cookie_is_bound_to_this_host() -> None:
 
 
 def test_an_invitation_laid_into_the_folder_is_taken_once_and_grows_old(tmp_path: Path) -> None:
-    laid = pending_invitations.lay(tmp_path, Role.VIEWER, wall_ms=1_000_000)
-    found = pending_invitations.collect(tmp_path, now_s=50.0, wall_ms=1_060_000)
+    laid = invitations.lay_invitation(tmp_path, Role.VIEWER, wall_ms=1_000_000)
+    found = invitations.collect_invitations(tmp_path, now_s=50.0, wall_ms=1_060_000)
     assert [(one.token, one.pin, one.role, one.until_s) for one in found] == [
         (laid.token, laid.pin, Role.VIEWER, 590.0)
     ]
-    assert pending_invitations.collect(tmp_path, now_s=50.0, wall_ms=1_060_000) == []
-    pending_invitations.lay(tmp_path, Role.VIEWER, wall_ms=1_000_000)
-    assert pending_invitations.collect(tmp_path, now_s=50.0, wall_ms=1_600_000) == []
-    pending_invitations.lay(tmp_path, Role.VIEWER, wall_ms=9_000_000)  # from the future: ten minutes, not more
-    assert pending_invitations.collect(tmp_path, now_s=50.0, wall_ms=1_600_000)[0].until_s == 650.0
+    assert invitations.collect_invitations(tmp_path, now_s=50.0, wall_ms=1_060_000) == []
+    invitations.lay_invitation(tmp_path, Role.VIEWER, wall_ms=1_000_000)
+    assert invitations.collect_invitations(tmp_path, now_s=50.0, wall_ms=1_600_000) == []
+    invitations.lay_invitation(tmp_path, Role.VIEWER, wall_ms=9_000_000)  # from the future: ten minutes, not more
+    assert invitations.collect_invitations(tmp_path, now_s=50.0, wall_ms=1_600_000)[0].until_s == 650.0
     (tmp_path / "waiting" / "x.json").write_text('{"token": "short", "pin": "1"}')
-    assert pending_invitations.collect(tmp_path, now_s=50.0, wall_ms=0) == []
+    assert invitations.collect_invitations(tmp_path, now_s=50.0, wall_ms=0) == []
     assert list((tmp_path / "waiting").iterdir()) == []
 
 
 def test_a_server_that_ended_is_not_found(tmp_path: Path) -> None:
-    assert pending_invitations.running(tmp_path) is None
-    pending_invitations.announce(tmp_path, "https://192.168.4.1:8000/")
-    assert pending_invitations.running(tmp_path) == "https://192.168.4.1:8000/"
+    assert invitations.running_server(tmp_path) is None
+    invitations.announce_server(tmp_path, "https://192.168.4.1:8000/")
+    assert invitations.running_server(tmp_path) == "https://192.168.4.1:8000/"
     secret_file.write(tmp_path / "running.json", {"pid": 2**22 + 1, "address": "https://x/"})
-    assert pending_invitations.running(tmp_path) is None
-    pending_invitations.announce(tmp_path, "https://x/")
-    pending_invitations.retire(tmp_path)
-    assert pending_invitations.running(tmp_path) is None
+    assert invitations.running_server(tmp_path) is None
+    invitations.announce_server(tmp_path, "https://x/")
+    invitations.retire_server(tmp_path)
+    assert invitations.running_server(tmp_path) is None
 
 
 # -- keys --------------------------------------------------------------------------------------------------------------
@@ -285,7 +285,10 @@ def test_keys_come_from_the_environment_or_from_files_for_one_user(tmp_path: Pat
     ("host", "is_own"),
     [
         *((own, True) for own in ("127.0.0.1", "127.8.9.1", "::1", "localhost", "LOCALHOST", "::ffff:127.0.0.1")),
-        *((far, False) for far in ("0.0.0.0", "::", "192.168.4.1", "", "localhost.example", "127.1", "car")),
+        *(
+            (far, False)
+            for far in ("0.0.0.0", "::", "192.168.4.1", "", "localhost.example", "127.1", "car", "fe80::1%eth0")
+        ),
     ],
 )
 def test_what_is_this_machine_alone(host: str, is_own: bool) -> None:

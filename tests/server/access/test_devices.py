@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from server.access import pending_invitations, secret_file
+from server.access import invitations, secret_file
 from server.access.devices import FORGOTTEN_AFTER_MS, MOST, Devices
 from server.access.identity import Role
 from server.storage.storage_thread import StorageThread
@@ -21,9 +21,9 @@ from tests.server.access.pairs import access_of, config
 async def test_only_the_hash_of_a_secret_is_on_the_disk_and_only_for_the_servers_user(tmp_path: Path) -> None:
     os.umask(0)
     access = access_of(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 1000)
-    device, secret = await access.pair(token=access.invite(), pin=None, name="Pixel", peer="")
+    device, secret = await access.pair(token=access.invitation().token, pin=None, name="Pixel", peer="")
     access.listens_at("http://192.168.4.1:8000/")
-    pending_invitations.lay(tmp_path / "access", Role.VIEWER, wall_ms=0)
+    invitations.lay_invitation(tmp_path / "access", Role.VIEWER, wall_ms=0)
     files = [path for path in (tmp_path / "access").rglob("*") if path.is_file()]
     assert {path.name for path in files} >= {"devices.json", "running.json"}
     assert [oct(path.stat().st_mode & 0o777) for path in files] == ["0o600"] * len(files)
@@ -95,7 +95,7 @@ async def test_names_are_distinguished_and_the_list_is_bounded(tmp_path: Path) -
 
 async def test_a_device_that_cannot_be_kept_is_not_paired(tmp_path: Path) -> None:
     access = access_of(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 0)
-    token = access.invite()
+    token = access.invitation().token
     with unwritable(tmp_path), pytest.raises(IsADirectoryError):
         await access.pair(token=token, pin=None, name="Pixel", peer="")
     assert access.devices.all() == []
@@ -135,7 +135,7 @@ async def test_paired_is_answered_once_the_disk_has_the_device(tmp_path: Path) -
     disk = HangingDisk()
     access = access_of(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 0, storage=disk.storage)
     async with disk:
-        pairing = asyncio.create_task(access.pair(token=access.invite(), pin=None, name="Pixel", peer=""))
+        pairing = asyncio.create_task(access.pair(token=access.invitation().token, pin=None, name="Pixel", peer=""))
         done, _ = await asyncio.wait([pairing], timeout=0.05)
         assert not done
         assert Devices(tmp_path / "access").all() == []
@@ -148,7 +148,7 @@ async def test_paired_is_answered_once_the_disk_has_the_device(tmp_path: Path) -
 async def test_who_is_removed_is_out_before_the_disk_answers_and_stays_out(tmp_path: Path) -> None:
     disk = HangingDisk()
     access = access_of(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 0, storage=disk.storage)
-    device, secret = await access.pair(token=access.invite(), pin=None, name="Lost", peer="")
+    device, secret = await access.pair(token=access.invitation().token, pin=None, name="Lost", peer="")
     cookie = access.cookie(device, secret, scheme="https", host="localhost").partition(";")[0]
     headers = {"host": "localhost", "cookie": cookie}
     assert access.known(headers, scheme="https") is not None
@@ -164,7 +164,7 @@ async def test_who_is_removed_is_out_before_the_disk_answers_and_stays_out(tmp_p
 
 async def test_a_role_that_cannot_be_kept_stays_as_it_was(tmp_path: Path) -> None:
     access = access_of(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 0)
-    device, _ = await access.pair(token=access.invite(), pin=None, name="Pixel", peer="")
+    device, _ = await access.pair(token=access.invitation().token, pin=None, name="Pixel", peer="")
     with unwritable(tmp_path), pytest.raises(IsADirectoryError):
         await access.change(device.id, role=Role.VIEWER, name="Tablet")
     assert access.devices.get(device.id) == device

@@ -32,7 +32,7 @@ class Node:
         self.access.devices.on_kept = self.bucket.changed
 
     async def pair(self) -> str:
-        device, _ = await self.access.pair(token=self.access.invite(), pin=None, name="Pixel", peer="")
+        device, _ = await self.access.pair(token=self.access.invitation().token, pin=None, name="Pixel", peer="")
         return device.id
 
     def role(self, id: str) -> Role | None:

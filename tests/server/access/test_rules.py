@@ -15,8 +15,7 @@ import pytest
 from fastapi.routing import APIRoute, APIWebSocketRoute
 from starlette.routing import BaseRoute, Mount, Route
 
-from server.access.identity import Role
-from server.access.rules import Needs, needs_of
+from server.access.identity import Needs, Role, needs_of
 from server.app.app import create_app
 from server.protocol import commands
 from tests.http import http_client

@@ -43,7 +43,9 @@ class Node:
 
     async def pair(self, role: Role = Role.OPERATOR) -> tuple[Device, dict[str, str]]:
         """The device and the headers that it sends from then on."""
-        device, secret = await self.access.pair(token=self.access.invite(role), pin=None, name="Pixel", peer="")
+        device, secret = await self.access.pair(
+            token=self.access.invitation(role).token, pin=None, name="Pixel", peer=""
+        )
         cookie = self.access.cookie(device, secret, scheme="http", host="room").partition(";")[0]
         return device, {"cookie": cookie, **HOST}
 

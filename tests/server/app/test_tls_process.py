@@ -22,6 +22,7 @@ from server.app.app import create_app
 from server.app.config import Config, Tls
 from server.app.tls_process import Secured, Server, secure, serve_secured
 from server.protocol.rate_limit import Limits
+from server.system import loopback
 from server.tls import tls_sniffer
 from server.tls.authority import TlsRefused
 from server.tls.certificate_renewal import OwnCertificate
@@ -184,7 +185,7 @@ async def test_one_address_gets_so_many_connections_handshakes_included(
     secured = secure(config)
     assert secured is not None
     async with field(secured, config) as one:
-        monkeypatch.setattr(http_protocol, "is_loopback", lambda _: False)
+        monkeypatch.setattr(loopback, "is_loopback", lambda _: False)
         held = []
         for _ in range(5):
             held.append(await asyncio.open_connection("127.0.0.1", one.port))

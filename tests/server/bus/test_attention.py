@@ -16,8 +16,8 @@ from server.bus.bus import ALL
 from server.bus.nats_bus import NatsBus
 from server.protocol.rate_limit import Limits
 from server.web.cars_board import FLEET, CarsBoard
-from server.web.fleet_commands import FleetCommands
 from server.web.fleet_log import FleetLog
+from server.web.fleet_socket import FleetCommands
 from server.web.remote_frames import RemoteFrames
 from tests.server.bus.broker import running_broker
 from tests.server.bus.buses import Clock, node, offering, until

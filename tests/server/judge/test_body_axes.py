@@ -21,7 +21,7 @@ from server.judge.signals.acceleration import acceleration_of_imu
 from server.judge.signals.heading import heading_of_imu
 from server.judge.signals.odometry import odometry
 from server.judge.signals.speed import twist_of_odometry
-from server.judge.topics import map_signals
+from server.judge.sources.choice import choose
 from tests.server.judge.mounted_lasers import Laser, quaternion, row
 
 ANGLE = st.floats(-math.pi, math.pi)
@@ -103,7 +103,7 @@ def test_axes_that_cannot_be_known_are_no_value() -> None:
     by = frames(Laser(yaw_rad=math.pi))
     by.receive("/tf_static", {"transforms": [row("mast", "imu")]})
     state, reception = State(), Reception()
-    sources = pipeline.by_topic(map_signals({"/imu/data": "sensor_msgs/Imu"}).values())["/imu/data"]
+    sources = pipeline.by_topic(choose({"/imu/data": "sensor_msgs/Imu"}).sources.values())["/imu/data"]
     changed = pipeline.receive(
         sources,
         imu(Laser(), 0.0, [1.0, 0.0, 9.81]),

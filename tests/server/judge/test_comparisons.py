@@ -15,14 +15,14 @@ from server.judge.frames import Frames
 from server.judge.message_fields import NotMeasured, Rejected
 from server.judge.profiles import GENERIC
 from server.judge.reception_stats import Reception
-from server.judge.topics import map_signals
+from server.judge.sources.choice import choose
 
 FIX, ODOMETRY, SCAN = "sensor_msgs/NavSatFix", "nav_msgs/Odometry", "sensor_msgs/LaserScan"
 TWIST, STAMPED = "geometry_msgs/Twist", "geometry_msgs/TwistStamped"
 
 
 def compared(found: dict[str, str], picked: dict[str, str] | None = None) -> set[tuple[str, str]]:
-    return {(one.signal, one.topic) for one in comparison_sources(found, map_signals(found, picked))}
+    return {(one.signal, one.topic) for one in comparison_sources(found, choose(found, picked).sources)}
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_another_robot_is_not_compared() -> None:
 
 def test_at_most_four_of_a_signal_and_those_of_before_first() -> None:
     found = {"/vel": TWIST, **{f"/{n:03}/fix": FIX for n in range(500)}}
-    chosen = map_signals(found, {"position": "/000/fix"})
+    chosen = choose(found, {"position": "/000/fix"}).sources
     topics = [one.topic for one in comparison_sources(found, chosen)]
     assert topics == [f"/{n:03}/fix" for n in range(1, 1 + MOST)]
     kept = comparison_sources(found, chosen, before=["/400/fix"])
@@ -104,7 +104,7 @@ def test_an_odometry_that_declares_itself_lost_is_not_compared(covariance: Any, 
 
 def test_what_is_compared_changes_no_signal_and_is_counted_for_none() -> None:
     found = {"/vel": TWIST, "/odom": ODOMETRY, "/lio": ODOMETRY}
-    sources = map_signals(found)
+    sources = choose(found).sources
     watched = (*sources.values(), *comparison_sources(found, sources))
     state, reception = State(), Reception()
     state.link(LinkFacts(phase="monitoring"))
@@ -133,7 +133,7 @@ def test_what_is_compared_changes_no_signal_and_is_counted_for_none() -> None:
 
 def test_the_unit_that_the_operator_chose_is_that_of_the_topic_which_carries_the_speed() -> None:
     found = {"/vehicle/speed": "std_msgs/Float32", "/gps/vel": STAMPED, "/gps/fix": FIX}
-    chosen = map_signals(found, {"speed": "/vehicle/speed"})
+    chosen = choose(found, {"speed": "/vehicle/speed"}).sources
     by_topic = pipeline.by_topic((*chosen.values(), *comparison_sources(found, chosen)))
     state, reception = State(), Reception()
     velocity = {"linear": {"x": 0.0, "y": 10.0, "z": 0.0}, "angular": {"z": 0.0}}
@@ -158,7 +158,7 @@ def test_the_unit_that_the_operator_chose_is_that_of_the_topic_which_carries_the
 
 def test_axes_that_are_not_known_keep_a_topic_from_being_compared_and_refuse_no_signal() -> None:
     found = {"/vel": TWIST, "/odom": ODOMETRY, "/lio": ODOMETRY}
-    sources = map_signals(found)
+    sources = choose(found).sources
     by_topic = pipeline.by_topic((*sources.values(), *comparison_sources(found, sources)))
     frames = Frames()
     for yaw_rad in (0.0, math.pi / 2):  # they contradict each other

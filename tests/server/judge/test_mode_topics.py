@@ -11,7 +11,8 @@ from monitor.values import DriveMode, Mode
 from server.judge import pipeline, profiles
 from server.judge.message_fields import Rejected
 from server.judge.reception_stats import Reception
-from server.judge.topics import BY_SIGNAL, map_signals
+from server.judge.sources.choice import choose
+from server.judge.topics import BY_SIGNAL
 
 REPORT = "autoware_vehicle_msgs/ControlModeReport"
 
@@ -58,9 +59,9 @@ def test_a_message_becomes_a_mode_or_is_rejected(type: str, message: Any, mode: 
 
 def test_a_report_is_found_by_its_type_and_other_topics_only_by_name_or_choice() -> None:
     found = {"/state": "std_msgs/Bool", "/report": "autoware_vehicle_msgs/msg/ControlModeReport"}
-    assert map_signals(found)["mode"].topic == "/report"
-    assert "mode" not in map_signals({"/state": "std_msgs/Bool"})
-    assert map_signals({"/state": "std_msgs/Bool"}, {"mode": "/state"})["mode"].decode is not None
+    assert choose(found).sources["mode"].topic == "/report"
+    assert "mode" not in choose({"/state": "std_msgs/Bool"}).sources
+    assert choose({"/state": "std_msgs/Bool"}, {"mode": "/state"}).sources["mode"].decode is not None
 
 
 def test_a_kind_of_car_has_words_and_numbers_of_its_own() -> None:
@@ -69,7 +70,7 @@ def test_a_kind_of_car_has_words_and_numbers_of_its_own() -> None:
     for at, (type, data) in enumerate(
         [("std_msgs/String", "cruise"), ("std_msgs/String", "park"), ("std_msgs/UInt8", 3)]
     ):
-        sources = pipeline.by_topic(map_signals({"/m": type}, {"mode": "/m"}).values())["/m"]
+        sources = pipeline.by_topic(choose({"/m": type}, {"mode": "/m"}).sources.values())["/m"]
         message = {"data": data}
         pipeline.receive(
             sources, message, float(at), None, reception=reception, state=state, profile=own, tyre_rad_per_unit=0.0

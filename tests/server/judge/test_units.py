@@ -18,7 +18,7 @@ from monitor.state import State
 from server.judge import pipeline, profiles
 from server.judge.profiles import GENERIC, Profile
 from server.judge.reception_stats import Reception
-from server.judge.topics import map_signals
+from server.judge.sources.choice import choose
 from server.judge.unit_watch import unit_questions, unit_sentences
 from server.judge.units import PERCENT, RULES, SHARE, UNITS, rule_for, table, unit_named
 from tests.tree import PROJECT
@@ -50,7 +50,7 @@ class Car:
     def __post_init__(self) -> None:
         offered = {TOPICS[name]: type for name, type in self.types.items() if name in TOPICS}
         offered |= {"/odom": ODOMETRY, "/fix": FIX}
-        self.sources = map_signals(offered, {name: TOPICS[name] for name in self.types})
+        self.sources = choose(offered, {name: TOPICS[name] for name in self.types}).sources
         self.by_topic = pipeline.by_topic(self.sources.values())
         self.state, self.reception = State(), Reception()
 

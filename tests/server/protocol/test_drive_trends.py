@@ -10,8 +10,7 @@ from dataclasses import replace
 import orjson
 import pytest
 
-from monitor.alarm import Transition
-from monitor.alarm_marks import MOST_MARKS, AlarmMark, AlarmMarks
+from monitor.alarm import MOST_MARKS, AlarmMark, AlarmMarks, Transition
 from monitor.alarm_spec import Priority
 from monitor.catalog import AllLimits
 from monitor.drive_trends import MOST_SPANS, DriveTrends

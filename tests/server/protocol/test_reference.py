@@ -11,9 +11,9 @@ from monitor import catalog
 from monitor.catalog import CHECKS
 from monitor.runner import IMPAIRED
 from monitor.signals import SIGNALS
-from server.protocol import alarm_reference, reference, tables
+from server.protocol import reference, tables
 from server.protocol.commands import BY_KIND
-from server.protocol.replay_commands import ReplayOrder
+from server.protocol.page_messages import ReplayOrder
 from server.protocol.tables import command_name, definitions
 from tests.tree import PROJECT
 
@@ -62,7 +62,7 @@ def test_words_around_the_tables_stay() -> None:
 
 @pytest.mark.parametrize("alarm", [*dict.fromkeys(check.id.partition(".")[0] for check in CHECKS), IMPAIRED])
 def test_every_alarm_is_on_its_page_once(alarm: str) -> None:
-    lines = alarm_reference.text().splitlines()
+    lines = reference.alarms_page().splitlines()
     rows = [line for line in lines if f"** `{alarm}`" in line or f"** `{alarm}.<" in line]
     assert len(rows) == 1
     cells = [cell.strip() for cell in rows[0].strip("|").split(" | ")]
@@ -71,7 +71,7 @@ def test_every_alarm_is_on_its_page_once(alarm: str) -> None:
 
 
 def test_every_threshold_is_on_the_page_of_alarms() -> None:
-    page = alarm_reference.text()
+    page = reference.alarms_page()
     rates = {f"signals.{name}_hz" for name in SIGNALS}
     assert all(f"| `{name}` |" in page for name in catalog.schema().keys() - rates)
     assert "`signals.<signal>_hz`" in page

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from server.replay.manager import NoReplay, ReplayClient, ReplayManager
-from server.web.agents.kept_replays import KeptReplays
+from server.web.agents.at_agent import KeptReplays
 
 MOST = 3
 

@@ -14,9 +14,9 @@ from typing import Any
 import psutil
 import pytest
 
-from server.rosbridge import dialer, service_calls
+from server.rosbridge import dialer
 from server.rosbridge.address import parse
-from server.rosbridge.link import RosLink
+from server.rosbridge.link import MAX_PENDING_CALLS, RosLink
 from server.rosbridge.live_source import CallFailed, LinkDown
 from server.rosbridge.subscription import Subscription
 from tests.server.link_listener import LinkListener, accept, answering, bridging, linked, until
@@ -402,10 +402,7 @@ async def test_unanswered_calls_are_bounded_and_a_cancelled_one_is_forgotten() -
     listener = LinkListener()
     async with bridging() as bridge, linked(bridge.address, listener) as link:
         await listener.wait_for("opened")
-        calls = [
-            asyncio.create_task(link.call("/rosapi/get_time", timeout_s=5))
-            for _ in range(service_calls.MAX_PENDING_CALLS)
-        ]
+        calls = [asyncio.create_task(link.call("/rosapi/get_time", timeout_s=5)) for _ in range(MAX_PENDING_CALLS)]
         await until(lambda: len(bridge.operations) == len(calls))
         with pytest.raises(CallFailed, match="too many"):
             await link.call("/rosapi/get_time")

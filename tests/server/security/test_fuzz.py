@@ -23,7 +23,7 @@ from hypothesis.errors import Unsatisfiable
 
 from server.protocol import commands
 from server.recording.marks.media import TYPES
-from server.web.routes.state import TOML
+from server.web.routes.session_request import TOML
 from tests.server.recording.made import record
 from tests.tree import PROJECT
 

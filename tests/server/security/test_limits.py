@@ -16,7 +16,7 @@ from h11 import IDLE
 from server.app.app import create_app
 from server.app.config import Config
 from server.protocol.rate_limit import MAX_DEPTH, Allowance, Limits, Rate, nests_deeper
-from server.web.middleware import http_protocol
+from server.system import loopback
 from server.web.middleware.throttle import is_upload
 from tests.http import http_client
 from tests.server.conftest import serving
@@ -199,7 +199,7 @@ async def test_what_is_no_http_is_answered_with_all_headers() -> None:
 @pytest.mark.field
 async def test_one_address_gets_so_many_connections(monkeypatch: pytest.MonkeyPatch) -> None:
     """Those of this machine are not counted, and a test has no other: for it, this machine is another."""
-    monkeypatch.setattr(http_protocol, "is_loopback", lambda _: False)
+    monkeypatch.setattr(loopback, "is_loopback", lambda _: False)
     async with serving(Config(limits=Limits(connections=5))) as base, contextlib.AsyncExitStack() as stack:
         lines = [await stack.enter_async_context(plugged(base)) for _ in range(5)]
         async with plugged(base) as (reader, _):
@@ -210,14 +210,6 @@ async def test_one_address_gets_so_many_connections(monkeypatch: pytest.MonkeyPa
         async with plugged(base) as (reader, writer):
             writer.write(b"GET /api/health HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
             assert (await reader.readline()).startswith(b"HTTP/1.1 200")
-
-
-@pytest.mark.parametrize(
-    ("address", "is_here"),
-    [("127.0.0.1", True), ("::1", True), ("192.168.4.2", False), ("fe80::1%eth0", False), ("", False)],
-)
-def test_only_loopback_is_this_machine(address: str, is_here: bool) -> None:
-    assert http_protocol.is_loopback(address) is is_here
 
 
 def test_what_is_taken_for_granted_of_h11() -> None:

@@ -11,8 +11,8 @@ import pytest
 
 from server.web.maps import mbtiles
 from server.web.maps.image_type import pixels
+from server.web.maps.layers import site_image
 from server.web.maps.mbtiles import MOST_PIXELS, MapFile, MapRefused
-from server.web.maps.site_image import site_image
 
 pytestmark = pytest.mark.world(n=24)
 

@@ -19,8 +19,8 @@ from server.judge.settings import BadSetting, SettingsFile, from_toml, salvage
 from server.mail.settings import MailSettingsFile
 from server.recording.event_channels import MOST_SETTINGS, read_recorded_events
 from server.storage.bounded_toml import MAX_BYTES, MAX_ENTRIES, MAX_LINE, MAX_NESTING, MAX_PARTS, BadToml, loads
+from server.web.maps.layers import site_image
 from server.web.maps.mbtiles import MapRefused
-from server.web.maps.site_image import site_image
 from tests.server.conftest import serving
 from tests.tree import PROJECT
 

@@ -12,7 +12,7 @@ import orjson
 import pytest
 
 from server.judge.message import Message, RosVersion
-from server.judge.topics import map_signals
+from server.judge.sources.choice import choose
 from server.rosbridge.codec import json_bytes
 from server.simulator.car import START_S, SimulatedCar
 from server.simulator.messages import PUBLISHED
@@ -111,7 +111,8 @@ def test_topics_have_the_real_cars_names_and_types(ros_version: RosVersion) -> N
 def test_every_message_is_understood_as_the_signal_it_is_meant_for(ros_version: RosVersion) -> None:
     messages = drive(3, ros_version=ros_version)
     sources = {
-        source.topic: source for source in map_signals({message.topic: message.type for message in messages}).values()
+        source.topic: source
+        for source in choose({message.topic: message.type for message in messages}).sources.values()
     }
     assert {published.topic: published.signal for published in PUBLISHED} == {
         topic: source.signal for topic, source in sources.items()

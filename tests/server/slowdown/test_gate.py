@@ -50,7 +50,7 @@ def test_one_file_makes_operations_that_publish() -> None:
             if made:
                 found[name] = made
     assert found.pop(GATE) == {"publish", "advertise", "unadvertise"}
-    calls, rows = "server/rosbridge/service_calls.py", "server/rosbridge/subscription.py"
+    calls, rows = "server/rosbridge/link.py", "server/rosbridge/subscription.py"
     foxglove = found.pop("server/vehicle/foxglove/protocol.py")
     assert foxglove == {"subscribe", "unsubscribe", "subscribeConnectionGraph", "advertise", "unadvertise"}
     assert found == {calls: {"call_service"}, rows: {"?"}}  # subscribe, unsubscribe: see below

@@ -16,7 +16,7 @@ from server.judge.active_settings import ActiveSettings
 from server.judge.profiles import GENERIC, Profile
 from server.judge.reception_stats import Reception
 from server.judge.settings import Settings, SettingsFile, from_toml
-from server.judge.topics import map_signals
+from server.judge.sources.choice import choose
 from server.slowdown.controller import NO_STEERING, STEERING_NOT_KNOWN
 from tests.monitor.checks.known import known
 from tests.monitor.test_corridor import sweep
@@ -42,7 +42,7 @@ def received(number: float, profile: Profile, tyre_rad_per_unit: float, chosen: 
 def value_of(number: float, profile: Profile, tyre_rad_per_unit: float, chosen: str | None = None) -> Steering | None:
     """The same; None: its unit is not known."""
     state = State()
-    sources = pipeline.by_topic(map_signals({"/catvehicle/steering": "geometry_msgs/Wrench"}, {}).values())
+    sources = pipeline.by_topic(choose({"/catvehicle/steering": "geometry_msgs/Wrench"}, {}).sources.values())
     pipeline.receive(
         sources["/catvehicle/steering"],
         {"force": {"x": 0.0, "y": 0.0, "z": 0.0}, "torque": {"x": 0.0, "y": 0.0, "z": number}},

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from server.tls.authority import TlsRefused
-from server.tls.certificate_renewal import ProvidedCertificateRenewal
-from server.tls.provided_certificate import look
+from server.tls.certificate_renewal import ProvidedCertificateRenewal, read_provided
 from tests.server.tls.certificates import pair
 
 NOW = dt.datetime(2027, 3, 1, 12, 0, tzinfo=dt.UTC)
@@ -23,7 +22,7 @@ def days(n: float) -> dt.timedelta:
 @pytest.mark.parametrize("is_rsa", [False, True])
 def test_a_good_one_is_taken_with_its_names(tmp_path: Path, is_rsa: bool) -> None:
     files = pair(tmp_path, start=NOW, names=("car.example.org", "*.pit.example.org"), is_rsa=is_rsa)
-    found = look(files.cert, files.key, now=NOW)
+    found = read_provided(files.cert, files.key, now=NOW)
     assert found.names == ("car.example.org", "*.pit.example.org")
     assert found.warning is None
 
@@ -39,14 +38,14 @@ def test_a_good_one_is_taken_with_its_names(tmp_path: Path, is_rsa: bool) -> Non
 )
 def test_a_fault_of_a_usable_certificate_is_reported(tmp_path: Path, after: dt.timedelta, text: str | None) -> None:
     files = pair(tmp_path, start=NOW)
-    warning = look(files.cert, files.key, now=NOW + after).warning
+    warning = read_provided(files.cert, files.key, now=NOW + after).warning
     assert warning is None if text is None else text in str(warning)
 
 
 def test_an_expired_one_is_refused(tmp_path: Path) -> None:
     files = pair(tmp_path, start=NOW)
     with pytest.raises(TlsRefused, match=r"expired on 2027-05-30 12:00 UTC\.$"):
-        look(files.cert, files.key, now=NOW + days(90.1))
+        read_provided(files.cert, files.key, now=NOW + days(90.1))
 
 
 def test_a_key_of_another_certificate_is_refused(tmp_path: Path) -> None:
@@ -54,19 +53,19 @@ def test_a_key_of_another_certificate_is_refused(tmp_path: Path) -> None:
     other = tmp_path / "other"
     other.mkdir()
     with pytest.raises(TlsRefused, match=r"key\.pem belongs to another certificate than the first in .*cert\.pem"):
-        look(files.cert, pair(other, start=NOW).key, now=NOW)
+        read_provided(files.cert, pair(other, start=NOW).key, now=NOW)
 
 
 def test_a_key_with_a_password_is_refused(tmp_path: Path) -> None:
     files = pair(tmp_path, start=NOW, password=b"secret")
     with pytest.raises(TlsRefused, match="is protected by a password"):
-        look(files.cert, files.key, now=NOW)
+        read_provided(files.cert, files.key, now=NOW)
 
 
 def test_one_without_names_is_refused(tmp_path: Path) -> None:
     files = pair(tmp_path, start=NOW, names=())
     with pytest.raises(TlsRefused, match="names no host"):
-        look(files.cert, files.key, now=NOW)
+        read_provided(files.cert, files.key, now=NOW)
 
 
 @pytest.mark.parametrize("which", ["cert", "key"])
@@ -81,7 +80,7 @@ def test_what_is_no_certificate_or_key_is_named(tmp_path: Path, which: str, cont
     else:
         broken.write_bytes(content)
     with pytest.raises(TlsRefused, match=f"{broken.name}.*{text}|{broken.name} {text}"):
-        look(files.cert, files.key, now=NOW)
+        read_provided(files.cert, files.key, now=NOW)
 
 
 def test_a_changed_pair_is_read_again(tmp_path: Path) -> None:
@@ -135,6 +134,6 @@ def test_no_key_is_ever_answered(tmp_path: Path, caplog: pytest.LogCaptureFixtur
     files = pair(tmp_path, start=NOW)
     files.cert.write_bytes(files.key.read_bytes())
     with caplog.at_level(logging.DEBUG), pytest.raises(TlsRefused) as refused:
-        look(files.cert, files.key, now=NOW)
+        read_provided(files.cert, files.key, now=NOW)
     secret = files.key.read_text().splitlines()[1]
     assert secret not in str(refused.value) + caplog.text

@@ -6,7 +6,7 @@ from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
 from server.judge.comparisons import comparison_sources
 from server.judge.settings import SettingsFile
-from server.judge.topics import map_signals
+from server.judge.sources.choice import choose
 from server.vehicle.judgement import Judgement
 from tests.server.vehicle.test_compared_cars import FIX, fix
 
@@ -18,7 +18,7 @@ def judgement() -> Judgement:
 
 
 def test_what_is_only_compared_comes_again_for_no_signal() -> None:
-    chosen = map_signals(CAR)
+    chosen = choose(CAR).sources
     by_topic = pipeline.by_topic((*chosen.values(), *comparison_sources(CAR, chosen)))
     judged = judgement()
     judged.receive(by_topic["/gps/fix"], "/gps/fix", fix(0.0, 1.0), None, 1.0)
@@ -33,7 +33,7 @@ def test_what_is_only_compared_comes_again_for_no_signal() -> None:
 
 
 def test_the_age_of_what_is_only_compared_is_not_that_of_the_signal() -> None:
-    chosen = map_signals(CAR)
+    chosen = choose(CAR).sources
     by_topic = pipeline.by_topic((*chosen.values(), *comparison_sources(CAR, chosen)))
     judged = judgement()
     at_s = 100.0

@@ -243,6 +243,6 @@ def off_of(page: Viewer, name: str) -> Any:
 
 @pytest.mark.parametrize("path", ["/agents/a/api/mail", "/agents/a%2Fb/api/mail/settings"])
 def test_who_may_is_decided_by_the_agents_own_path(path: str) -> None:
-    from server.access.rules import Needs, needs_of
+    from server.access.identity import Needs, needs_of
 
     assert needs_of("GET", path) is Needs.OPERATOR

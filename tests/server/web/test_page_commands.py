@@ -15,7 +15,7 @@ from server.bus.local import LocalBus
 from server.protocol.rate_limit import Limits
 from server.replay.view_source import ViewSource
 from server.vehicle.outcomes import Outcomes
-from server.web.fleet_commands import FleetCommands
+from server.web.fleet_socket import FleetCommands
 from server.web.page_commands import PageCommands
 
 pytestmark = pytest.mark.virtual_time

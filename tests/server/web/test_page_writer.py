@@ -17,7 +17,7 @@ from starlette.websockets import WebSocket
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.protocol.messages import Hello
-from server.protocol.replay_commands import OpenReplay
+from server.protocol.page_messages import OpenReplay
 from server.protocol.state import ServerState
 from server.replay.manager import ReplayClient, ReplayManager
 from server.replay.view_source import ViewSource

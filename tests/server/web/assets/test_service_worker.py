@@ -19,7 +19,7 @@ from server.app.config import Config
 from server.system.page_files import static_dir
 from server.web.assets import icons
 from server.web.assets.bundle import Built, Entry
-from server.web.assets.manifest import manifest
+from server.web.assets.icons import manifest
 from server.web.assets.service_worker import build_of, shell_of, withdrawn
 from tests.http import http_client
 from tests.tree import PROJECT

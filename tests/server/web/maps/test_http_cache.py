@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from server.web.maps.http_cache import DEFAULT_FRESH_S, LONGEST_S, MOST, WITHIN_S, Pace, fresh_for_s, retry_after_s
+from server.web.maps.tile_fetcher import DEFAULT_FRESH_S, LONGEST_S, MOST, WITHIN_S, Pace, fresh_for_s, retry_after_s
 
 NOW_S = 1_790_000_000.0  # Mon, 21 Sep 2026 14:13:20 GMT
 DATE = "Mon, 21 Sep 2026 14:13:20 GMT"

@@ -343,7 +343,7 @@ async def test_older_wishes_give_way_when_there_are_too_many(
 
 
 async def test_nobody_fetches_a_whole_country(source: Source, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.web.maps.http_cache.MOST", 5)
+    monkeypatch.setattr("server.web.maps.tile_fetcher.MOST", 5)
     async with serving(source.upstream(), tmp_path / "data") as one:
         for x in range(8):
             await one.at(6, x, 0)

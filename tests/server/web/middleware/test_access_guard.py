@@ -64,7 +64,7 @@ async def closed(page: websockets.ClientConnection) -> tuple[int, str]:
 
 
 async def test_a_link_pairs_one_device_once_and_its_cookie_is_all_it_takes(served: Served) -> None:
-    token = served.access.invite(Role.OPERATOR)
+    token = served.access.invitation(Role.OPERATOR).token
     async with served.browser() as browser, served.browser() as second:
         assert (await browser.get("/api/state")).status_code == 401
         answer = await browser.post("/api/pair", json={"token": token, "name": "Pixel 7"})
@@ -75,7 +75,7 @@ async def test_a_link_pairs_one_device_once_and_its_cookie_is_all_it_takes(serve
         assert (await browser.get("/api/me")).json()["name"] == "Pixel 7"
         again = await second.post("/api/pair", json={"token": token, "name": "Thief"})
         assert (again.status_code, again.json()["code"]) == (403, "used")
-        assert served.access.invite(Role.OPERATOR) != token  # another one stands on the terminal
+        assert served.access.invitation(Role.OPERATOR).token != token  # another one stands on the terminal
 
 
 async def test_a_pin_lets_one_device_in_and_takes_the_link_beside_it_along(served: Served) -> None:
@@ -107,7 +107,7 @@ async def test_words_that_are_none_are_refused(served: Served, credentials: dict
 
 
 async def test_guessing_is_slowed_also_when_all_guesses_come_at_once(served: Served) -> None:
-    right = served.access.pin(Role.OPERATOR)
+    right = served.access.invitation(Role.OPERATOR).pin
     pins = [f"{n:06d}" for n in range(200) if f"{n:06d}" != right][:60]
     async with served.browser() as browser:
         answers = await asyncio.gather(*(browser.post("/api/pair", json={"pin": pin}) for pin in pins))
@@ -120,12 +120,12 @@ async def test_guessing_is_slowed_also_when_all_guesses_come_at_once(served: Ser
         assert int(late.headers["retry-after"]) >= 1
         assert late.json()["detail"] == "Too many wrong PINs. Wait, or scan the QR code instead."
         # The link has 144 bits and needs no waits: nobody who tries PINs can lock out a crew.
-        token = served.access.invite(Role.OPERATOR)
+        token = served.access.invitation(Role.OPERATOR).token
         assert (await browser.post("/api/pair", json={"token": token})).status_code == 200
 
 
 async def test_a_forwarded_address_makes_nobody_another_guesser(served: Served) -> None:
-    served.access.pin(Role.OPERATOR)
+    served.access.invitation(Role.OPERATOR)
     async with served.browser() as browser:
         codes = []
         for n in range(5):
@@ -411,7 +411,7 @@ async def test_a_request_of_who_is_removed_ends(served: Served) -> None:
 
 async def test_an_answer_half_given_to_who_is_removed_breaks_off() -> None:
     access = access_of(config(), now=time.monotonic, wall_ms=lambda: 1_790_000_000_000)
-    device, secret = await access.pair(token=access.invite(), pin=None, name="Lost", peer="")
+    device, secret = await access.pair(token=access.invitation().token, pin=None, name="Lost", peer="")
     sent: list[str] = []
 
     async def endless(scope: Scope, receive: Receive, send: Send) -> None:

@@ -17,8 +17,8 @@ import pytest
 from server.app.app import create_app
 from server.app.config import Config
 from server.web.maps.image_type import media_type, plain_text
+from server.web.maps.layers import site_image
 from server.web.maps.mbtiles import MapFile, MapRefused
-from server.web.maps.site_image import site_image
 from tests.http import http_client
 from tests.server.web import map_files as maps
 from tests.server.web.map_files import png

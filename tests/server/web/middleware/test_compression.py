@@ -14,7 +14,7 @@ from websockets.extensions.permessage_deflate import PerMessageDeflate
 from websockets.frames import Frame, Opcode
 
 from server.rosbridge_server.server import RosBridge
-from server.web.compression import Messages, SharedDeflate
+from server.web.middleware.http_protocol import SentMessages, SharedDeflate
 from tests.server.cars import driving
 from tests.server.viewer import viewer
 
@@ -22,7 +22,7 @@ from tests.server.viewer import viewer
 class Line:
     """The server's side and a page's side of one connection."""
 
-    def __init__(self, messages: Messages, *, bits: int = 15, is_forgetful: bool = False) -> None:
+    def __init__(self, messages: SentMessages, *, bits: int = 15, is_forgetful: bool = False) -> None:
         agreed = PerMessageDeflate(False, is_forgetful, 12, bits)
         self.server = SharedDeflate(agreed, messages)
         self.page = PerMessageDeflate(is_forgetful, False, bits, 12)
@@ -75,14 +75,14 @@ async def test_a_state_shrinks_to_a_twentieth(bridge: RosBridge, server: str) ->
     async with driving(bridge, speed=lambda n: 4.2 + n / 100), viewer(server) as one:
         await one.until(lambda: len(one.states) >= 12)
     texts = [json.dumps(state, separators=(",", ":")).encode() for state in one.states]
-    line = Line(Messages())
+    line = Line(SentMessages())
     sent = [line.send(text) for text in texts]
     assert mean(map(len, texts)) > 4096, "too small to show what a window is for"
     assert mean(sent[1:]) < 0.05 * mean(map(len, texts[1:]))
 
 
 def test_a_state_refers_to_the_last_one_over_what_came_between() -> None:
-    line = Line(Messages())
+    line = Line(SentMessages())
     sizes = []
     for n, state in enumerate(states(5)):
         sizes.append(line.send(state))
@@ -100,9 +100,9 @@ def test_pages_that_got_the_same_share_the_work(monkeypatch: pytest.MonkeyPatch)
         made.append(kwargs)
         return compressobj(*args, **kwargs)  # type: ignore[arg-type]
 
-    messages = Messages()
+    messages = SentMessages()
     lines = [Line(messages) for _ in range(20)]
-    monkeypatch.setattr("server.web.compression.zlib.compressobj", counted)
+    monkeypatch.setattr("server.web.middleware.http_protocol.zlib.compressobj", counted)
     for n, state in enumerate(states(10)):
         for k, line in enumerate(lines):
             line.send(state)
@@ -117,7 +117,7 @@ def test_pages_that_got_the_same_share_the_work(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_no_more_is_kept_than_pages_may_refer_to() -> None:
-    messages = Messages()
+    messages = SentMessages()
     lines = [Line(messages) for _ in range(3)]
     for state in states(50):
         _send_to_all(lines, state)
@@ -137,7 +137,7 @@ def test_no_more_is_kept_than_pages_may_refer_to() -> None:
 def test_each_page_reads_what_was_sent_whatever_it_was_and_whatever_it_agreed_to(seed: int) -> None:
     """Long and short messages of several kinds, in an order of each page's own."""
     chance = random.Random(seed)
-    messages = Messages()
+    messages = SentMessages()
     common = [
         *states(12),
         *states(4, length=70_000),

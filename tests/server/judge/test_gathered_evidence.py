@@ -7,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from server.judge.sources import survey as module
-from server.judge.sources.survey import survey
+from server.judge.sources.evidence import PLACES, WINDOW_S, gather
 from tests.server.judge.test_sources import FIX, LASERS, ODOM, odometry, scan, shown
 
 Row = tuple[float, str, str, Any]
@@ -47,7 +46,7 @@ def stands_then_moves(stands_s: float, length_s: float, mps: float, twist_mps: f
 
 
 def looked_into(drive: Drive) -> Any:
-    return survey(drive, {"odom": "/odom"}, shown({"/odom": ODOM}))
+    return gather(drive, {"odom": "/odom"}, shown({"/odom": ODOM}))
 
 
 @pytest.mark.parametrize("stands_s", [0.0, 5.0, 60.0, 900.0, 1700.0])
@@ -67,7 +66,7 @@ def test_it_ends_as_soon_as_it_knows_enough() -> None:
 def test_it_is_bounded_however_much_there_is() -> None:
     drive = stands_then_moves(1e9, 5000.0, 0.0, 0.0)
     assert not looked_into(drive).of("/odom").is_twist_empty
-    assert drive.read <= len(module.PLACES) * (module.WINDOW_S * 10 + 2)
+    assert drive.read <= len(PLACES) * (WINDOW_S * 10 + 2)
 
 
 def test_what_cannot_be_decoded_is_not_counted_twice() -> None:
@@ -84,5 +83,5 @@ def test_a_damaged_recording_shows_what_can_be_read() -> None:
 
 def test_of_topics_that_do_not_compete_nothing_is_kept() -> None:
     rows = [(1000.0 + n, topic, kind, scan(topic)) for n in range(9) for topic, kind in {**LASERS, "/fix": FIX}.items()]
-    evidence = survey(Drive(rows), {topic: topic for topic in [*LASERS, "/fix"]}, shown(LASERS))
+    evidence = gather(Drive(rows), {topic: topic for topic in [*LASERS, "/fix"]}, shown(LASERS))
     assert [evidence.of(topic).frame for topic in [*LASERS, "/fix"]] == ["/front/scan", "/rear/scan", None]

@@ -1,12 +1,22 @@
-"""Whose work is in catgraph: each part with its version, its licence and the licence's text."""
+"""What runs here, for the page's License and About: versions, the work of others in it, its JSON interface."""
 
 from __future__ import annotations
 
+import platform
 import re
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
+
+from fastapi import APIRouter, HTTPException, Request
+from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse
+from fastapi.templating import Jinja2Templates
+from pydantic import BaseModel
+
+from server.system.page_files import static_dir, templates_dir
+from server.web.interface import raises
+from server.web.services import services
 
 _TEXT = re.compile(r"^(LICEN[CS]E|COPYING|NOTICE)", re.IGNORECASE)
 _NAME = re.compile(r"[A-Za-z0-9][\w.-]*")
@@ -91,3 +101,73 @@ def _license(about: metadata.PackageMetadata) -> str:
         return str(stated)
     kinds = [one.rsplit("::", 1)[1].strip() for one in about.get_all("Classifier", []) if one.startswith("License ::")]
     return ", ".join(kinds) or "see its text"
+
+
+router = APIRouter()
+
+
+class ThirdPartyPart(BaseModel):
+    """A part of somebody else's."""
+
+    name: str
+    version: str
+    license: str
+    where: str
+
+
+class About(BaseModel):
+    """What runs here."""
+
+    version: str
+    python: str
+    system: str
+    parts: list[ThirdPartyPart]
+
+
+def _parts() -> tuple[Part, ...]:
+    return parts(static_dir() / "vendor")
+
+
+@router.get("/api/about", tags=["server"], summary="Versions of the server and of everything in it")
+def about(request: Request) -> About:
+    return About(
+        version=services(request).version,
+        python=platform.python_version(),
+        system=f"{platform.system()} {platform.machine()}",
+        parts=[
+            ThirdPartyPart(name=part.name, version=part.version, license=part.license, where=part.where)
+            for part in _parts()
+        ],
+    )
+
+
+@router.get(
+    "/api/notices/{name}",
+    response_class=PlainTextResponse,
+    responses=raises(404),
+    tags=["server"],
+    summary="The licence text of one part",
+)
+def notice(name: str) -> PlainTextResponse:
+    part = next((part for part in _parts() if part.name == name), None)
+    if part is None:
+        raise HTTPException(404, f"No part is named {name[:40]}.")
+    return PlainTextResponse(part.text or f"{part.name} brings no text; its maker calls its licence {part.license}.")
+
+
+@router.get("/openapi.json", include_in_schema=False)
+def described(request: Request) -> JSONResponse:
+    """Making it takes half a second: in a thread, by `def`."""
+    return JSONResponse(request.app.openapi())
+
+
+@router.get("/docs", response_class=HTMLResponse, include_in_schema=False)
+def docs(request: Request) -> HTMLResponse:
+    """The description of the interface as a page of our own: FastAPI's loads its scripts from the internet."""
+    schema = request.app.openapi()
+    context = {
+        "info": schema["info"],
+        "paths": schema["paths"],
+        "schemas": schema.get("components", {}).get("schemas", {}),
+    }
+    return Jinja2Templates(directory=templates_dir()).TemplateResponse(request, "docs.html", context)

@@ -12,7 +12,7 @@ from packaging.utils import canonicalize_name
 
 from server.app.config import Config
 from server.system.page_files import static_dir
-from server.web.assets.third_party import _license, parts
+from server.web.routes.about import _license, parts
 from tests.http import http_client
 from tests.server.conftest import serving
 
