@@ -6,7 +6,7 @@ import contextlib
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,7 +20,8 @@ from server.analysis.report import Report, to_choose
 from server.analysis.report_text import printable
 from server.judge.active_settings import SettingsOverride
 from server.judge.settings import BadSetting
-from server.recording.read.read import Recording, RecordingUnreadable, open_recording
+from server.recording.read.errors import RecordingUnreadable
+from server.recording.read.read import Recording, open_recording
 from server.recording.verification import of_files
 from server.simulator.scenarios import planned
 from server.system.page_files import AssetsMissing
@@ -30,6 +31,7 @@ NO_CRITICAL, CRITICAL, CANNOT = 0, 1, 2
 SWITCH_S = 0.0002
 
 OnProgress = Callable[[float, float], None]  # which part is done, from 0 to 1; seconds of recording judged
+_OWN_SUFFIXES = (".mcap", ".writing")  # of catgraph's own files
 
 
 class Impossible(Exception):
@@ -155,3 +157,26 @@ def _demand_extract(recording: Recording, options: CheckOptions) -> None:
             raise Impossible(
                 f"{fault.scenario.name} at {fault.after_s:g} s is behind the end: the recording has {length_s:.1f} s."
             )
+
+
+def by_recording(paths: Sequence[Path]) -> list[list[Path]]:
+    """The files of each recording, in the order in which the recordings are first named.
+
+    Parts of a recording of catgraph name it in their metadata. Every other file is a recording, as is a clip.
+    """
+    groups: dict[Hashable, list[Path]] = {}
+    for number, path in enumerate(paths):
+        groups.setdefault(_recording_of(path) or number, []).append(path)
+    return list(groups.values())
+
+
+def _recording_of(path: Path) -> tuple[str, str] | None:
+    """Vehicle and recording of the file; None: unknown."""
+    if path.suffix not in _OWN_SUFFIXES or not path.is_file():
+        return None
+    try:
+        with open_recording([path]) as recording:
+            about = recording.metadata
+    except (RecordingUnreadable, MemoryError):
+        return None  # reading it reports the reason
+    return (about.get("vehicle", ""), about["session"]) if "session" in about and "clip_of" not in about else None

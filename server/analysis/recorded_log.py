@@ -10,8 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from server.analysis.alarm_load import Load, load_of
-from server.analysis.episodes import Announcement, Episode
+from server.analysis.episodes import Announcement, Episode, Load, load_of
 from server.judge.logged_transition import spec_of, transition_of
 from server.recording.drive.parts import recorded_s
 from server.recording.read.read import Recording

@@ -10,7 +10,7 @@ from monitor import catalog
 from monitor.alarm_spec import Priority
 from monitor.scan_shape import habit_words
 from monitor.signals import SIGNALS
-from server.analysis.compare import Change, compare
+from server.analysis.episodes import Change, compare
 from server.analysis.recorded_log import RecordedLog
 from server.analysis.rehearse import Rehearsed
 from server.analysis.report_text import printable

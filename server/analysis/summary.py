@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 from monitor.alarm_spec import Priority
 from monitor.load import BEARABLE_IN_10_MIN, FLOOD_IN_10_MIN
-from server.analysis.compare import Change
-from server.analysis.episodes import Episode
+from server.analysis.episodes import Change, Episode
 from server.analysis.report import Report, SignalRow, differences, name_of, not_checked, to_choose
 from server.analysis.report_text import clock, counted, grouped, length, printable
 

@@ -11,12 +11,19 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from server.analysis.check_pool import check_each
-from server.analysis.check_recording import CANNOT, NO_CRITICAL, Checked, CheckOptions, Impossible, check_recording
+from server.analysis.check_recording import (
+    CANNOT,
+    NO_CRITICAL,
+    Checked,
+    CheckOptions,
+    Impossible,
+    by_recording,
+    check_recording,
+)
 from server.analysis.faults import CannotInject, Faults
 from server.analysis.rehearse import Extract
 from server.analysis.thresholds import BadSettingsFile, read_override
 from server.cli.progress import Progress
-from server.recording.read.by_recording import by_recording
 from server.simulator.scenarios import UnknownScenario, planned
 from server.storage import output_file
 from server.storage.output_file import Output, output_of

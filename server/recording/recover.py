@@ -17,12 +17,12 @@ import contextlib
 import fcntl
 import logging
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from server.recording import space
-from server.recording.folder import DAMAGED, FINISHED, RECOVERING, RecordingsFolder, id_of
+from server.recording.folder import DAMAGED, FINISHED, RECOVERING, id_of
 from server.recording.mcap.chunks import MAGIC, Walk
 from server.recording.mcap.recovered_file import Contents, write_recovered
 from server.storage.durable_file import sync_folder
@@ -44,14 +44,6 @@ class Recovered:
     aside: Path | None = None  # where the rest is kept
     messages: int = 0
     is_settled: bool = True  # False: it is still as it was, and may be tried again
-
-
-def recover_all(folder: RecordingsFolder) -> Iterator[Recovered]:
-    """Recovers whatever a server left; nothing may be writing into the folder meanwhile."""
-    for path in folder.unfinished():
-        with contextlib.suppress(OSError):
-            path.with_name(id_of(path) + RECOVERING).unlink()
-        yield recover(path)
 
 
 def recover(left: Path) -> Recovered:

@@ -21,8 +21,7 @@ from server.recording.delay import recorded_delay
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, RecordingUnreadable
 from server.replay import replay_frames
-from server.replay.recorded_events import MOST, NOTHING, TimelineEvents
-from server.replay.timeline import EMPTY_S, Index, behind_gap
+from server.replay.timeline import EMPTY_S, MOST, NOTHING, Index, TimelineEvents, behind_gap
 from server.vehicle import queries
 from server.vehicle.queries import check_answer
 

@@ -24,7 +24,7 @@ from server.judge.active_settings import SettingsOverride
 from server.recording.read.read import RecordingUnreadable, open_recording
 from server.replay.playback import Playback
 from server.replay.protocol import Kind, record
-from server.replay.recorded_events import NOTHING, TimelineEvents, read_timeline_events
+from server.replay.timeline import NOTHING, TimelineEvents, read_timeline_events
 
 NICE = 10
 MOST_MEMORY = 1536 * 1024 * 1024  # of its own data; a file that needs more is not of a car

@@ -20,8 +20,8 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from server.judge.message import Json, RosVersion
+from server.recording.read.decode import RawMessage, fields_of
 from server.recording.read.errors import Undecodable
-from server.recording.read.raw_message import RawMessage, fields_of
 from server.rosbridge.codec import cbor_bytes, json_bytes
 from server.rosbridge_server.shape import (
     FLOATS,

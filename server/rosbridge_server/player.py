@@ -11,8 +11,8 @@ from itertools import islice
 from typing import Any, Protocol, TypeVar
 
 from server.judge.message import Json, Message
+from server.recording.read.decode import fields_of
 from server.recording.read.errors import Undecodable
-from server.recording.read.raw_message import fields_of
 from server.rosbridge_server.encoding import Outgoing
 from server.rosbridge_server.server import RosBridge
 
@@ -83,7 +83,6 @@ async def play(
     rate: float = 1.0,
     clock: Callable[[], float] | None = None,
     call_later: Callable[[float, Callable[[], None]], Timer] | None = None,
-    on_end: Callable[[], None] | None = None,
     on_message: Callable[[Message], None] | None = None,
     ahead: int = 0,
 ) -> int:
@@ -104,8 +103,6 @@ async def play(
         async for batch in fetched:
             count += len(batch)
             await playing.play(batch)
-    if on_end is not None:
-        on_end()
     return count
 
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from server.judge.message import Json, RosVersion
-from server.recording.read.raw_message import Layout
+from server.recording.read.decode import Layout
 from server.rosbridge_server.completion import Completion
 from server.rosbridge_server.shape import TIMES, fields
 

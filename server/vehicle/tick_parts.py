@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 
 from server.bus.bus import SessionBus
-from server.recording.read.spans import span
+from server.recording.read.steady_time import span
 from server.system import process_limits
 from server.vehicle.event_log import EventLog
 

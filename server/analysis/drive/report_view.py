@@ -11,15 +11,14 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any
 
-from server.analysis.alarm_load import Load
 from server.analysis.drive.axis import dated_time
+from server.analysis.episodes import Load
 from server.recording.catalog.annotations import Annotations
 from server.recording.drive import people
 from server.recording.drive.facts import DriveFacts, DriveLog, figures_of
-from server.recording.drive.link_way import LinkStretch, link_along
+from server.recording.drive.link_way import LinkStretch, UnseenTime, blind_times, late_times, link_along
 from server.recording.drive.parts import DrivePart, Span
 from server.recording.drive.unrecorded import Unrecorded, unrecorded_of
-from server.recording.drive.unseen import UnseenTime, blind_times, late_times
 from server.recording.folder import id_of
 from server.recording.read.read import Recording
 from server.recording.verification import Verification

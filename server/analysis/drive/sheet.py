@@ -14,8 +14,7 @@ from monitor.unseen import unseen_words
 from server.analysis import report_text
 from server.analysis.drive import drawings, link_drawing, sheet_things
 from server.analysis.drive.axis import day_time
-from server.analysis.drive.media import Media
-from server.analysis.drive.sheet_things import MOST_ROWS
+from server.analysis.drive.sheet_things import MOST_ROWS, Media
 from server.recording.drive.alarms import marks_of
 from server.recording.drive.facts import DriveFacts
 from server.recording.drive.link_way import LinkStretch, link_along

@@ -1,18 +1,30 @@
-"""Tables of the drive's report with a row for each thing: parts, interventions, marks, slow-downs, planned stops."""
+"""Tables of the drive's report with a row for each thing: parts, interventions, marks, slow-downs, planned stops.
+
+An intervention has a drawing of the seconds before it, a mark its voice note and its photo as data: URIs, for a page
+that needs no other file. Only numbers of ours are put into drawings.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import base64
+import contextlib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
 
 from server.analysis import report_text
-from server.analysis.drive.axis import day_time
-from server.analysis.drive.intervention_drawing import before_plot
-from server.analysis.drive.media import Media
+from server.analysis.drive.axis import Scale, day_time, ticks
+from server.analysis.drive.drawings import path, sign_at, svg
+from server.recording.marks.media import MediaName
+from server.recording.marks.recorded import all_media
 
 MOST_ROWS = 300  # of one table; the CSV has all of them
+BEFORE_S = 10.0
+BEFORE_BREAK_S = 1.2  # without a sample for longer: the line ends
+BEFORE_WIDTH, BEFORE_HEIGHT = 260.0, 76.0
+MOST_MEDIA_BYTES = 24_000_000  # of all together: a page of more is not sent by mail, nor opened by a phone
 
 
 def parts(found: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
@@ -118,3 +130,70 @@ def planned_stops(found: Sequence[Mapping[str, Any]] | None, end_ms: int) -> lis
         lasted = report_text.length((until_ms - one["from_ms"]) / 1000)
         rows.append((day_time(one["from_ms"]), title, f"{ended}{by}", lasted))
     return rows
+
+
+def before_plot(one: Mapping[str, Any]) -> Markup | None:
+    """The speed in the 10 s before an intervention; None: fewer than two samples."""
+    samples = [(at_s, abs(mps)) for at_s, mps in one["before"] if -BEFORE_S - 0.5 <= at_s <= 0.05]
+    if len(samples) < 2:
+        return None
+    marks = ticks(0.0, max(max(mps for _, mps in samples), 1.0), 2)
+    x, y = Scale(-BEFORE_S, 0.0, 34.0, BEFORE_WIDTH - 14), Scale(0.0, marks[-1], BEFORE_HEIGHT - 22, 22.0)
+    parts = [
+        f'<path class="{"grid" if mark else "axis"}" d="M34 {y(mark):.1f}H{BEFORE_WIDTH - 14:g}"/>'
+        f'<text x="28" y="{y(mark) + 4.5:.1f}" text-anchor="end">{mark:g}</text>'
+        for mark in (marks[0], marks[-1])
+    ]
+    parts += [f'<path class="line" d="{path([(x(s), y(mps)) for s, mps in line])}"/>' for line in _unbroken(samples)]
+    parts.append(f'<path class="axis" d="M{x(0):.1f} 16V{BEFORE_HEIGHT - 22:g}"/>')
+    parts.append(sign_at("wheel", x(0), 8.0))
+    parts.append('<text x="28" y="11" text-anchor="end">m/s</text>')
+    for at_s, anchor, words in (
+        (-BEFORE_S, "start", "−10 s"),
+        (-BEFORE_S / 2, "middle", "−5 s"),
+        (0.0, "end", "0"),
+    ):
+        parts.append(f'<text x="{x(at_s):.1f}" y="{BEFORE_HEIGHT - 4:g}" text-anchor="{anchor}">{words}</text>')
+    return svg(BEFORE_WIDTH, BEFORE_HEIGHT, parts, "Speed in the 10 s before it")
+
+
+def _unbroken(samples: Sequence[tuple[float, float]]) -> list[list[tuple[float, float]]]:
+    lines: list[list[tuple[float, float]]] = []
+    for at_s, mps in samples:
+        if not lines or at_s - lines[-1][-1][0] > BEFORE_BREAK_S:
+            lines.append([])
+        lines[-1].append((at_s, mps))
+    return lines
+
+
+class Media:
+    """Of one drive; what does not fit is counted in `left_out`."""
+
+    def __init__(self) -> None:
+        self.left_out = 0
+        self._bytes = 0
+        self._found: dict[tuple[str, str], str] = {}
+
+    def get(self, mark: str, kind: str) -> str | None:
+        """The data: URI of a mark's `voice` or `photo`."""
+        return self._found.get((mark, kind))
+
+    def add(self, name: MediaName, data: bytes) -> None:
+        """The first of a mark counts."""
+        if (name.mark, name.kind) in self._found:
+            return
+        if self._bytes + len(data) > MOST_MEDIA_BYTES:
+            self.left_out += 1
+            return
+        self._bytes += len(data)
+        self._found[name.mark, name.kind] = f"data:{name.media_type};base64,{base64.b64encode(data).decode()}"
+
+
+def media_of(files: Iterable[Path]) -> Media:
+    """The attachments of recordings and the files beside them; what cannot be read has none."""
+    found = Media()
+    for file in files:
+        with contextlib.suppress(OSError):
+            for name, data in all_media(file):
+                found.add(name, data)
+    return found

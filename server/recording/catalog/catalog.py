@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import shutil
-import zlib
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +17,7 @@ import orjson
 
 from server.protocol.answers import Recording, RecordingNames, Total, VerificationAnswer
 from server.protocol.logbook import LogbookDrive
+from server.recording import space
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.catalog_db import Entry, Which
 from server.recording.catalog.entries import Entries, Refused
@@ -127,8 +126,8 @@ class Catalog:
         """The sketch of all its signals; None: it has not been read yet."""
         entry = self._listing.entry(id)
         sha256 = (entry.found or {}).get("sha256") if entry is not None else None
-        body = self._entries.trends(sha256) if sha256 is not None else None
-        found: dict[str, Any] | None = None if body is None else orjson.loads(zlib.decompress(body))
+        body = self._entries.body("trends", sha256) if sha256 is not None else None
+        found: dict[str, Any] | None = None if body is None else orjson.loads(body)
         return found
 
     def course(self, id: str) -> bytes | None:
@@ -142,12 +141,11 @@ class Catalog:
         """Of one recording."""
         entry = self._listing.entry(id)
         sha256 = (entry.found or {}).get("sha256") if entry is not None else None
-        body = self._entries.course(sha256) if sha256 is not None else None
+        body = self._entries.body("course", sha256) if sha256 is not None else None
         if body is None or entry is None:
             return None
-        whole = zlib.decompress(body)
         beside = entry.annotations
-        return orjson.dumps(with_marks(orjson.loads(whole), entry.marks)) if beside.marks or beside.removed else whole
+        return orjson.dumps(with_marks(orjson.loads(body), entry.marks)) if beside.marks or beside.removed else body
 
     def drives(self, which: Which) -> list[LogbookDrive]:
         """The drives for the logbook, oldest first; those that are yet to be read are not among them."""
@@ -217,11 +215,8 @@ class Catalog:
 
     def free_bytes(self) -> int | None:
         """The free space of the disk [B]; None: unknown."""
-        folder = self.folder
-        while not folder.exists() and folder != folder.parent:
-            folder = folder.parent
         try:
-            return shutil.disk_usage(folder).free
+            return space.free_at(self.folder)
         except OSError:
             return None
 

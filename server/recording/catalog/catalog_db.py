@@ -6,10 +6,11 @@ import contextlib
 import logging
 import os
 import sqlite3
+import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import orjson
 
@@ -48,6 +49,8 @@ PRAGMA user_version = {(VERSION := 2)};
 _FORGET = """
 DELETE FROM {table} WHERE sha256 NOT IN (SELECT found ->> 'sha256' FROM recording WHERE found ->> 'sha256' IS NOT NULL)
 """
+Table = Literal["trends", "course", "figures"]  # what is beside the rows: a list reads every row, and needs none of it
+TABLES: tuple[Table, ...] = get_args(Table)
 COLUMNS = "path, id, trashed_ms, vehicle, started_ms, size, changed_ns, found, title, note, tags, weather, marks"
 
 
@@ -111,7 +114,7 @@ def _open(name: str) -> sqlite3.Connection:
         database.execute("PRAGMA synchronous=OFF")  # after a power loss it is rebuilt from the files
         database.executescript(_SCHEMA)
         database.execute("PRAGMA quick_check").fetchone()
-        for table in ("trends", "figures", "course"):
+        for table in TABLES:
             database.execute(_FORGET.format(table=table))
         return database
     except BaseException:
@@ -171,29 +174,17 @@ def forget(database: sqlite3.Connection, paths: Iterable[str]) -> None:
     database.executemany("DELETE FROM recording WHERE path = ?", [(os.fsencode(path),) for path in paths])
 
 
-def put_trends(database: sqlite3.Connection, sha256: str, body: bytes) -> None:
-    """Keeps the trends of a file by its content, so that a file that is moved has them still."""
-    database.execute("INSERT OR REPLACE INTO trends VALUES (?, ?)", (sha256, body))
+def put_body(database: sqlite3.Connection, table: Table, sha256: str, body: dict[str, Any]) -> None:
+    """Keeps trends, course or figures of a file by its content, so that a file that is moved has them still."""
+    text = orjson.dumps(body)
+    kept = text.decode() if table == "figures" else zlib.compress(text, 6)
+    database.execute(f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", (sha256, kept))
 
 
-def trends(database: sqlite3.Connection, sha256: str) -> bytes | None:
-    row = database.execute("SELECT body FROM trends WHERE sha256 = ?", (sha256,)).fetchone()
-    return row[0] if row is not None else None
-
-
-def put_course(database: sqlite3.Connection, sha256: str, body: bytes) -> None:
-    """Keeps the course of a drive, as its trends."""
-    database.execute("INSERT OR REPLACE INTO course VALUES (?, ?)", (sha256, body))
-
-
-def course(database: sqlite3.Connection, sha256: str) -> bytes | None:
-    row = database.execute("SELECT body FROM course WHERE sha256 = ?", (sha256,)).fetchone()
-    return row[0] if row is not None else None
-
-
-def put_figures(database: sqlite3.Connection, sha256: str, figures: dict[str, Any]) -> None:
-    """Keeps the figures of a drive by the content of its file, as its trends."""
-    database.execute("INSERT OR REPLACE INTO figures VALUES (?, ?)", (sha256, orjson.dumps(figures).decode()))
+def body(database: sqlite3.Connection, table: Literal["trends", "course"], sha256: str) -> bytes | None:
+    """What `put_body` kept, as JSON; None: nothing."""
+    row = database.execute(f"SELECT body FROM {table} WHERE sha256 = ?", (sha256,)).fetchone()
+    return zlib.decompress(row[0]) if row is not None else None
 
 
 def figures(database: sqlite3.Connection, which: Which, most: int) -> list[tuple[Any, ...]]:

@@ -8,11 +8,11 @@ import sqlite3
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from server.protocol.answers import RecordingNames, Total
 from server.recording.catalog import catalog_db
-from server.recording.catalog.catalog_db import COLUMNS, Entry, Which
+from server.recording.catalog.catalog_db import COLUMNS, Entry, Table, Which
 
 log = logging.getLogger("catgraph.catalog")
 
@@ -68,33 +68,16 @@ class Entries:
             if paths and not self._is_closed:
                 self._write(lambda database: catalog_db.forget(database, paths))
 
-    def put_trends(self, sha256: str, body: bytes) -> None:
-        """Keeps the sketch of a drive's signals."""
+    def put_body(self, table: Table, sha256: str, body: dict[str, Any]) -> None:
+        """Keeps trends, course or figures of a drive."""
         with self.lock:
             if not self._is_closed:
-                self._write(lambda database: catalog_db.put_trends(database, sha256, body))
+                self._write(lambda database: catalog_db.put_body(database, table, sha256, body))
 
-    def trends(self, sha256: str) -> bytes | None:
-        """What `put_trends` kept; None: nothing."""
+    def body(self, table: Literal["trends", "course"], sha256: str) -> bytes | None:
+        """What `put_body` kept, as JSON; None: nothing."""
         with self.lock:
-            return None if self._is_closed else catalog_db.trends(self._database, sha256)
-
-    def put_figures(self, sha256: str, figures: dict[str, Any]) -> None:
-        """Keeps the figures of a drive for the logbook."""
-        with self.lock:
-            if not self._is_closed:
-                self._write(lambda database: catalog_db.put_figures(database, sha256, figures))
-
-    def put_course(self, sha256: str, body: bytes) -> None:
-        """Keeps the course of a drive, for comparisons."""
-        with self.lock:
-            if not self._is_closed:
-                self._write(lambda database: catalog_db.put_course(database, sha256, body))
-
-    def course(self, sha256: str) -> bytes | None:
-        """What `put_course` kept; None: nothing."""
-        with self.lock:
-            return None if self._is_closed else catalog_db.course(self._database, sha256)
+            return None if self._is_closed else catalog_db.body(self._database, table, sha256)
 
     def figures(self, which: Which, most: int) -> list[tuple[Any, ...]]:
         """The newest drives of some kind, oldest first: see catalog_db.figures."""

@@ -38,7 +38,7 @@ from server.recording.drive.facts import facts_of, figures_of, limits_of, undesc
 from server.recording.drive.motion import Motion
 from server.recording.drive.parts import Span, gaps_of
 from server.recording.event_channels import read_recorded_events
-from server.recording.marks.of_drive import in_recording
+from server.recording.marks.recorded import in_recording
 from server.recording.mcap.chain import read_head
 from server.recording.read.errors import NoRoom
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording

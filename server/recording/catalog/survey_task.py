@@ -10,7 +10,6 @@ import contextlib
 import logging
 import os
 import sys
-import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from typing import Any
 import orjson
 
 from server.recording.catalog.annotations import line
-from server.recording.catalog.catalog_db import Entry
+from server.recording.catalog.catalog_db import TABLES, Entry
 from server.recording.catalog.discovery import started_ms_of, vehicle_of
 from server.recording.catalog.entries import Entries
 from server.recording.catalog.folder_listing import FolderListing
@@ -173,15 +172,9 @@ class SurveyTask:
             now = next(iter(self._entries.select("WHERE path = ?", [os.fsencode(entry.path)])), None)
             if now is None or (now.size, now.changed_ns) != (entry.size, entry.changed_ns):
                 return
-            trends = found.pop("trends", None)  # beside the row: a list reads every row, and needs none of it
-            if trends is not None:
-                self._entries.put_trends(found["sha256"], zlib.compress(orjson.dumps(trends), 6))
-            course = found.pop("course", None)
-            if course is not None:
-                self._entries.put_course(found["sha256"], zlib.compress(orjson.dumps(course), 6))
-            figures = found.pop("figures", None)
-            if figures is not None:
-                self._entries.put_figures(found["sha256"], figures)
+            for table in TABLES:
+                if (body := found.pop(table, None)) is not None:
+                    self._entries.put_body(table, found["sha256"], body)
             is_passing = found.pop("is_passing", False)  # then it is read again when the folder is scanned again
             found = {**found, "survey": None if is_passing else VERSION}
             origin = entry.path.split("/", 2)[2] if entry.trashed_ms is not None else entry.path

@@ -1,4 +1,7 @@
-"""The alarms of a drive: when they were raised, acknowledged and over. Times are ms since 1970."""
+"""The alarms of a drive: when they were raised, acknowledged and over, and which part of the car each is about.
+
+Times are ms since 1970.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,10 @@ from dataclasses import dataclass, replace
 from statistics import median
 from typing import Any
 
-from monitor.alarm import AlarmState
+from monitor import catalog
+from monitor.alarm import LEVEL, AlarmState
+from monitor.signals import SIGNALS
 from server.judge.logged_transition import spec_of
-from server.recording.drive.components import component_of
 from server.recording.drive.drive_events import Event, text_of
 
 MOST_ALARMS = 5000
@@ -22,6 +26,25 @@ MARKS = {
     "paused": "suppressed: monitoring was paused",
     "suppressed": "suppressed by another alarm",
 }
+_ABOUT_NEEDS = {check.id: sorted(check.needs) for check in catalog.CHECKS}
+# The first part of an alarm's id, where its check names no signal.
+_BY_PREFIX = (
+    ("laser", "Laser"),
+    ("link", "Link"),
+    ("connect", "Link"),
+    ("no_message", "Link"),
+    ("car_silent", "Link"),
+    ("bridge", "Link"),
+    ("all_slow", "Link"),
+    ("phone", "Phone"),
+    ("slow_down", "Slow-down"),
+    ("clock", "Clock"),
+    ("record", "Recorder"),
+    ("disk", "Recorder"),
+    ("log_", "Recorder"),
+    ("reach", "Operators"),
+    ("paused", "Operators"),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,3 +138,17 @@ def _raised(alarm: str, event: Event) -> AlarmInDrive:
         raised_ms=event["at_ms"],
         planned_stop=isinstance(event.get("planned_stop"), str),
     )
+
+
+def component_of(alarm_id: str, causes: Sequence[str] = ()) -> str:
+    """A name for people. Diagnostics name the component themselves, as their cause."""
+    check_id, _, signal = alarm_id.partition(".")
+    if check_id.startswith("diagnostics"):
+        return next((cause[:60] for cause in causes if cause and not cause.startswith(LEVEL)), "Diagnostics")
+    if signal in SIGNALS:
+        return SIGNALS[signal].label
+    for prefix, name in _BY_PREFIX:
+        if check_id.startswith(prefix):
+            return name
+    needs = _ABOUT_NEEDS.get(check_id)
+    return SIGNALS[needs[0]].label if needs else "Other"

@@ -17,15 +17,24 @@ from server.recording.delay import RecordedDelay
 from server.recording.drive.alarms import AlarmInDrive, alarms_of, by_component, percentile
 from server.recording.drive.departure import Departure, check_of, departure_of
 from server.recording.drive.drive_events import Event, PartEvents, joined, of_change, read_part_events, whole_of
-from server.recording.drive.modes import MODES, Intervention, ModeSpan, are_modes_known, interventions_of, mode_spans
+from server.recording.drive.modes import (
+    MODES,
+    Intervention,
+    ModeSpan,
+    PlannedStopInDrive,
+    SlowDownInDrive,
+    are_modes_known,
+    interventions_of,
+    mode_spans,
+    planned_stops_of,
+    slow_downs_of,
+)
 from server.recording.drive.motion import Motion
 from server.recording.drive.parts import DrivePart, Span, gaps_of, outside, parts_of
 from server.recording.drive.people import PersonInDrive, joined_people, names_of, people_of
-from server.recording.drive.planned_stops import PlannedStopInDrive, planned_stops_of
-from server.recording.drive.slow_downs import SlowDownInDrive, slow_downs_of
 from server.recording.event_channels import read_recorded_events
 from server.recording.marks.described import as_event
-from server.recording.marks.of_drive import described_late, marks_of
+from server.recording.marks.recorded import described_late, marks_of
 from server.recording.read.read import Recording
 
 SIGNALS = ("speed", "odometry", "position", "steering", "command")

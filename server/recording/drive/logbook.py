@@ -1,4 +1,5 @@
-"""The logbook of a car: all its drives, week by week, from the figures that the catalog keeps of each."""
+"""The logbook of a car: all its drives, week by week, from the figures that the catalog keeps of each; and how long ago
+each car was checked before a drive."""
 
 from __future__ import annotations
 
@@ -9,17 +10,19 @@ from typing import Any, Literal
 import orjson
 
 from monitor.driving_summary import per_km
-from server.protocol.logbook import LogbookAnswer, LogbookDrive, LogbookTotals, LogbookWeek
-from server.recording.drive.checks import checks_of
+from server.protocol.departure import RecurringItem
+from server.protocol.logbook import LogbookAnswer, LogbookCheck, LogbookDrive, LogbookDue, LogbookTotals, LogbookWeek
 from server.recording.drive.modes import MODES
 from server.recording.marks.rows import merged
 
-WEEK_MS = 7 * 86_400_000
-MONDAY_MS = 4 * 86_400_000  # the first Monday after 1970 began
+DAY_MS = 86_400_000
+WEEK_MS = 7 * DAY_MS
+MONDAY_MS = 4 * DAY_MS  # the first Monday after 1970 began
 MEDIAN_OF = 5
 LEAST_M = 100.0  # in a week: of less, a rate on 100 km has no meaning
 MOST_WEEKS = 520
 MOST_STOPPED_MS = 3_600_000  # between two recordings of one drive, with a restart of the server between them
+MOST_DRIVES = MOST_PEOPLE = MOST_VEHICLES = 200
 
 Rated = Literal["interventions", "alarms"]
 
@@ -78,7 +81,6 @@ def logbook(
     now_ms: int,
     every: Sequence[LogbookDrive] | None = None,
     unread: int = 0,
-    most_drives: int = 200,
 ) -> LogbookAnswer:
     """`person`: only drives in which they were on duty. `every`: all drives of the cars, for when they were checked;
     None: these are all. `unread`: recordings whose drives are missing, as they are yet to be read."""
@@ -88,8 +90,8 @@ def logbook(
         "totals": _totals(chosen),
         "weeks": weeks_of(chosen),
         "components": _components(chosen),
-        "drives": list(chosen[-most_drives:][::-1]),
-        "people": people[:200],
+        "drives": list(chosen[-MOST_DRIVES:][::-1]),
+        "people": people[:MOST_PEOPLE],
         "checks": checks_of(drives if every is None else every, now_ms),
         "unread": unread,
     }
@@ -247,3 +249,76 @@ def _sum(one: float | None, other: float | None) -> float | None:
 def _count_of(one: int | None, other: int | None) -> int | None:
     """Not known where one part does not know: its distance counts, and a rate must not seem better by it."""
     return None if one is None or other is None else one + other
+
+
+def checks_of(drives: Sequence[LogbookDrive], now_ms: int) -> list[LogbookCheck]:
+    """One for each car, by name. `drives`: all of them, oldest first, whatever else was requested."""
+    by_vehicle: dict[str, list[LogbookDrive]] = {}
+    for drive in drives:
+        by_vehicle.setdefault(drive["vehicle"], []).append(drive)
+    return [_check(vehicle, by_vehicle[vehicle], now_ms) for vehicle in sorted(by_vehicle)[:MOST_VEHICLES]]
+
+
+def _check(vehicle: str, drives: Sequence[LogbookDrive], now_ms: int) -> LogbookCheck:
+    """The drive that was checked counts as driven since, not as a drive without."""
+    place = max((n for n, drive in enumerate(drives) if drive["departure"] == "signed"), default=None)
+    signed = None if place is None else drives[place]
+    since = drives[place or 0 :]
+    without = since if signed is None else since[1:]
+    distance_m, unmeasured = _driven(since)
+    due = [] if signed is None else [_due(row, drives, now_ms) for row in signed["recurring"]]
+    return {
+        "vehicle": vehicle,
+        "signed_ms": None if signed is None else signed["departure_ms"] or signed["started_ms"],
+        "by": "" if signed is None else signed["departure_by"],
+        "failed": 0 if signed is None else signed["departure_failed"],
+        "failed_items": [] if signed is None else signed["failed_items"],
+        "distance_m": distance_m,
+        "unmeasured": unmeasured,
+        "drives": len(without),
+        "not_known": sum(drive["departure"] is None for drive in without),
+        "recurring": sorted(due, key=lambda one: (not one["is_overdue"], _left(one), one["title"])),
+    }
+
+
+def _due(row: RecurringItem, drives: Sequence[LogbookDrive], now_ms: int) -> LogbookDue:
+    """Counted from the newest signed check in which it was done. What was driven without being measured makes nothing
+    late, and nothing certain."""
+    places = [n for n, drive in enumerate(drives) if drive["departure"] == "signed" and _is_done(row["item"], drive)]
+    done = drives[places[-1]] if places else None
+    distance_m, unmeasured = (None, 0) if done is None else _driven(drives[places[-1] :])
+    done_ms = None if done is None else done["departure_ms"] or done["started_ms"]
+    days, km = row["every_days"], row["every_km"]
+    due_days = None if days is None or done_ms is None else (done_ms + days * DAY_MS - now_ms) // DAY_MS
+    due_km = None if km is None or distance_m is None else round(km - distance_m / 1000, 1)
+    return {
+        "item": row["item"],
+        "title": row["title"],
+        "every_days": days,
+        "every_km": km,
+        "done_ms": done_ms,
+        "distance_m": distance_m,
+        "is_least": unmeasured > 0,
+        "due_days": due_days,
+        "due_km": due_km,
+        "is_overdue": done is None or (due_days is not None and due_days < 0) or (due_km is not None and due_km < 0),
+    }
+
+
+def _is_done(item: str, drive: LogbookDrive) -> bool:
+    return any(row["item"] == item and row["is_done"] for row in drive["recurring"])
+
+
+def _driven(drives: Sequence[LogbookDrive]) -> tuple[float | None, int]:
+    """How far [m], None: not known; and of how many drives the distance is not known."""
+    metres = [drive["distance_m"] for drive in drives if drive["distance_m"] is not None]
+    return (round(sum(metres), 1) if metres else None), len(drives) - len(metres)
+
+
+def _left(due: LogbookDue) -> float:
+    """What is left of its interval, as a part of it; negative: late, never done: as late as can be."""
+    if due["done_ms"] is None:
+        return float("-inf")
+    days, km, due_days, due_km = due["every_days"], due["every_km"], due["due_days"], due["due_km"]
+    parts = [left / whole for left, whole in ((due_days, days), (due_km, km)) if left is not None and whole]
+    return min(parts, default=float("inf"))

@@ -1,11 +1,15 @@
-"""Who drove: spans of driving modes, and interventions. Times are ms since 1970."""
+"""Who drove and what was done in a drive: spans of driving modes, interventions, planned stops, orders to slow down.
+
+Times are ms since 1970.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from server.recording.drive.drive_events import Event, moment_of, number_of, of_change, text_of
+from monitor.planned_stop import REASONS, reason_of
+from server.recording.drive.drive_events import Event, moment_of, number_of, of_change, text_of, whole_of
 
 MODES = ("autonomous", "manual", "unknown")
 MOST_INTERVENTIONS = 1000
@@ -15,6 +19,8 @@ _KINDS = {
     "steer": "steering against the command",
 }
 _INITIATORS = ("driver", "operator", "system")
+MOST_PLANNED_STOPS = 500
+MOST_SLOW_DOWNS = 500
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,3 +134,84 @@ def _before(rows: list[object]) -> tuple[tuple[float, float], ...]:
             if at_s is not None and speed_mps is not None:
                 found.append((at_s, speed_mps))
     return tuple(found)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedStopInDrive:
+    """One. `from_ms` may be before the drive began; `to_ms` None: it did not end in it."""
+
+    reason: str  # as text
+    by: str
+    from_ms: int
+    to_ms: int | None = None
+    ended: str = ""  # the text of its end
+    ended_by: str = ""  # "": it ended by itself
+
+
+def planned_stops_of(events: Sequence[Event]) -> list[PlannedStopInDrive]:
+    """All of them, in order. After a restart of the server it is the same one; another reason is another."""
+    found: list[PlannedStopInDrive] = []
+    for event in of_change(events, "planned_stop", "planned_stop_ended"):
+        at_ms, newest = event["at_ms"], found[-1] if found and found[-1].to_ms is None else None
+        if event["change"] == "planned_stop_ended":
+            if newest is not None:
+                ended, by = text_of(event, "text", 300), text_of(event, "by", 120)
+                found[-1] = replace(newest, to_ms=at_ms, ended=ended, ended_by=by)
+            continue
+        reason = REASONS[reason_of(event.get("reason"))]
+        since_ms = number_of(event, "since_ms")
+        if newest is not None and newest.reason == reason:
+            continue
+        if newest is not None:
+            found[-1] = replace(newest, to_ms=at_ms)
+        if len(found) < MOST_PLANNED_STOPS:
+            from_ms = at_ms if since_ms is None else round(since_ms)
+            found.append(PlannedStopInDrive(reason=reason, by=text_of(event, "by", 120), from_ms=from_ms))
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowDownInDrive:
+    """One order. None: that did not happen, or not in this drive."""
+
+    order: int
+    by: str
+    why: str
+    ordered_ms: int
+    sent_ms: int | None = None  # the first command
+    slows_ms: int | None = None  # the car's speed proved it
+    proof: str = ""  # the text of the proof
+    not_confirmed_ms: int | None = None
+    released_ms: int | None = None
+    steps: int = 1
+
+
+_MOMENTS = {"sent": "sent_ms", "slows": "slows_ms", "not_confirmed": "not_confirmed_ms"}
+
+
+def slow_downs_of(events: Sequence[Event]) -> list[SlowDownInDrive]:
+    """All orders, in order."""
+    found: dict[int, SlowDownInDrive] = {}
+    for event in of_change(events, "slow_down"):
+        number, step = whole_of(event, "order"), text_of(event, "step", 20)
+        if not number:
+            continue
+        order = found.get(number)
+        if order is None:
+            if len(found) >= MOST_SLOW_DOWNS:
+                continue
+            by = text_of(event, "ordered_by", 120) or text_of(event, "by", 120)
+            order = SlowDownInDrive(order=number, by=by, why=text_of(event, "why", 300), ordered_ms=event["at_ms"])
+        found[number] = _after_step(order, step, event)
+    return list(found.values())
+
+
+def _after_step(order: SlowDownInDrive, step: str, event: Event) -> SlowDownInDrive:
+    order = replace(order, steps=order.steps + 1)
+    if step in ("slows", "not_confirmed", "stands"):
+        order = replace(order, proof=text_of(event, "text", 300))
+    if step in _MOMENTS and getattr(order, _MOMENTS[step]) is None:
+        return replace(order, **{_MOMENTS[step]: event["at_ms"]})
+    if step in ("released", "ended"):
+        return replace(order, released_ms=event["at_ms"])
+    return order

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from server.protocol.people import ROLES
-from server.recording.drive.drive_events import Event, of_change, text_of
+from server.recording.drive.drive_events import Event, text_of
 
 MOST_PEOPLE = 100
 
@@ -70,11 +70,6 @@ def joined_people(parts: Sequence[tuple[int, int, Sequence[PersonInDrive]]]) -> 
 def names_of(people: Sequence[PersonInDrive]) -> list[str]:
     """The people by name, without devices at which nobody had signed on."""
     return list(dict.fromkeys(one.name for one in people if one.role))
-
-
-def controllers(events: Sequence[Event]) -> bool:
-    """Whether the log has anything on control."""
-    return any(True for _ in of_change(events, "control"))
 
 
 def _person(event: Event, found: dict[str, PersonInDrive]) -> PersonInDrive | None:

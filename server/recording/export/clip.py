@@ -21,7 +21,7 @@ from server.protocol.marks import DriveMark
 from server.recording.export.export_format import NothingRecorded, Outcome, Progress, nothing
 from server.recording.export.raw import OWN, Raw, described_event, raw_messages, span_ns
 from server.recording.folder import WRITING, id_of
-from server.recording.marks.of_drive import described_late, marks_of, media_of
+from server.recording.marks.recorded import described_late, marks_of, media_of
 from server.recording.marks.rows import entry
 from server.recording.mcap.write import PartFile
 from server.recording.own import own_schema

@@ -10,7 +10,7 @@ Progress = Callable[[float], None]  # called now and then, with 0 to 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportFormat:
-    """One format, declared as `FORMAT` in a file of the package `formats`."""
+    """One format, declared in a file of the package `formats`."""
 
     name: str
     label: str  # on the page's key

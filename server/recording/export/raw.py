@@ -15,7 +15,7 @@ import orjson
 from server.protocol.driving_state import InterventionDescription
 from server.recording.export.export_format import Outcome
 from server.recording.marks.described import as_event
-from server.recording.marks.of_drive import described_late, in_recording, marks_of
+from server.recording.marks.recorded import described_late, in_recording, marks_of
 from server.recording.marks.rows import entry
 from server.recording.read.errors import RecordingUnreadable
 from server.recording.read.read import Recording

@@ -15,7 +15,7 @@ from monitor.geo import is_at_zero
 from monitor.values import STATUS_UNSET, GpsFix
 from server.recording.export.decoded_drive import DecodedDrive
 from server.recording.export.export_format import ExportRefused, Progress, nothing
-from server.recording.marks.of_drive import marks_of, title_of
+from server.recording.marks.recorded import marks_of, title_of
 
 GAP_S = 5.0  # after this time without a position a new track starts, as on the map
 NEAR_S = 5.0  # an alarm is active where the car was, if it was known within so long

@@ -14,8 +14,7 @@ from typing import Any, cast, get_args
 
 from monitor.interventions import By
 from server.protocol.driving_state import InterventionDescription
-from server.recording.mcap.mcap_file import McapFile
-from server.recording.mcap.own_entries import finished, own_entries
+from server.recording.mcap.mcap_file import McapFile, finished, own_entries
 from server.recording.own import PREFIX
 from server.system.clean_text import clean
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from itertools import islice
@@ -15,13 +15,15 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex
 
+from server.protocol.driving_state import InterventionDescription
 from server.protocol.marks import DriveMark
 from server.recording.catalog import annotations as annotation_store
 from server.recording.marks import media
 from server.recording.marks.media import Kind, MediaName
 from server.recording.marks.rows import folded, merged
-from server.recording.mcap.own_entries import attachments_of, finished, own_entries
+from server.recording.mcap.mcap_file import attachments_of, finished, own_entries
 from server.recording.own import PREFIX
+from server.recording.read.read import Recording
 
 TOPIC = f"{PREFIX}marks"
 MOST = 20_000  # entries; a file that holds more is not of our making
@@ -154,3 +156,39 @@ def late_media(path: Path) -> list[Path]:
     folder = annotation_store.media_beside(path)
     found = sorted(folder.iterdir()) if folder.is_dir() else []
     return [file for file in found if media.name_of(file.name) is not None]
+
+
+def marks_of(recording: Recording) -> list[DriveMark]:
+    """Oldest first, late ones among them."""
+    return with_late(in_recording(recording), files_of(recording), recording.start_s * 1000)
+
+
+def in_recording(recording: Recording) -> list[DriveMark]:
+    """Those that the recording itself holds. Raises RecordingUnreadable."""
+    marks, _ = folded(row for _, row in islice(recording.own(TOPIC), MOST))
+    return list(marks.values())
+
+
+def media_of(recording: Recording) -> Iterator[tuple[MediaName, bytes]]:
+    """The voice notes and photos of those marks."""
+    marks = {row["mark"] for row in marks_of(recording)}
+    for path in files_of(recording):
+        with contextlib.suppress(OSError):
+            yield from ((name, data) for name, data in all_media(path) if name.mark in marks)
+
+
+def described_late(recording: Recording) -> list[InterventionDescription]:
+    """The descriptions of its interventions after it was complete, oldest first."""
+    rows = [row for path in files_of(recording) for row in annotation_store.read(path).described]
+    return sorted(rows, key=lambda row: row["described_ms"])
+
+
+def files_of(recording: Recording) -> Sequence[Path]:
+    """Those of which it is, and before them the folder of a split bag: marks and descriptions can be beside each."""
+    folders = [folder for path in recording.paths if path.is_dir() and (folder := path.absolute()).name]
+    return [*folders, *(file.path for file in recording.files)]
+
+
+def title_of(mark: DriveMark) -> str:
+    """A short text for a map or a table."""
+    return mark["category"] or (mark["words"][:60] if mark["words"] else "Mark")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections import Counter
 from collections.abc import Container, Iterator, Sequence
@@ -9,8 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
+import orjson
 from mcap.reader import McapReader, make_reader
-from mcap.records import ChunkIndex, Statistics
+from mcap.records import AttachmentIndex, ChunkIndex, Statistics
 
 from server.judge.message import RosVersion
 from server.recording.mcap.chunk_rows import EVERYWHERE, ChunkRow, chunk_rows, in_order, run_rows
@@ -295,3 +297,30 @@ def _ros_version(profile: str, channels: Sequence[Channel]) -> RosVersion:
     encodings = {channel.encoding for channel in channels}
     is_ros2 = "cdr" in encodings or any("/msg/" in one.type for one in channels if one.encoding == "json")
     return 2 if is_ros2 and "ros1" not in encodings else 1
+
+
+def own_entries(source: McapFile, topic: str) -> Iterator[dict[str, Any]]:
+    """The JSON objects of a channel in the order of time. Raises OSError."""
+    numbers = {channel.number for channel in source.channels if channel.topic == topic}
+    for _, _, raw in source.messages(numbers, 0) if numbers else ():
+        with contextlib.suppress(orjson.JSONDecodeError):
+            entry = orjson.loads(raw)
+            if isinstance(entry, dict):
+                yield entry
+
+
+def finished(path: Path) -> McapFile:
+    """The file, open. Raises ValueError where it was never closed, OSError, and whatever damage makes of it."""
+    with path.open("rb") as file:
+        if is_cut(file):  # before its index is made, for which all of it is unpacked
+            raise ValueError(f"{path.name} was never closed")
+    return McapFile(path)
+
+
+def attachments_of(file: IO[bytes]) -> list[AttachmentIndex]:
+    """Where each attachment of a file is. Raises OSError, and whatever damage makes the library raise."""
+    summary = make_reader(file).get_summary()
+    if summary is not None and summary.statistics is not None:
+        if len(summary.attachment_indexes) == summary.statistics.attachment_count:
+            return list(summary.attachment_indexes)
+    return scan(file, with_messages=False).attachments

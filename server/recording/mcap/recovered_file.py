@@ -27,8 +27,8 @@ from mcap.records import (
 )
 
 from server.recording.mcap.chain import RECORD_BYTES, ChainWriter, Kind
-from server.recording.mcap.chunk_index import read_indexes
 from server.recording.mcap.chunks import MAGIC, BadChunk, Walk, WholeChunk
+from server.recording.mcap.write import read_indexes
 from server.recording.own import METADATA
 
 _BLOCK = 1 << 20

@@ -7,42 +7,24 @@ ROS 2: OMG CDR 1.0 (DDSI-RTPS 10: a 4-byte header, then each primitive aligned t
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
 
-from server.judge.message import RosVersion
+from server.judge import shapes
+from server.judge.message import Json, RosVersion
+from server.recording.read.code_writer import PLACEHOLDER, ROS1_TIMES, CodeWriter
 from server.recording.read.definitions import demand_few_fields
 from server.recording.read.errors import Undecodable
+from server.recording.read.source import Channel, Damage, FileSource
 
 Decode = Callable[[bytes], dict[str, Any]]
 
-# name → (code of struct, numpy dtype without byte order, bytes)
-_PRIMITIVES = {
-    "bool": ("?", "?", 1),
-    "byte": ("b", "i1", 1),
-    "char": ("B", "u1", 1),
-    "int8": ("b", "i1", 1),
-    "uint8": ("B", "u1", 1),
-    "int16": ("h", "i2", 2),
-    "uint16": ("H", "u2", 2),
-    "int32": ("i", "i4", 4),
-    "uint32": ("I", "u4", 4),
-    "int64": ("q", "i8", 8),
-    "uint64": ("Q", "u8", 8),
-    "float32": ("f", "f4", 4),
-    "float64": ("d", "f8", 8),
-}
-_ROS1_TIMES = {
-    "builtin_interfaces/msg/Time": ("uint32", "secs", "nsecs"),
-    "builtin_interfaces/msg/Duration": ("int32", "secs", "nsecs"),
-}
-_PLACEHOLDER = "structure_needs_at_least_one_member"  # how ROS 2 writes a message without fields; no field of anybody's
 _MISTAKES = (struct.error, ValueError, OverflowError, MemoryError)
-_DEEPEST = 32  # levels of messages in messages: a definition that contains itself never ends
 
 
 def sifted(decode: Decode, topic: str, topics: Collection[str] | None) -> Decode:
@@ -84,21 +66,21 @@ def compile_decoder(type: str, definitions: dict[str, Any], version: RosVersion)
     """
     demand_few_fields(type, definitions)
     if version == 1:
-        return _compile(type, definitions, _Layout(ros1=True, order="<", start=0), None)
+        return _compile(type, definitions, _ByteLayout(ros1=True, order="<", start=0), None)
     big: list[Decode] = []  # compiled when first met: hardly any recording has them
 
     def read_other(raw: bytes) -> dict[str, Any]:
         if raw[:2] != b"\x00\x00":
             raise Undecodable(f"its encoding {raw[:2].hex() or 'nothing'} is not plain CDR")
         if not big:
-            big.append(_compile(type, definitions, _Layout(ros1=False, order=">", start=4), None))
+            big.append(_compile(type, definitions, _ByteLayout(ros1=False, order=">", start=4), None))
         return big[0](raw)
 
-    return _compile(type, definitions, _Layout(ros1=False, order="<", start=4), read_other)
+    return _compile(type, definitions, _ByteLayout(ros1=False, order="<", start=4), read_other)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Layout:
+class _ByteLayout:
     """The byte layout: packed in ROS 1, aligned in CDR."""
 
     ros1: bool
@@ -106,9 +88,9 @@ class _Layout:
     start: int
 
 
-def _compile(type: str, definitions: dict[str, Any], layout: _Layout, other: Decode | None) -> Decode:
+def _compile(type: str, definitions: dict[str, Any], layout: _ByteLayout, other: Decode | None) -> Decode:
     """`other` reads what is not little-endian CDR."""
-    writer = _Writer(definitions, layout)
+    writer = _DecoderWriter(definitions, layout)
     result = writer.message(type, 0)
     writer.flush()
     lines = ["def decode(raw):"]
@@ -128,37 +110,23 @@ def _compile(type: str, definitions: dict[str, Any], layout: _Layout, other: Dec
     return decode
 
 
-class _Writer:
-    """Writes the source of one decoder: runs of primitives become one struct each, nested messages are written in line.
+class _DecoderWriter(CodeWriter):
+    """Writes the source of one decoder."""
 
-    Names from definitions go into the source only as quoted strings, so no definition can smuggle in code.
-    """
-
-    def __init__(self, definitions: dict[str, Any], layout: _Layout) -> None:
-        self.lines: list[str] = []
-        self.constants: dict[str, Any] = {}
-        self._definitions = definitions
+    def __init__(self, definitions: dict[str, Any], layout: _ByteLayout) -> None:
+        super().__init__(definitions, ros1=layout.ros1)
         self._layout = layout
-        self._indent = "  "
-        self._names = 0
-        self._run: list[str] = []  # struct codes not yet written out, and
-        self._variables: list[str] = []  # the variables which take their values
-        self._modulus, self._offset = 8, 0  # what is known of the place: place mod _modulus = _offset
+        self._variables: list[str] = []  # which take the values of the run
 
     def message(self, type: str, depth: int) -> str:
         """Writes the reading of a message; answers the expression of its dict."""
-        if depth > _DEEPEST:
-            raise Undecodable("its definition contains itself")
-        if self._layout.ros1 and type in _ROS1_TIMES:
-            primitive, seconds, nanoseconds = _ROS1_TIMES[type]
-            first, second = self._primitive(primitive), self._primitive("uint32" if primitive == "uint32" else "int32")
-            return f"{{{seconds!r}: {first}, {nanoseconds!r}: {second}}}"
-        if type not in self._definitions:
-            raise Undecodable(f"the definition of {type} is missing")
+        if self._ros1 and type in ROS1_TIMES:
+            first, second = self._primitive(ROS1_TIMES[type]), self._primitive(ROS1_TIMES[type])
+            return f"{{'secs': {first}, 'nsecs': {second}}}"
         pairs = []
-        for name, description in self._definitions[type][1]:
-            if name == _PLACEHOLDER:
-                if not self._layout.ros1:
+        for name, description in self._fields_of(type, depth):
+            if name == PLACEHOLDER:
+                if not self._ros1:
                     self._primitive("uint8")
                 continue
             pairs.append(f"{name!r}: {self._field(description, depth)}")
@@ -203,7 +171,7 @@ class _Writer:
         variable, end = self._new_name(), self._new_name()
         self._write(f"{end} = pos + {length}")
         self._write(f"if {end} > size: raise ValueError")
-        last = end if self._layout.ros1 else f"{end} - 1 if {length} else pos"  # CDR counts the NUL
+        last = end if self._ros1 else f"{end} - 1 if {length} else pos"  # CDR counts the NUL
         self._write(f"{variable} = str(raw[pos:{last}], 'utf-8', 'replace')")
         self._write(f"pos = {end}")
         self._modulus, self._offset = 1, 0
@@ -211,9 +179,7 @@ class _Writer:
 
     def _primitives(self, primitive: str, count: str, *, is_fixed: bool) -> str:
         _, dtype, size = self._look_up(primitive)
-        if not self._layout.ros1 and size > self._modulus_now():
-            condition = "" if is_fixed else f"if {count}: "  # CDR aligns for the items, and there may be none
-            self._write(f"{condition}pos += ({4 % size} - pos) % {size}")
+        self._align_items(size, count, is_fixed=is_fixed)
         variable = self._new_name()
         if primitive in ("uint8", "char"):
             self._write(f"if pos + {count} > size: raise ValueError")
@@ -240,40 +206,80 @@ class _Writer:
         self._modulus, self._offset = 1, 0
         return items
 
-    def _align(self, size: int) -> None:
-        if self._layout.ros1 or size == 1:
-            return
-        if self._modulus >= size:
-            padding = -self._offset % size
-            if padding:
-                self._run.append(f"{padding}x")
-                self._offset += padding
-        else:
-            self.flush()
-            self._write(f"pos += ({4 % size} - pos) % {size}")
-            self._modulus, self._offset = size, 0
+    def _padding(self, size: int) -> str:
+        return f"pos += ({4 % size} - pos) % {size}"
 
-    def _modulus_now(self) -> int:
-        """The largest size that this place is known to be aligned to."""
-        size = self._modulus
-        while self._offset % size:
-            size //= 2
-        return size
 
-    def _look_up(self, primitive: str) -> tuple[str, str, int]:
-        found = _PRIMITIVES.get(primitive)
-        if found is None:
-            raise Undecodable(f"fields of the kind {primitive} are not supported")
-        return found
+@dataclass(frozen=True, slots=True, eq=False)
+class Layout:
+    """How the bytes of one channel's messages are to be read.
 
-    def _constant(self, value: Any) -> str:
-        name = f"c{len(self.constants)}"
-        self.constants[name] = value
-        return name
+    `definitions` are those of its type and of all it contains, as rosbags has them.
+    """
 
-    def _new_name(self) -> str:
-        self._names += 1
-        return f"v{self._names}"
+    ros_version: RosVersion
+    definitions: dict[str, Any]
 
-    def _write(self, line: str) -> None:
-        self.lines.append(self._indent + line)
+
+class RawMessage(Mapping[str, Any]):
+    """The serialized message in the encoding of its ROS version. Reading fields raises Undecodable."""
+
+    __slots__ = ("_decode", "_fields", "_unreadable", "layout", "raw")
+
+    def __init__(self, raw: bytes, decode: Callable[[bytes], Json], layout: Layout) -> None:
+        self.raw = raw
+        self.layout = layout
+        self._decode = decode
+        self._fields: Json | None = None
+        self._unreadable: str | None = None  # the reason; decoding is tried once
+
+    @property
+    def fields(self) -> Json:
+        """The decoded message. Raises Undecodable."""
+        if self._unreadable is not None:
+            raise Undecodable(self._unreadable)
+        if self._fields is None:
+            try:
+                self._fields = self._decode(self.raw)
+            except Undecodable as error:
+                self._unreadable = str(error)
+                raise
+        return self._fields
+
+    def __getitem__(self, name: str) -> Any:
+        return self.fields[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.fields)
+
+    def __len__(self) -> int:
+        return len(self.fields)
+
+
+def fields_of(message: Json) -> Json:
+    """The message as a dict, whichever kind it is. Raises Undecodable."""
+    return message.fields if isinstance(message, RawMessage) else message
+
+
+def beforehand(
+    source: FileSource, ways: Mapping[int, tuple[str, str, Decode]]
+) -> Iterator[tuple[float, str, str, Json]]:
+    """Time [s since 1970], topic, type and content of the messages of some channels, by number: topic, type, decoder.
+    What cannot be read is left out; the reading itself names it."""
+    try:
+        for time_ns, number, raw in source.messages(set(ways), 0, Damage()):
+            topic, type, decode = ways[number]
+            with suppress(Undecodable):
+                yield time_ns / 1e9, topic, type, decode(raw)
+    except MemoryError:
+        raise
+    except Exception:  # a damaged file makes the readers fail in every way there is
+        return
+
+
+def type_of_first(source: FileSource, channel: Channel, decode: Decode) -> str:
+    """The type of a channel by the fields of its first message, as live; "": none is known."""
+    for _, topic, _, message in beforehand(source, {channel.number: (channel.topic, "", decode)}):
+        found = shapes.type_of(message, topic) or shapes.type_by_fields(message)
+        return found if source.ros_version == 1 else found.replace("/", "/msg/")
+    return ""

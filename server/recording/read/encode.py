@@ -17,33 +17,11 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 
 from server.judge.message import RosVersion
+from server.recording.read.code_writer import PLACEHOLDER, PRIMITIVES, ROS1_TIMES, CodeWriter
 from server.recording.read.definitions import demand_few_fields
-from server.recording.read.errors import Undecodable
 
 Encode = Callable[[Any], bytes]
 
-# name → (code of struct, numpy dtype, bytes)
-_PRIMITIVES = {
-    "bool": ("?", "|b1", 1),
-    "byte": ("b", "|i1", 1),
-    "char": ("B", "|u1", 1),
-    "int8": ("b", "|i1", 1),
-    "uint8": ("B", "|u1", 1),
-    "int16": ("h", "<i2", 2),
-    "uint16": ("H", "<u2", 2),
-    "int32": ("i", "<i4", 4),
-    "uint32": ("I", "<u4", 4),
-    "int64": ("q", "<i8", 8),
-    "uint64": ("Q", "<u8", 8),
-    "float32": ("f", "<f4", 4),
-    "float64": ("d", "<f8", 8),
-}
-_ROS1_TIMES = {
-    "builtin_interfaces/msg/Time": ("uint32", "uint32"),
-    "builtin_interfaces/msg/Duration": ("int32", "int32"),
-}
-_PLACEHOLDER = "structure_needs_at_least_one_member"
-_DEEPEST = 32
 _NAN = float("nan")
 _CDR_HEADER = b"\x00\x01\x00\x00"  # plain CDR, little-endian
 _MISTAKES = (struct.error, ValueError, TypeError, KeyError, OverflowError, AttributeError)
@@ -63,7 +41,7 @@ def compile_encoder(type: str, definitions: dict[str, Any], version: RosVersion)
     TypeMismatch from the function.
     """
     demand_few_fields(type, definitions)
-    writer = _Writer(definitions, ros1=version == 1)
+    writer = _EncoderWriter(definitions, ros1=version == 1)
     writer.message(type, "m", 0)
     writer.flush()
     lines = ["def encode(m):", f" out = bytearray({b'' if version == 1 else _CDR_HEADER!r})", " try:", *writer.lines]
@@ -74,35 +52,21 @@ def compile_encoder(type: str, definitions: dict[str, Any], version: RosVersion)
     return encode
 
 
-class _Writer:
-    """Writes the source of one encoder: runs of primitives become one struct each, nested messages stand in line.
-
-    Names from definitions go into the source only as quoted strings, so no definition can smuggle in code.
-    """
+class _EncoderWriter(CodeWriter):
+    """Writes the source of one encoder."""
 
     def __init__(self, definitions: dict[str, Any], *, ros1: bool) -> None:
-        self.lines: list[str] = []
-        self.constants: dict[str, Any] = {}
-        self._definitions = definitions
-        self._ros1 = ros1
-        self._indent = "  "
-        self._names = 0
-        self._run: list[str] = []  # struct codes not yet written out, and
-        self._values: list[str] = []  # the expressions of their values
-        self._modulus, self._offset = 8, 0  # what is known of the place: place mod _modulus = _offset
+        super().__init__(definitions, ros1=ros1)
+        self._values: list[str] = []  # the expressions of the run's values
 
     def message(self, type: str, given: str, depth: int) -> None:
         """Writes the writing of the message that the expression `given` is."""
-        if depth > _DEEPEST:
-            raise Undecodable("its definition contains itself")
-        if self._ros1 and type in _ROS1_TIMES:
+        if self._ros1 and type in ROS1_TIMES:
             self._check(f"len({given}) != 2")
-            for name, primitive in zip(("secs", "nsecs"), _ROS1_TIMES[type], strict=True):
-                self._primitive(primitive, f"{given}[{name!r}]")
+            for name in ("secs", "nsecs"):
+                self._primitive(ROS1_TIMES[type], f"{given}[{name!r}]")
             return
-        if type not in self._definitions:
-            raise Undecodable(f"the definition of {type} is missing")
-        fields = [(name, what) for name, what in self._definitions[type][1] if name != _PLACEHOLDER]
+        fields = [(name, what) for name, what in self._fields_of(type, depth) if name != PLACEHOLDER]
         self._check(f"{given}.__class__ is not dict or len({given}) != {len(fields)}")
         if not fields and not self._ros1:
             self._primitive("uint8", "0")
@@ -167,7 +131,7 @@ class _Writer:
             road = {"uint8": "octets", "char": "octets", "float32": "floats", "float64": "floats"}
             known = self._constant(_kind(item[1][0]))
             self._write(f"{items} = {road.get(item[1][0], 'numbers')}({value}, {known})")
-            size = _PRIMITIVES[item[1][0]][2]
+            size = PRIMITIVES[item[1][0]][2]
             count = f"len({items})" if size == 1 else f"len({items}) // {size}"
         else:
             self._check(f"{value}.__class__ is not list")
@@ -197,57 +161,21 @@ class _Writer:
         self._modulus, self._offset = 1, 0
 
     def _numbers(self, primitive: str, items: str, *, is_fixed: bool) -> None:
-        size = _PRIMITIVES[primitive][2]
-        if not self._ros1 and size > self._modulus_now():
-            condition = "" if is_fixed else f"if {items}: "  # CDR aligns for the items, and there may be none
-            self._write(f"{condition}out += bytes((4 - len(out)) % {size})")
+        size = PRIMITIVES[primitive][2]
+        self._align_items(size, items, is_fixed=is_fixed)
         self._write(f"out += {items}")
         self._modulus, self._offset = (size, 0) if is_fixed else (min(size, 4), 0)
 
-    def _align(self, size: int) -> None:
-        if self._ros1 or size == 1:
-            return
-        if self._modulus >= size:
-            padding = -self._offset % size
-            if padding:
-                self._run.append(f"{padding}x")
-                self._offset += padding
-        else:
-            self.flush()
-            self._write(f"out += bytes((4 - len(out)) % {size})")  # counted from behind the header of 4 bytes
-            self._modulus, self._offset = size, 0
-
-    def _modulus_now(self) -> int:
-        size = self._modulus
-        while self._offset % size:
-            size //= 2
-        return size
-
-    def _look_up(self, primitive: str) -> tuple[str, str, int]:
-        found = _PRIMITIVES.get(primitive)
-        if found is None:
-            raise Undecodable(f"fields of the kind {primitive} are not supported")
-        return found
+    def _padding(self, size: int) -> str:
+        return f"out += bytes((4 - len(out)) % {size})"  # counted from behind the header of 4 bytes
 
     def _check(self, condition: str) -> None:
         self._write(f"if {condition}: raise TypeMismatch('it does not fit its type')")
 
-    def _constant(self, value: Any) -> str:
-        name = f"c{len(self.constants)}"
-        self.constants[name] = value
-        return name
-
-    def _new_name(self) -> str:
-        self._names += 1
-        return f"v{self._names}"
-
-    def _write(self, line: str) -> None:
-        self.lines.append(self._indent + line)
-
 
 def _kind(primitive: str) -> _Kind:
-    code, dtype, _ = _PRIMITIVES[primitive]
-    return code.replace("?", "b"), np.dtype(dtype), primitive
+    code, dtype, _ = PRIMITIVES[primitive]
+    return code.replace("?", "b"), np.dtype(f"<{dtype}"), primitive
 
 
 def _floats(given: Any, kind: _Kind) -> bytes:

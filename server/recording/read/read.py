@@ -16,13 +16,10 @@ import orjson
 from server.judge.message import Json, Message, RosVersion
 from server.recording.mcap.mcap_file import McapFile
 from server.recording.own import PREFIX
-from server.recording.read.beforehand import beforehand, type_of_first
-from server.recording.read.decode import Decode, compile_decoder, sifted
+from server.recording.read.decode import Decode, Layout, RawMessage, beforehand, compile_decoder, sifted, type_of_first
 from server.recording.read.definitions import definition_of, definitions_of
 from server.recording.read.errors import RecordingUnreadable, Undecodable
-from server.recording.read.open_files import of_car, open_parts, open_with, what_is_wrong
-from server.recording.read.raw_message import Layout, RawMessage
-from server.recording.read.recognise import recognise
+from server.recording.read.recognise import of_car, open_parts, open_with, recognise, what_is_wrong
 from server.recording.read.source import Channel, Damage, FileSource, Stream, in_time_order, why_not_decoded
 from server.recording.read.steady_time import ClockStep, make_steady, notes_on
 

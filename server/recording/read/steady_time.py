@@ -34,8 +34,8 @@ from server.recording.read.clock_steps import (
     returned,
 )
 from server.recording.read.source import Channel, FileSource
-from server.recording.read.spans import span
 
+_UNITS = ((31_557_600, "year", "years"), (86_400, "day", "days"), (3600, "h", "h"), (60, "min", "min"), (1, "s", "s"))
 COMPARED = 5  # messages of a channel on each side
 LEAST_COMPARED = 3
 MOST_CHANNELS = 6
@@ -53,6 +53,13 @@ _CDR = {0: struct.Struct(">4xiI"), 1: struct.Struct("<4xiI")}  # by the second b
 MOST_NOTED = 10
 BETWEEN_FILES_NS = S  # parts of one recording may overlap by less
 _PART = re.compile(r"(.*)_(\d+)")
+
+
+def span(seconds: float) -> str:
+    """A span of time in the unit a person would name it in, as "230 days" or "2.5 min"."""
+    size, one, many = next((unit for unit in _UNITS if seconds >= 2 * unit[0]), _UNITS[-1])
+    count = f"{seconds / size:.1f}".removesuffix(".0")
+    return f"{count} {one if count == '1' else many}"
 
 
 class StampWitness:

@@ -11,14 +11,16 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from server.protocol.answers import Recording
+from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.annotations import NONE, Annotations
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.discovery import why_not_one_file
 from server.recording.catalog.entries import NotThere, Refused
-from server.recording.store import annotation_upload, names, row
-from server.recording.store.annotation_upload import AnnotationSet
+from server.recording.marks.recorded import late_media
+from server.recording.store import names, row
 from server.recording.store.clips import ClipMaker
 from server.recording.store.object_store import FileChanged, ObjectStore, Pace
 from server.recording.store.plan import is_another
@@ -29,6 +31,41 @@ from server.recording.store.uploads import SentClip, SentPart, Upload, Uploads, 
 ANOTHER = "The store has another recording of this name: rename this file."
 _READ = 2**20
 PROVED_FOR_MS = 10 * 60_000  # a copy that was read back longer ago is read back again before the file is deleted
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnnotationSet:
+    """What is beside a file. Another value: it was changed."""
+
+    annotations: Annotations = NONE
+    media: tuple[tuple[str, int, int], ...] = ()  # name, size and time of change
+
+
+NO_ANNOTATIONS = AnnotationSet()
+
+
+def annotation_set(path: Path) -> AnnotationSet:
+    """What is beside a recording now. Raises OSError."""
+    stats = [(file.name, file.stat()) for file in late_media(path)]
+    return AnnotationSet(
+        annotations=annotation_store.read(path),
+        media=tuple((name, stat.st_size, stat.st_mtime_ns) for name, stat in stats),
+    )
+
+
+def send_annotations(store: ObjectStore, vehicle: str, id: str, path: Path) -> dict[str, Any] | None:
+    """Put all that is beside a recording into the store; return the object of the texts and marks, for the row; None:
+    there are none. Raises StoreTrouble, OSError."""
+    for file in late_media(path):
+        store.put(names.mark_key(vehicle, id, file.name), file.read_bytes())
+    try:
+        with annotation_store.beside(path).open("rb") as beside:
+            body = beside.read(annotation_store.MAX_BYTES)
+    except FileNotFoundError:
+        return None
+    key = names.annotations_key(vehicle, id)
+    store.put(key, body)
+    return {"name": key.rpartition("/")[2], "size": len(body), "sha256": hashlib.sha256(body).hexdigest()}
 
 
 class NotTheSame(Exception):
@@ -58,10 +95,10 @@ class Copying:
             raise Refused(ANOTHER)
         id, digest = recording["id"], row.digest_of(recording, upload)
         path = self.catalog.path(id)
-        sent = annotation_upload.NOTHING if path is None else annotation_upload.annotation_set(path)
-        is_silent = sent == annotation_upload.NOTHING and _annotations(recording) == _annotations(None)
+        sent = NO_ANNOTATIONS if path is None else annotation_set(path)
+        is_silent = sent == NO_ANNOTATIONS and _annotations(recording) == _annotations(None)
         if not upload.is_deleted or not is_silent:  # what came back may have lost them
-            annotations = None if path is None else annotation_upload.send(self.store, recording["vehicle"], id, path)
+            annotations = None if path is None else send_annotations(self.store, recording["vehicle"], id, path)
             self.store.put(names.row_key(recording["vehicle"], id), row.made(recording, upload, annotations))
 
         def keep(upload: Upload) -> None:
@@ -196,7 +233,7 @@ class Copying:
         try:
             pace.check()
             _need_one_file(self.catalog.folder / moved.path)
-            now = annotation_upload.annotation_set(self.catalog.folder / moved.path)
+            now = annotation_set(self.catalog.folder / moved.path)
             is_as_sent = now == sent and _annotation_fields(now.annotations) == _annotations(recording)
             if is_as_sent:
                 self.uploads.change(recording["id"], _note_deleted)

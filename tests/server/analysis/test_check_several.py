@@ -14,9 +14,8 @@ import psutil
 import pytest
 
 from server.analysis.check_pool import check_each
-from server.analysis.check_recording import CANNOT, CRITICAL, NO_CRITICAL, CheckOptions
+from server.analysis.check_recording import CANNOT, CRITICAL, NO_CRITICAL, CheckOptions, by_recording
 from server.analysis.rehearse import Extract
-from server.recording.read.by_recording import by_recording
 from server.recording.verify import verify
 from server.simulator.scenarios import planned
 from tests.interrupted import INTERRUPTED

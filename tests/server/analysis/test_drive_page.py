@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from server.analysis.drive_page import write_drive_page
+from server.analysis.drive.drive_report import write_drive_page
 from server.analysis.recorded_log import MOST_ENTRIES, RecordedLog, read_recorded_log
 from server.recording.read.read import open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1

@@ -14,11 +14,11 @@ from typing import Any, Literal
 
 import pytest
 
-from server.analysis.drive import form, media, sheet
+from server.analysis.drive import form, sheet, sheet_things
 from server.analysis.drive.axis import nice_step, ticks, time_ticks
+from server.analysis.drive.drive_report import write_drive_page
 from server.analysis.drive.form import write_forms
 from server.analysis.drive.tables import write_report_csv, write_report_json
-from server.analysis.drive_page import write_drive_page
 from server.recording.catalog import annotations
 from server.recording.drive.departure import Departure
 from server.recording.export.export_format import ExportRefused
@@ -326,8 +326,8 @@ def test_a_drive_without_a_departure_check_says_so(tmp_path: Path) -> None:
 
 
 def test_media_are_bounded() -> None:
-    found = media.Media()
-    found.add(MediaName(mark="a", kind="photo", ending="png"), bytes(media.MOST_BYTES + 1))
+    found = sheet_things.Media()
+    found.add(MediaName(mark="a", kind="photo", ending="png"), bytes(sheet_things.MOST_MEDIA_BYTES + 1))
     found.add(MediaName(mark="b", kind="photo", ending="png"), b"x")
     found.add(MediaName(mark="b", kind="photo", ending="png"), b"another")
     assert (found.left_out, found.get("a", "photo")) == (1, None)

@@ -10,8 +10,8 @@ import pytest
 
 from server.analysis.drive import sheet
 from server.analysis.drive.axis import dated_time
+from server.analysis.drive.drive_report import write_drive_page
 from server.analysis.drive.tables import write_report_json
-from server.analysis.drive_page import write_drive_page
 from server.recording.read.read import open_recording
 from tests.server.analysis.test_drive_report import text_of
 from tests.server.recording.drive.story import BEGIN_MS, recorded

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from server.recording.marks.recorded import NOTHING, in_file
-from server.recording.mcap import own_entries
+from server.recording.mcap import mcap_file
 from tests.server.recording.made import record
 
 
@@ -21,7 +21,7 @@ def test_a_file_that_was_never_closed_is_not_read(tmp_path: Path, monkeypatch: p
     def read(*_: Any) -> None:
         raise AssertionError("it is read")
 
-    monkeypatch.setattr(own_entries, "McapFile", read)
+    monkeypatch.setattr(mcap_file, "McapFile", read)
     with pytest.raises(ValueError, match="never closed"):
-        own_entries.finished(path)
+        mcap_file.finished(path)
     assert in_file(path) == NOTHING

@@ -26,7 +26,7 @@ from server.recording.marks.recorded import read_marks, read_media
 from server.recording.marks.rows import entry
 from server.recording.read.read import open_recording
 from server.recording.verify import verify
-from server.replay.recorded_events import read_timeline_events
+from server.replay.timeline import read_timeline_events
 from tests.server.marks.media_samples import PHOTO, VOICE
 from tests.server.recording.bags import BEGIN_S, Drive, write_ros1, write_ros2
 from tests.server.recording.export.ours import Own, as_ours

@@ -10,9 +10,11 @@ from typing import Any
 
 import orjson
 
+from server.recording.folder import RecordingsFolder
 from server.recording.mcap.write import PartFile
 from server.recording.own import own_schema
 from server.recording.read.schemas import Schema, TypeBook
+from server.recording.recover import Recovered, recover
 
 BEGAN_MS = 1_790_000_000_000
 NORTH_M = 111_000.0  # of one degree of latitude, near enough
@@ -96,3 +98,8 @@ def _fix(lat_deg: float, lon_deg: float, n: int) -> dict[str, Any]:
         "latitude": lat_deg, "longitude": lon_deg, "altitude": 700.0,
         "position_covariance": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 4.0], "position_covariance_type": 2,
     }  # fmt: skip
+
+
+def recover_all(folder: RecordingsFolder) -> list[Recovered]:
+    """Recovers all that a server left."""
+    return [recover(left) for left in folder.unfinished()]

@@ -17,9 +17,10 @@ from server.recording.chain_neighbours import Beside, compare, newest_head, read
 from server.recording.folder import RecordingsFolder
 from server.recording.mcap.chain import RECORD_BYTES, TAG
 from server.recording.mcap.chunks import Walk
-from server.recording.recover import recover, recover_all
+from server.recording.recover import recover
 from server.recording.verify import verify
 from tests.server.recording.chained import change, closed, drive, recorded
+from tests.server.recording.made import recover_all
 from tests.server.recording.recording_child import record_until_killed
 from tests.server.recording.test_recorder import RecorderUser
 

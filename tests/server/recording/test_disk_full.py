@@ -15,10 +15,10 @@ import pytest
 from server.recording import recover, space
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
-from server.recording.recover import recover_all
 from server.recording.space import Allowance
 from server.rosbridge_server.server import RosBridge
 from tests.server.cars import driving
+from tests.server.recording.made import recover_all
 from tests.server.recording.mcap.test_write import written
 from tests.server.recording.test_controller import watched
 from tests.server.recording.test_recorder import RecorderUser

@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 from server.recording.folder import RecordingsFolder
 from server.recording.mcap.scan import by_name
 from server.recording.own import METADATA
-from server.recording.recover import recover_all
+from tests.server.recording.made import recover_all
 from tests.server.recording.recording_child import BEGAN_NS, MISSING, record_until_killed
 
 pytestmark = pytest.mark.field
@@ -53,7 +53,7 @@ def kill_once(root: Path, after_s: float, part_s: float = 3600.0) -> Killed:
         pass
     folder = RecordingsFolder(root)
     left = folder.unfinished()
-    done = list(recover_all(folder))
+    done = recover_all(folder)
     assert len(done) == len(left)
     assert all(one.is_settled for one in done)
     assert [one.aside for one in done if one.aside] == []

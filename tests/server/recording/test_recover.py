@@ -13,7 +13,8 @@ from server.judge.message import RosVersion
 from server.recording.folder import RecordingsFolder
 from server.recording.mcap.chunks import HEAD_BYTES, Walk, WholeChunk
 from server.recording.read.read import open_recording
-from server.recording.recover import recover, recover_all
+from server.recording.recover import recover
+from tests.server.recording.made import recover_all
 from tests.server.recording.mcap.test_write import written
 
 
@@ -89,7 +90,7 @@ def test_cut_at_every_byte_everything_before_the_cut_is_kept(tmp_path: Path) -> 
     folder = RecordingsFolder(tmp_path / "recordings")
     for size in range(len(original) + 1):
         left.write_bytes(original[:size])
-        done = list(recover_all(folder))
+        done = recover_all(folder)
         expected = sum(messages for end, messages in ends if end <= size)
         (settled,) = done
         assert settled.is_settled, size

@@ -12,8 +12,8 @@ import pytest
 
 from server.recording.catalog import annotations as annotation_store
 from server.recording.read.read import Recording, open_recording
-from server.replay import process, recorded_events
-from server.replay.recorded_events import MOST_WORDS, NOTHING, TimelineEvents, read_timeline_events
+from server.replay import process, timeline
+from server.replay.timeline import MOST_WORDS, NOTHING, TimelineEvents, read_timeline_events
 from tests.server.recording.bags import Drive, write_ros1
 from tests.server.recording.drive import story
 from tests.server.recording.drive.story import BEGIN_MS, EVIL, mark, recorded
@@ -53,10 +53,10 @@ def test_whatever_fails_it_is_replayed_without(
     def fails(*_: object) -> None:
         raise OverflowError("a number of a stranger")
 
-    monkeypatch.setattr(recorded_events, "read_drive_events", fails)
+    monkeypatch.setattr(timeline, "read_drive_events", fails)
     found = read_timeline_events(lambda: open_recording([path]))
     assert ([row["mark"] for row in found.flags], found.interventions) == (["m1", "m3"], ())
-    monkeypatch.setattr(recorded_events, "marks_of", fails)
+    monkeypatch.setattr(timeline, "marks_of", fails)
     assert read_timeline_events(lambda: open_recording([path])) == NOTHING
     assert "replayed without marks, interventions or driving modes" in caplog.text
 

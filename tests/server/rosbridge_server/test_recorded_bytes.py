@@ -10,8 +10,8 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from server.judge.message import Json, Message, RosVersion
+from server.recording.read.decode import Layout, RawMessage
 from server.recording.read.errors import Undecodable
-from server.recording.read.raw_message import Layout, RawMessage
 from server.recording.read.read import open_recording
 from server.rosbridge_server.player import moved, play
 from server.rosbridge_server.server import RosBridge

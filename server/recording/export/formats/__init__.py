@@ -1,4 +1,4 @@
-"""Finds every export format: one file of this package each."""
+"""Finds every export format that a file of this package declares."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ def load() -> dict[str, ExportFormat]:
     """Every format by its name, in the order of the page; raises ValueError where two have one name."""
     found: dict[str, ExportFormat] = {}
     for module in iter_modules(__path__):
-        export_format: ExportFormat = import_module(f"{__name__}.{module.name}").FORMAT
-        if export_format.name in found or export_format.name == CLIP:
-            raise ValueError(f"two export formats are named {export_format.name}")
-        found[export_format.name] = export_format
+        declared = vars(import_module(f"{__name__}.{module.name}")).values()
+        for export_format in (value for value in declared if isinstance(value, ExportFormat)):
+            if export_format.name in found or export_format.name == CLIP:
+                raise ValueError(f"two export formats are named {export_format.name}")
+            found[export_format.name] = export_format
     return dict(sorted(found.items(), key=lambda item: (item[1].order, item[0])))
 
 

@@ -25,7 +25,7 @@ from server.recording.export.columns import OWN_TABLES, TABLES, TIMES, OwnTable,
 from server.recording.export.decoded_drive import DecodedDrive
 from server.recording.export.export_format import ExportFormat, ExportRefused, Outcome, Progress, nothing
 from server.recording.export.raw import described_event
-from server.recording.marks.of_drive import described_late, marks_of, media_of
+from server.recording.marks.recorded import described_late, marks_of, media_of
 from server.recording.read.read import Recording
 
 FORMAT = ExportFormat(

@@ -19,7 +19,7 @@ from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.discovery import files_below
 from server.recording.catalog.entries import Refused
 from server.recording.catalog.survey import survey
-from server.recording.marks.of_drive import marks_of
+from server.recording.marks.recorded import marks_of
 from server.recording.marks.rows import row_of
 from server.recording.read import temporary_copy
 from server.recording.read.read import open_recording

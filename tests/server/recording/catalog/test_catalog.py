@@ -86,7 +86,7 @@ async def test_a_drive_keeps_the_sketch_of_its_signals_until_it_is_destroyed(tmp
         one.delete(row["id"])
         one.destroy(None)
     async with catalog(tmp_path) as one:
-        assert one._entries.trends(row["sha256"] or "") is None
+        assert one._entries.body("trends", row["sha256"] or "") is None
 
 
 @pytest.mark.field

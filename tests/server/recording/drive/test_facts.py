@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from server.recording.catalog.survey import survey
-from server.recording.drive.alarms import marks_of, percentile
-from server.recording.drive.components import component_of
+from server.recording.drive.alarms import component_of, marks_of, percentile
 from server.recording.drive.departure import check_of
 from server.recording.drive.facts import DriveFacts, DriveLog, figures_of, read_facts
 from server.recording.drive.modes import interventions_of

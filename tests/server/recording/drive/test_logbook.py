@@ -8,8 +8,7 @@ from typing import Any
 import orjson
 import pytest
 
-from server.recording.drive.checks import DAY_MS
-from server.recording.drive.logbook import WEEK_MS, drives_of, logbook, weeks_of
+from server.recording.drive.logbook import DAY_MS, WEEK_MS, drives_of, logbook, weeks_of
 
 LATE = '{"marks":[],"removed":[],"described":[]}'  # nothing came
 MONDAY = 1_700_438_400_000  # 20 November 2023

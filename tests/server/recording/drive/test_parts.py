@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from server.recording.drive.facts import DriveFacts, DriveLog, figures_of, read_facts
+from server.recording.drive.link_way import blind_times, late_times
 from server.recording.drive.modes import ModeSpan
 from server.recording.drive.parts import DrivePart, outside, parts_of
 from server.recording.drive.people import PersonInDrive, Span, joined_people
 from server.recording.drive.unrecorded import Beside, missing, unrecorded_of
-from server.recording.drive.unseen import blind_times, late_times
 from server.recording.read.read import open_recording
 from tests.server.recording.bags import BEGIN_S
 from tests.server.recording.drive.story import BEGIN_MS, LENGTH_S, NS, SECOND, in_two_parts, logged, recorded, standing
