@@ -70,7 +70,7 @@ class CommandHandler:
         return await self._outcomes.keep(message, self._carry_out)
 
     def _log_given_up(self, message: Mapping[str, Any], why: str) -> None:
-        log_late(self._parts.event_log.note, message.get("kind"), why, by=Caller.of(message).name)
+        log_late(self._parts.event_log.note, str(message.get("kind")), why, by=Caller.of(message).name)
 
     async def _carry_out(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         caller = Caller.of(message)

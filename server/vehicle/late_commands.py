@@ -13,13 +13,12 @@ from server.protocol.rate_limit import Allowance, Rate
 OF_NODES = Rate(per_s=1.0, at_once=30)  # a web node proves nothing of a command that it passes on late
 
 
-def log_late(note: Note, kind: object, why: str, *, by: str | None) -> None:
+def log_late(note: Note, kind: str, why: str, *, by: str | None) -> None:
     """`why` is a sentence."""
     if kind == "slow_down":
         note("slow_down", f"Slow-down refused: {why}", by=by, step="refused")
-        return
-    name = f"“{kind}”" if isinstance(kind, str) and kind in commands.BY_KIND else "A command"
-    note("late", f"{name} was not carried out: {why}", by=by)
+    else:
+        note("late", f"“{kind}” was not carried out: {why}", by=by)
 
 
 class LateCommands:
@@ -31,8 +30,14 @@ class LateCommands:
         self._allowances: dict[str, Allowance] = {}
 
     def note(self, vehicle: str, command: Mapping[str, Any], why: str) -> None:
-        """Log one that a web node passed on, in the name that the node states; what floods the log is left out."""
-        now_s = self._now()
+        """Log an order that a web node passed on, in the name that the node states; what floods the log is left out.
+
+        Queries, and what a page sends again by itself as its status, are no orders.
+        """
+        now_s, kind = self._now(), command.get("kind")
+        order = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
+        if order is None or not order.is_signed:
+            return
         allowance = self._allowances.setdefault(vehicle, Allowance(OF_NODES, now_s))
         if (note := self._find(vehicle)) is not None and allowance.takes(now_s):
-            log_late(note, command.get("kind"), why, by=display_name.clean(command.get("by")) or None)
+            log_late(note, str(kind), why, by=display_name.clean(command.get("by")) or None)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from server.vehicle.late_commands import OF_NODES, LateCommands
 
 WHY = "it came through a web node 1.2 s after its deadline."
@@ -27,14 +29,21 @@ def test_it_is_logged_with_its_kind_the_reason_and_the_name_that_the_node_gave()
     car.late.note("ocelot", {"kind": "release", "by": "Ann"}, WHY)
     car.late.note("ocelot", {"kind": "slow_down", "by": "Ann"}, WHY)
     car.late.note("margay", {"kind": "release", "by": "Ann"}, WHY)
-    car.late.note("ocelot", {"kind": "a\nlong tale", "by": "\u202eAnn\n"}, WHY)
-    car.late.note("ocelot", {"kind": 7, "by": 7}, WHY)
+    car.late.note("ocelot", {"kind": "pause", "by": "\u202eAnn\n"}, WHY)
+    car.late.note("ocelot", {"kind": "resume", "by": 7}, WHY)
     assert car.events == [
         ("late", f"“release” was not carried out: {WHY}", "Ann"),
         ("slow_down", f"Slow-down refused: {WHY}", "Ann"),
-        ("late", f"A command was not carried out: {WHY}", "Ann"),
-        ("late", f"A command was not carried out: {WHY}", None),
+        ("late", f"“pause” was not carried out: {WHY}", "Ann"),
+        ("late", f"“resume” was not carried out: {WHY}", None),
     ]
+
+
+@pytest.mark.parametrize("kind", ["present", "announces", "refresh", "outcome", "position", "a\nlong tale", 7, None])
+def test_what_is_no_order_is_not_logged(kind: object) -> None:
+    car = Car()
+    car.late.note("ocelot", {"kind": kind, "by": "Ann"}, WHY)
+    assert car.events == []
 
 
 def test_a_flood_does_not_fill_the_log() -> None:
