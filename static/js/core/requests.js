@@ -6,7 +6,7 @@ import { maybe, withCut } from './outcome.js';
 const REPLY_MS = 4000;
 /** The outcome of an unanswered command is queried so often [ms], and for so long: a session knows it for 120 s. */
 const LOOKS_EVERY_MS = 1500;
-const LOOKS_FOR_MS = 110_000;
+const LOOKS_FOR_MS = 100_000;
 /** So many of them at most; the oldest is given up. */
 const MOST_LOST = 20;
 
