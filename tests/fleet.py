@@ -1,16 +1,23 @@
-"""`make fleet`: a broker, five simulated cars with different faults, their agents and two web nodes on this machine."""
+"""`make fleet`: a broker, five simulated cars with different faults, their agents and two web nodes on this machine.
+
+    python -m tests.fleet [--ports 8001 8002] [--typed]
+
+With --typed no fault begins by itself: each line that is typed begins one, as `lynx speeding 20`.
+"""
 
 from __future__ import annotations
 
+import argparse
 import asyncio
 import contextlib
 import signal
+import sys
 import tempfile
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 
 from server.bus import broker_users
-from tests.page.processes import running, simulate
+from tests.page.processes import Process, running, simulate
 from tests.server.bus.broker import running_broker
 
 # Each car, and what goes wrong with it, over and over: it is typed on its simulator's terminal.
@@ -21,11 +28,15 @@ CARS = {
     "caracal": ("gps-jump 20", 70.0),
     "lynx": ("", 0.0),
 }
-NODES = {"room-1": 8001, "room-2": 8002}
+NODES = ("room-1", "room-2")
 TODAY = "2026-01-01"  # in a list that lasts as long as this run
 
 
-async def main() -> None:
+Type = Callable[[str], Awaitable[None]]  # on the terminal of one car's simulator
+
+
+async def main(ports: tuple[int, int], *, is_typed: bool) -> None:
+    """`ports` of the nodes, 0: any that is free."""
     running_here = asyncio.current_task()
     assert running_here is not None
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, running_here.cancel)
@@ -44,29 +55,52 @@ async def main() -> None:
                 data = str(folder / name)
                 return ("--broker", broker.address, "--key", key, "--port", str(port), "--data", data)
 
-            faults = []
-            for name, (fault, every_s) in CARS.items():
-                car = await up.enter_async_context(running(*simulate()))
-                agent = ("agent", *options(name, 0), "--vehicle", f"{name}={car.address}")
-                at_car = await up.enter_async_context(running(*agent))
-                print(f"{name}: its own page at {at_car.address}/  fault: {fault or 'none'}", flush=True)
-                if fault:
-                    faults.append(again(car.type, fault, every_s))
+            async def all_of(*commands: tuple[str, ...]) -> list[Process]:
+                return await asyncio.gather(*(up.enter_async_context(running(*command)) for command in commands))
+
+            cars = dict(zip(CARS, await all_of(*(simulate() for _ in CARS)), strict=True))
+            agents = await all_of(
+                *(("agent", *options(name, 0), "--vehicle", f"{name}={cars[name].address}") for name in CARS)
+            )
+            for (name, (fault, _)), at_car in zip(CARS.items(), agents, strict=True):
+                about = f"bridge {cars[name].address}  fault: {'as typed' if is_typed else fault or 'none'}"
+                print(f"{name}: its own page at {at_car.address}/  {about}", flush=True)
             expected = [argument for name in CARS for argument in ("--expect", name)]
-            for name, port in NODES.items():
-                node = await up.enter_async_context(running("web", *options(name, port), *expected))
-                print(f"Web node {name}: {node.address}/  all cars: {node.address}/fleet", flush=True)
+            named = tuple(zip(NODES, ports, strict=True))
+            rooms = await all_of(*(("web", *options(name, port), *expected) for name, port in named))
+            for name, room in zip(NODES, rooms, strict=True):
+                print(f"Web node {name}: {room.address}/  all cars: {room.address}/fleet", flush=True)
             print("Press Ctrl-C to stop.", flush=True)
-            await asyncio.gather(*faults)
+            if is_typed:
+                await typed({name: car.type for name, car in cars.items()})
+            else:
+                await asyncio.gather(*(again(cars[name].type, *CARS[name]) for name in CARS if CARS[name][0]))
 
 
-async def again(write: Callable[[str], Awaitable[None]], fault: str, every_s: float) -> None:
+async def again(write: Type, fault: str, every_s: float) -> None:
     """Types the fault again and again."""
     while True:
         await write(fault)
         await asyncio.sleep(every_s)
 
 
+async def typed(terminals: Mapping[str, Type]) -> None:
+    """Passes each line of the standard input on to the car that it names, and goes on without an input."""
+    lines = asyncio.StreamReader()
+    await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), sys.stdin)
+    while line := (await lines.readline()).decode():
+        name, _, fault = line.strip().partition(" ")
+        if name in terminals and fault:
+            await terminals[name](fault)
+        else:
+            print(f"A line is CAR FAULT, such as “lynx speeding 20”; cars: {', '.join(terminals)}.", flush=True)
+    await asyncio.get_running_loop().create_future()
+
+
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--ports", nargs=2, type=int, default=(8001, 8002), help="of the two web nodes; 0: any")
+    parser.add_argument("--typed", action="store_true", help="begin only faults that are typed, as `lynx speeding 20`")
+    given = parser.parse_args()
     with contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
-        asyncio.run(main())
+        asyncio.run(main(tuple(given.ports), is_typed=given.typed))

@@ -24,6 +24,7 @@ from server.bus.local import LocalBus
 from server.judge.settings import SettingsFile
 from server.mail.mailer import Mailer
 from server.mail.recorded import Recorded
+from server.protocol.alarm_state import Note
 from server.recording.catalog.catalog import Catalog
 from server.recording.export.jobs import Exports
 from server.recording.folder import RecordingsFolder
@@ -34,6 +35,7 @@ from server.replay.manager import ReplayManager, ReplaySource
 from server.storage.data_folder import DataFolder
 from server.storage.storage_thread import StorageThread
 from server.system.page_files import static_dir
+from server.vehicle.late_commands import LateCommands
 from server.vehicle.marks import MarksPlace
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
@@ -69,8 +71,9 @@ def build(
     off = OffVehicles(config.data if config.is_node else None, storage, wall_ms=wall_ms)
     people = People(config.data, wall_ms=wall_ms, storage=storage)
     page_bus, link, agents = _fleet(
-        config, bus, access, people, boot, storage, orders, off, AtAgent(lambda: running), now=now, wall_ms=wall_ms
-    )
+        config, bus, access, people, boot, storage, orders, off, AtAgent(lambda: running),
+        LateCommands(lambda name: _note_of(running, name), now=now), now=now, wall_ms=wall_ms,
+    )  # fmt: skip
     replays = _replays(agents, lambda id: _replay_source(running, id), now=now)
     running = Services(
         is_open=config.is_open,
@@ -156,6 +159,7 @@ def _fleet(
     orders: SignedOrders | None,
     off: OffVehicles,
     at_agent: AtAgent,
+    late: LateCommands,
     *,
     now: Callable[[], float],
     wall_ms: Callable[[], int],
@@ -190,7 +194,7 @@ def _fleet(
             return remote, BrokerLink(config.broker, remote, agents, bucket, name="catgraph web"), agents
         return remote, BrokerLink(config.broker, remote, agents, name="catgraph web"), agents
     assert orders is not None
-    agent = NatsAgent(bus, run=boot, now=now, admit=orders.admit)
+    agent = NatsAgent(bus, run=boot, now=now, admit=orders.admit, on_late=late.note)
     kept = HttpAgent(lambda: bus.vehicles, at_agent, scope_of, now=now)
     name = f"catgraph agent {' '.join(v.name for v in config.vehicles)}"
     return bus, BrokerLink(config.broker, agent, kept, name=name, unsent=lambda: agent.unsent), None
@@ -228,9 +232,14 @@ def _orders(
     )
 
 
+def _note_of(running: Services, vehicle: str) -> Note | None:
+    session = running.sessions.get(vehicle)
+    return None if session is None else session.note
+
+
 def _note_device(running: Services, vehicle: str, by: str, text: str) -> None:
-    if (session := running.sessions.get(vehicle)) is not None:
-        session.note("device", text, by=by or None)
+    if (note := _note_of(running, vehicle)) is not None:
+        note("device", text, by=by or None)
 
 
 def _session(

@@ -29,12 +29,18 @@ WANTED_FOR_S = 2.5  # after the last pull a node is taken to look no longer
 MOST_PULLS = 256  # that wait at once, of all nodes
 MOST_REQUESTS = 64  # requests at once; a flood is refused
 Admit = Callable[[str, Mapping[str, Any]], Awaitable[Mapping[str, Any]]]  # of vehicle, message; raises NotAdmitted
+Late = Callable[[str, Mapping[str, Any], str], None]  # of vehicle, command, and why it is late, as a sentence
 LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
+LOOKS_EVERY_S = 0.1  # whether the broker is there again
 FILTERS = frozenset({"before", "alarm", "change", "since_ms", "until_ms"})
 
 
 async def as_it_is(vehicle: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
     return message
+
+
+def unnoted(vehicle: str, command: Mapping[str, Any], why: str) -> None:
+    """Nothing."""
 
 
 class Looked:
@@ -77,9 +83,13 @@ class Looked:
 class NatsAgent:
     """Answers nodes for the vehicles of `bus`, in this run of it. `now`: a monotonic clock in seconds, as the bus's."""
 
-    def __init__(self, bus: LocalBus, *, run: str, now: Callable[[], float], admit: Admit = as_it_is) -> None:
-        """`admit` decides who gave a command that a node passes on, and whether it is carried out."""
+    def __init__(
+        self, bus: LocalBus, *, run: str, now: Callable[[], float], admit: Admit = as_it_is, on_late: Late = unnoted
+    ) -> None:
+        """`admit` decides who gave a command that a node passes on, and whether it is carried out; `on_late` gets each
+        that came too late for that."""
         self._admit = admit
+        self._on_late = on_late
         self._bus = bus
         self._client: Client | None = None
         self._run = run
@@ -195,7 +205,18 @@ class NatsAgent:
             now_s = self._now()
             for key in [key for key, looked in self._looked.items() if looked.until_s < now_s]:
                 self._looked.pop(key).close()
-            await asyncio.sleep(wire.HERE_EVERY_S)
+            await self._here_is_due()
+
+    async def _here_is_due(self) -> None:
+        """In a second, or as soon as the broker is there again: nodes request frames then, and not only once the
+        requests that were lost have ended."""
+        until_s, was_connected = self._now() + wire.HERE_EVERY_S, True
+        while (left_s := until_s - self._now()) > 0:
+            is_connected = self._client is not None and self._client.is_connected
+            if is_connected and not was_connected:
+                return
+            was_connected = is_connected
+            await asyncio.sleep(left_s if is_connected else min(left_s, LOOKS_EVERY_S))
 
     # -- requests ------------------------------------------------------------------------------------------------------
 
@@ -278,6 +299,7 @@ class NatsAgent:
     async def _command(self, vehicle: str, ask: wire.Ask) -> Any:
         """Raises NotServed, also for a command that came too late or was meant for an earlier run."""
         if ask.run != self._run:
+            self._on_late(vehicle, ask.command, "it was given before this agent was started.")
             raise NotServed(f"{vehicle} has started again since the command was given")
         self._check_time(vehicle, ask)
         try:
@@ -291,8 +313,9 @@ class NatsAgent:
 
     def _check_time(self, vehicle: str, ask: wire.Ask) -> None:
         """Raises NotServed: the command may not be carried out any more."""
-        if self._now() >= ask.not_after_s:
+        if (late_s := self._now() - ask.not_after_s) >= 0:
             log.warning("command_too_late vehicle=%s kind=%s", vehicle, ask.command.get("kind"))
+            self._on_late(vehicle, ask.command, f"it came through a web node {late_s:.1f} s after its deadline.")
             raise NotServed(f"the command reached {vehicle} too late and was not carried out")
 
     async def _publish(self, vehicle: str, what: str, body: wire.Body) -> None:

@@ -130,9 +130,12 @@ class NatsBus:
 
     def _meet(self, vehicle: str, run: str, last: int) -> None:
         is_new = vehicle not in self._logs
+        is_back = self._agents.is_gone(vehicle)
         self._agents.note(vehicle)
         self._on_message(vehicle)
         self._logs.begin(vehicle, run, last)
+        if is_back:
+            self._pulls.again(vehicle)
         if is_new:
             self._on_new(vehicle)
             self._look(ALL)  # with a second one summaries are wanted of all

@@ -20,6 +20,7 @@ from server.bus.broker import Broker, BrokerRefused
 log = logging.getLogger("catgraph.bus")
 
 RETRY_S = 1
+AGAIN_S = 0.3  # between two dials of a broker that was lost: behind a gap of the radio pages wait for it
 CONNECTS_WITHIN_S = 3
 PING_EVERY_S = 2  # a broker that has not answered two of them is gone: after 4 to 6 s
 LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
@@ -148,7 +149,7 @@ class BrokerLink:
             connect_timeout=CONNECTS_WITHIN_S,
             ping_interval=PING_EVERY_S,
             max_outstanding_pings=2,
-            reconnect_time_wait=RETRY_S,
+            reconnect_time_wait=AGAIN_S,  # type: ignore[arg-type]
             max_reconnect_attempts=-1,
             pending_size=0,  # what cannot be sent now is not kept: it would come late
         )

@@ -43,6 +43,10 @@ class AgentLiveness:
             return f"The agent of {vehicle} does not answer."
         return f"Nothing comes from the agent of {vehicle}: it or the broker does not answer."
 
+    def is_gone(self, vehicle: str) -> bool:
+        """Whether nothing came from it for so long that what it was requested is lost; False: or it was never there."""
+        return vehicle in self._received_s and self._silent_s(vehicle) > GONE_AFTER_S
+
     def check_known(self, vehicle: str) -> None:
         """Raises NotServed where nothing was ever received from the agent."""
         if vehicle not in self._received_s:
@@ -60,6 +64,9 @@ class AgentLiveness:
             raise NotServed(why, cut="broker-agent")
 
     def _is_live(self, vehicle: str) -> bool:
+        return self._silent_s(vehicle) <= SILENT_AFTER_S
+
+    def _silent_s(self, vehicle: str) -> float:
+        """Since anything came from it."""
         clock = self._questions.clocks.get(vehicle)
-        received_s = max(self._received_s[vehicle], clock.received_s if clock is not None else 0.0)
-        return self._now() - received_s <= SILENT_AFTER_S
+        return self._now() - max(self._received_s[vehicle], clock.received_s if clock is not None else 0.0)

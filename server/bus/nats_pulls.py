@@ -39,6 +39,12 @@ class Pulls:
         elif not is_looked and key in self._tasks:
             self._tasks.pop(key).cancel()
 
+    def again(self, vehicle: str) -> None:
+        """Request its frames anew: what was requested while its agent was silent is lost."""
+        for key in [key for key in self._tasks if key[0] == vehicle]:
+            self.look(*key, False)
+            self.look(*key, True)
+
     async def stop(self) -> None:
         tasks, self._tasks = self._tasks, {}
         for task in tasks.values():

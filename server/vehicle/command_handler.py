@@ -21,6 +21,7 @@ from server.protocol.state import LiveState
 from server.rosbridge.address import BadAddress
 from server.storage.storage_thread import StorageThread
 from server.vehicle import departure_seen, phone, queries
+from server.vehicle.late_commands import log_late
 from server.vehicle.outcomes import Outcomes
 from server.vehicle.queries import check_answer
 from server.vehicle.session_parts import SessionActions, SessionParts
@@ -59,7 +60,7 @@ class CommandHandler:
         self._frame = frame
         self._now = now
         self._wall_ms = wall_ms
-        self._outcomes = Outcomes(now)
+        self._outcomes = Outcomes(now, self._log_given_up)
 
     async def handle(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """The answer to a command or a query."""
@@ -67,6 +68,9 @@ class CommandHandler:
         if found is not None:
             return found
         return await self._outcomes.keep(message, self._carry_out)
+
+    def _log_given_up(self, message: Mapping[str, Any], why: str) -> None:
+        log_late(self._parts.event_log.note, str(message.get("kind")), why, by=Caller.of(message).name)
 
     async def _carry_out(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         caller = Caller.of(message)
@@ -106,14 +110,15 @@ class CommandHandler:
         return answer
 
     def _check_meant(self, command: commands.LoggedCommand, by: str) -> None:
-        """It must be for this car and for now. Raises Refused; a slow-down that is refused is logged."""
+        """It must be for this car and for now. Raises Refused; what came too late, and any slow-down, is logged."""
         why = self._of_other_car(command)
+        is_late = why is None
         if why is None and isinstance(command, Prompt):
             why = command.too_late(self._wall_ms())
         if why is None:
             return
-        if isinstance(command, drive_commands.Decelerate):
-            self._parts.event_log.note("slow_down", f"Slow-down refused: {why}", by=by, step="refused")
+        if is_late or isinstance(command, drive_commands.Decelerate):
+            log_late(self._parts.event_log.note, command.kind, why, by=by)
         raise Refused(why)
 
     def _of_other_car(self, command: commands.LoggedCommand) -> str | None:

@@ -15,6 +15,7 @@ log = logging.getLogger("catgraph.session")
 LONGEST_WAY_S = 3.0  # of a question; `ago_s` was counted when it left the page
 KEPT_S = 120.0
 MOST = 1000
+GIVEN_UP = "Its page had given it up before it came."
 
 Became = Literal["done", "refused", "never", "under_way", "not_known"]
 
@@ -28,10 +29,16 @@ class _Known:
 
 
 class Outcomes:
-    """Of one session, each command by its page and id. `now`: a monotonic clock in seconds."""
+    """Of one session, each command by its page and id. `now`: a monotonic clock in seconds.
 
-    def __init__(self, now: Callable[[], float]) -> None:
+    `given_up` is called with each command that came when its page had given it up, and why it is not carried out.
+    """
+
+    def __init__(
+        self, now: Callable[[], float], given_up: Callable[[Mapping[str, Any], str], None] = lambda *_: None
+    ) -> None:
         self._now = now
+        self._given_up = given_up
         self._since_s = now()  # every command that came since then is known
         self._known: dict[tuple[str, str], _Known] = {}
 
@@ -40,7 +47,8 @@ class Outcomes:
         if message.get("kind") in ("present", "outcome"):
             return await carry_out(message)
         if not self.may_begin(message, self._now()):
-            return {"ok": False, "reason": "Its page had given it up before it came."}
+            self._given_up(message, GIVEN_UP)
+            return {"ok": False, "reason": GIVEN_UP}
         try:
             answer = await carry_out(message)
         except BaseException:

@@ -89,7 +89,9 @@ test('what became of a command that was not answered is queried until it is know
   sent.length = 0;
   void requests.ask('resume', {});
   requests.broke();
-  requests.look(performance.now() + 61_000);
+  requests.look(performance.now() + 95_000);
+  assert.deepEqual([sent.length, found.length], [2, 2], 'the session of the car still knows it');
+  requests.look(performance.now() + 101_000);
   assert.deepEqual(found[2], { kind: 'resume', became: 'not_known', reason: '', cut: 'page-server' });
   void requests.ask('resume', {});
   requests.broke();

@@ -4,9 +4,9 @@ import { maybe, withCut } from './outcome.js';
 
 /** A command is for now: without an answer by then it is not known what became of it [ms]. */
 const REPLY_MS = 4000;
-/** The outcome of an unanswered command is queried so often [ms], and for so long. */
+/** The outcome of an unanswered command is queried so often [ms], and for so long: a session knows it for 120 s. */
 const LOOKS_EVERY_MS = 1500;
-const LOOKS_FOR_MS = 60_000;
+const LOOKS_FOR_MS = 100_000;
 /** So many of them at most; the oldest is given up. */
 const MOST_LOST = 20;
 

@@ -28,18 +28,25 @@ class Way:
     """From a node to an agent, with one place where it can be held up."""
 
     def __init__(
-        self, both: Buses, hold: Callable[[], None], let_go: Callable[[], None], is_there: Callable[[], bool]
+        self,
+        both: Buses,
+        hold: Callable[[], None],
+        let_go: Callable[[], None],
+        is_there: Callable[[], bool],
+        late: Sequence[tuple[int, str]],
     ) -> None:
         self.both = both
         self.hold = hold
         self.let_go = let_go
         self.is_there = is_there  # the orders are where they are held
+        self.late = late  # what the agent reported as late: its number, and why
 
 
 @contextlib.asynccontextmanager
 async def way(place: Place) -> AsyncIterator[Way]:
     open_, waiting = asyncio.Event(), 0
     open_.set()
+    late: list[tuple[int, str]] = []
 
     async def admit(vehicle: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
         nonlocal waiting
@@ -53,7 +60,10 @@ async def way(place: Place) -> AsyncIterator[Way]:
         async with near.on_air() as node_at, far.on_air() as agent_at, node(nats(node_at), both.clock) as page:
             both.page = page
             async with connected(nats(agent_at)) as client:
-                agent = NatsAgent(both.session, run="run-1", now=both.clock, admit=admit)
+                agent = NatsAgent(
+                    both.session, run="run-1", now=both.clock, admit=admit,
+                    on_late=lambda _, command, why: command["what"] < 0 or late.append((command["what"], why)),
+                )  # fmt: skip
                 await agent.start(client)
                 await until(lambda: set(page.vehicles) == set(VEHICLES))
                 match place:
@@ -65,7 +75,7 @@ async def way(place: Place) -> AsyncIterator[Way]:
                         radio = near if "node" in place else far
                         hold, let_go = radio.cut, radio.mend
                 try:
-                    yield Way(both, hold, let_go, lambda: place != "agent" or waiting == AT_ONCE)
+                    yield Way(both, hold, let_go, lambda: place != "agent" or waiting == AT_ONCE, late)
                 finally:
                     let_go()
                     await agent.stop()
@@ -112,7 +122,7 @@ async def hold_up(place: Place, holds_s: Sequence[float]) -> None:
     """Holds up orders for so long by the clock of both sides, and before each hold gives one that comes in time."""
     async with way(place) as held:
         both = held.both
-        for hold_s in holds_s:
+        for n, hold_s in enumerate(holds_s):
             await served(both)
             held.hold()
             under_way = [asyncio.create_task(given(both, number)) for number in range(AT_ONCE)]
@@ -126,6 +136,8 @@ async def hold_up(place: Place, holds_s: Sequence[float]) -> None:
                 assert str(one) == "the command reached ocelot too late and was not carried out"
                 assert (one.outcome, one.cut) == ("not_delivered", None), "its agent answers"
             assert {one["what"] for one in both.commands} == {-1}
+            assert sorted(number for number, _ in held.late) == sorted([*range(AT_ONCE)] * (n + 1))
+            assert all("after its deadline" in why for _, why in held.late)
 
 
 @pytest.mark.field

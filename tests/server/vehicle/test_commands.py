@@ -15,8 +15,10 @@ from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.protocol.command_base import OF_PAGE
 from server.protocol.commands import BY_KIND, COMES_WITHIN_S, comes_within_s
+from server.vehicle.outcomes import GIVEN_UP, LONGEST_WAY_S
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
+from tests.server.bus.buses import Clock
 
 # What changes the car's monitoring for everybody. Slowing the car is not among it, letting it go is.
 NEEDS_CONTROL = {
@@ -34,12 +36,15 @@ PHONE_B = {"by": "Ben", "who": "b", "page": "page-b"}
 
 
 @pytest.fixture
-async def bus() -> AsyncIterator[LocalBus]:
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+async def bus(clock: Clock) -> AsyncIterator[LocalBus]:
     """Serves a session without a car, of which Ann is in control; Ben's page is seen as well."""
-    bus = LocalBus(Journal(None), now=time.monotonic)
-    session = Session(
-        Vehicle(name="car"), bus, now=time.monotonic, wall_ms=lambda: time.time_ns() // 1_000_000, server=dict
-    )
+    bus = LocalBus(Journal(None), now=clock)
+    session = Session(Vehicle(name="car"), bus, now=clock, wall_ms=lambda: time.time_ns() // 1_000_000, server=dict)
     await session.start()
     for sender in (PHONE_A, PHONE_B):
         await bus.request("car", example("present") | sender)
@@ -117,9 +122,24 @@ async def test_what_was_long_on_its_way_is_refused_and_the_same_pressed_now_is_n
         assert "ago: press again if still needed" in answer["reason"], answer
     answer = await bus.request("car", example(kind) | {"pressed_ago_s": within_s + 0.1} | PHONE_A)
     assert "ago: press again if still needed" in answer["reason"], answer
+    logged = [event for event in bus.past_events("car") if "ago: press again if still needed" in event["text"]]
+    assert [(event["change"], event["by"]) for event in logged] == 3 * [
+        ("slow_down" if kind == "slow_down" else "late", PHONE_A["by"])
+    ]
+    assert all(kind in event["text"] or event["step"] == "refused" for event in logged)
     now = {"heard_ms": float(time.time_ns() // 1_000_000), "held_s": 0.0}
     answer = await bus.request("car", example(kind) | now | PHONE_A)
     assert "press again" not in answer.get("reason", "")
+
+
+async def test_what_its_page_had_given_up_is_logged_when_it_comes(bus: LocalBus, clock: Clock) -> None:
+    clock.ahead_s += LONGEST_WAY_S + 2.0  # of what was given before it began a session knows nothing
+    asked = {"kind": "outcome", "id": "p1?", "of": "p1", "ago_s": 1.0, **PHONE_A}
+    assert (await bus.request("car", asked))["became"] == "never"
+    answer = await bus.request("car", {"kind": "resume", "id": "p1", **PHONE_A})
+    assert answer == {"ok": False, "reason": GIVEN_UP}
+    (event,) = bus.past_events("car", change="late")
+    assert (event["text"], event["by"]) == (f"“resume” was not carried out: {GIVEN_UP}", PHONE_A["by"])
 
 
 async def test_what_is_not_for_the_moment_may_come_late(bus: LocalBus) -> None:
