@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from server.access.identity import LOCAL, Principal
 from server.access.people_files import DUTY_FILE, PEOPLE_FILE, PeopleFiles
 from server.control import display_name
-from server.control.duty import DutyBoard, DutyEntry
+from server.control.duty import MOST_PEOPLE, DutyBoard, DutyEntry, Person
 from server.protocol.people import ROLES, Duty, DutyState, PeopleList
 from server.storage.storage_thread import StorageThread
+
+log = logging.getLogger("catgraph.people")
 
 MOST_LISTED = 20  # people on duty that are sent to a page
 LONGEST_WAIT_S = 60.0  # a clock that is put forward ends a duty within a minute
@@ -119,7 +122,7 @@ class People:
 
     async def remove(self, id: str) -> None:
         """Raises Refused, OSError."""
-        self.board.remove(id, self._wall_ms())
+        log_dropped(self.board.remove(id, self._wall_ms()))
         await self._keep(PEOPLE_FILE)
 
     async def set_hours(self, hours: float) -> None:
@@ -210,6 +213,12 @@ class People:
         self._timer = None
         self._advance()
         self._wait()
+
+
+def log_dropped(people: Iterable[Person]) -> None:
+    """Log who is not stated as off duty any more: too many were removed within a few days."""
+    for one in people:
+        log.warning("removed_person_dropped name=%r off_ms=%s most=%d", one.name, one.off_ms, MOST_PEOPLE)
 
 
 NOBODY = People(None, wall_ms=lambda: 0)  # of parts that are used without a server

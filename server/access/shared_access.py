@@ -17,7 +17,7 @@ import orjson
 from monitor.runner import Refused
 from server.access.access import Access
 from server.access.devices import FORGOTTEN_AFTER_MS, SEEN_EVERY_MS, Device, device_of
-from server.access.people import People
+from server.access.people import People, log_dropped
 from server.access.people_files import entry_id, entry_of, person_of, time_ms
 from server.control.duty import NOTE_LASTS_MS, DutyEntry
 
@@ -113,7 +113,7 @@ class SharedPeople:
         board = self._people.board
         self._had[f"person.{id}"] = removed_ms
         if id in board.people or id not in board.removed:
-            board.forget(id, removed_ms)
+            log_dropped(board.forget(id, removed_ms))
             self._changed()
 
     def _take_duty(self, key: str, entry: DutyEntry) -> None:

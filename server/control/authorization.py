@@ -101,6 +101,7 @@ class Authorization:
         self._duties: Mapping[Any, Any] = {}  # as stated last
         self._listed: int | None = None  # people, as stated last
         self._off_ms: dict[str, int] = {}  # by name, when their duty ended; who was removed since stays
+        self.owners: frozenset[str] = frozenset()  # names of people who have acknowledged what stands now
 
     def tick(self, now_s: float) -> bool:
         """Time passes; whether control changed by it."""
@@ -202,7 +203,15 @@ class Authorization:
             self._off_ms.pop(name, None)
             if type(off_ms) is int:
                 self._off_ms[name] = off_ms
-        self._off_ms = dict(list(self._off_ms.items())[-MOST_DUTIES:])
+        newest = set(list(self._off_ms)[-MOST_DUTIES:])
+        self._off_ms = {name: at_ms for name, at_ms in self._off_ms.items() if name in newest | self.owners}
+
+    def restore_off_duty(self, owners: Mapping[str, int]) -> None:
+        """Of who acted under these names before this run, their duty ended then; what a page states counts more."""
+        for signed, off_ms in owners.items():
+            name = display_name.person_of(signed)
+            if name and name not in self._duties:
+                self._off_ms[name] = off_ms
 
     def off_duty_ms(self, signed: str | None) -> int | None:
         """When the duty of who acted under this name ended; None: on duty, or not known (not a person)."""

@@ -115,24 +115,26 @@ class DutyBoard:
         self.people[id] = changed
         return changed
 
-    def remove(self, id: str, now_ms: int) -> Person:
+    def remove(self, id: str, now_ms: int) -> list[Person]:
+        """As `forget`. Raises Refused: they are on duty."""
         person = self.person(id)
         entry = self.duty_of(id)
         if entry is not None:
             raise Refused(f"{person.name} is on duty at {entry.device_name}: they must sign off first.")
-        self.forget(id, now_ms)
-        return person
+        return self.forget(id, now_ms)
 
-    def forget(self, id: str, at_ms: int) -> None:
+    def forget(self, id: str, at_ms: int) -> list[Person]:
         """This person is not in the list any more, nor on duty, and nobody brings them back; of the removed so many
-        are kept, and those whose duty ended lately as they were."""
+        are kept, and those whose duty ended lately as they were. Returns those of them that were one too many."""
         if (entry := self.duty_of(id)) is not None:  # as another web node removed them
             why = "Who was on duty here was removed from the list of people: nobody is on duty here now."
             self._end(entry, why, max(at_ms, entry.changed_ms + 1))
+        gone = list(self.gone.values())
         if (person := self.people.pop(id, None)) is not None:
-            gone = [one for one in (*self.gone.values(), person) if one.is_lately_off(at_ms)]
+            gone = [one for one in (*gone, person) if one.is_lately_off(at_ms)]
             self.gone = {one.id: one for one in gone[-MOST_PEOPLE:]}
         self.removed = dict([*self.removed.items(), (id, at_ms)][-2 * MOST_PEOPLE :])
+        return gone[:-MOST_PEOPLE]
 
     def person(self, id: str) -> Person:
         person = self.people.get(id)

@@ -6,6 +6,7 @@ from typing import assert_never
 
 from monitor.alarm import Alarm, AlarmState
 from monitor.runner import Refused
+from server.control import display_name
 from server.control.authorization import Authorization, Caller
 from server.control.handover import Handover, Line, NotReadBack, version_of
 from server.control.lease import Operator
@@ -75,7 +76,9 @@ class CarHandover:
     def watch_owners(self) -> None:
         """Log that an owner of acknowledged alarms is off duty, and on duty again: a replay knows it by that."""
         acknowledged = [one for one in self._judgement.monitor.standing() if one.state is AlarmState.ACKED]
-        for owner in sorted({one.acknowledged_by or "" for one in acknowledged} - {""}):
+        owners = sorted({one.acknowledged_by or "" for one in acknowledged} - {""})
+        self._authorization.owners = frozenset(display_name.person_of(owner) or "" for owner in owners)
+        for owner in owners:
             off_ms, logged_ms = self._authorization.off_duty_ms(owner), self._owners_off.pop(owner, None)
             if off_ms is not None:
                 self._owners_off = dict([*self._owners_off.items(), (owner, off_ms)][-MOST_OWNERS:])

@@ -69,6 +69,7 @@ class Restoration:
         self.held = None
         before = self._recall()
         self._parts.judgement.monitor.restore(before.transitions)
+        self._parts.authorization.restore_off_duty(before.owners_off)
         if before.address != url:
             return None
         self._parts.recording.remember(before.stood)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, cast, get_args
 
@@ -29,7 +29,7 @@ ORDER_STANDS = ("ordered", "sent", "slows", "stands", "not_confirmed", "cut", "r
 LONGEST_HOLD_S = 3600.0  # as the setting allows
 
 MOST_EVENTS = 3000  # of one check: 60 items that turn 20 times each, and what people do besides
-_DEPARTURE_PORTION = 200
+_LARGE_PORTION = 200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +45,7 @@ class RestoredState:
     transitions: tuple[Transition, ...] = ()  # of each alarm since it was last at rest, oldest first
     stood: tuple[Mapping[str, Any], ...] = ()  # the newest event of each alarm that was not at rest
     recent: tuple[Transition, ...] = ()  # of all alarms in the last ten minutes, oldest first
+    owners_off: Mapping[str, int] = field(default_factory=dict)  # who acted on these alarms → when their duty ended
 
     @property
     def standing(self) -> Mapping[str, Transition]:
@@ -98,7 +99,24 @@ def recall(bus: SessionBus, vehicle: str, *, now_s: float, wall_ms: int) -> Rest
         transitions=tuple(transitions),
         stood=tuple(events[-1] for events in alarms if events and events[-1].get("state") != AlarmState.NORMAL),
         recent=tuple(_recent(bus, vehicle, wall_ms, moment_s, shelf_s)),
+        owners_off=_owners_off(bus, vehicle, alarms),
     )
+
+
+def _owners_off(bus: SessionBus, vehicle: str, alarms: Iterable[Iterable[Mapping[str, Any]]]) -> dict[str, int]:
+    """Whose duty ended after their last act on these alarms, as logged: the list of people may not have them now."""
+    acted: dict[str, int] = {}  # by name: the number of their newest event
+    for event in (event for events in alarms for event in events):
+        if (by := text_of(event.get("by"))) is not None:
+            acted[by] = max(acted.get(by, 0), _number(event))
+    found: dict[str, int] = {}
+    for event in _changes_backwards(bus, vehicle, "owner"):
+        if not acted or _number(event) < min(acted.values()):
+            break
+        number, off_ms = acted.pop(str(event.get("owner")), None), event.get("off_duty_ms")
+        if number is not None and number < _number(event) and type(off_ms) is int:
+            found[str(event.get("owner"))] = off_ms
+    return found
 
 
 def _order(bus: SessionBus, vehicle: str, wall_ms: int) -> Mapping[str, Any] | None:
@@ -191,7 +209,7 @@ def recall_departure(bus: SessionBus, vehicle: str) -> DeparturePast:
     """Reads the log. Monitoring that was stopped ended its check."""
     started, stopped = (_newest(bus, vehicle, change) for change in ("started", "stopped"))
     events: list[Mapping[str, Any]] = []
-    for event in _departure_backwards(bus, vehicle):
+    for event in _changes_backwards(bus, vehicle, "departure"):
         if _number(event) < stopped or len(events) >= MOST_EVENTS:
             break
         events.insert(0, event)
@@ -268,8 +286,8 @@ def _newest(bus: SessionBus, vehicle: str, change: str) -> int:
     return _number(found[0]) if found else -1
 
 
-def _departure_backwards(bus: SessionBus, vehicle: str) -> Iterator[dict[str, Any]]:
+def _changes_backwards(bus: SessionBus, vehicle: str, change: str) -> Iterator[dict[str, Any]]:
     before: int | None = None
-    while events := bus.past_events(vehicle, change="departure", before=before, limit=_DEPARTURE_PORTION):
+    while events := bus.past_events(vehicle, change=change, before=before, limit=_LARGE_PORTION):
         yield from events
         before = events[-1]["n"]

@@ -411,6 +411,14 @@ class Canned:
         async def devices() -> Json:
             return {"you": "local", "open": True, "devices": []}
 
+        @self.app.get("/api/marks")
+        async def drive_marks() -> Json:
+            return {"marks": self.drive_marks}
+
+        @self.app.get("/api/interventions/{name}")
+        async def intervention(name: str) -> Json:
+            return self.interventions[name]
+
         @self.app.get("/api/people")
         async def people() -> Json:
             people = People(None, wall_ms=lambda: 0)
@@ -465,6 +473,8 @@ class Canned:
         self.timeline: Json | None = None  # of the recording that a page requests to replay
         self.mails: list[Json] = []
         self.marks: list[Json] = []  # of every recording
+        self.drive_marks: list[Json] = []  # of the drive that goes on
+        self.interventions: dict[str, Json] = {}  # by their id
         self.vehicle = "car"
         self.access = "open"
         self.cars_every_s = 0.5

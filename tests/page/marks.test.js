@@ -283,6 +283,10 @@ test('rows say what was cut, moved or made smaller', () => {
   assert.equal(smallerWords(11.8e6, 2.1e6), 'photo 2.1 MB, made smaller from 11.8 MB');
   assert.equal(waitWords(3), '3 wait');
   assert.match(waitingWords([mark('a')], false, true).text, /lost if the page is closed/);
+  const full = mark('b', { refused: 'No room.' });
+  assert.equal(waitingWords([full], true, false).text, 'They survive closing the page. The server refused 1: offered again every 30 s.');
+  assert.match(waitingWords([mark('a'), full], true, false).text, /being delivered, oldest first\. The server refused 1:/);
+  assert.doesNotMatch(waitingWords([full], true, true).text, /refused/);
 });
 
 test('rows of this phone come before those of the server, each mark once', () => {

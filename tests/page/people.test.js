@@ -47,8 +47,9 @@ test('a hand-over concerns two pages, and opens once all is read', (t) => {
   assert.equal(endWords({ ...handover, left: 0 }, 'giver').isOpen, false, 'who hands over cannot take it for them');
   const line = (/** @type {any} */ more) => /** @type {any} */ ({ key: 'k', kind: 'alarm', title: 'Speed', text: '12 m/s', priority: null, since_ms: null, until_ms: null, read: false, ...more });
   assert.equal(lineWords(line({ since_ms: AT })), '12 m/s · since 13:58:00');
+  assert.equal(lineWords(line({ since_ms: AT, text: 'Acknowledged by Ann.' })), 'Acknowledged by Ann · since 13:58:00');
   assert.equal(lineWords(line({ until_ms: AT, text: '' })), 'back at 13:58:00');
-  assert.equal(lineWords(line({ since_ms: AT, off_duty_ms: AT + 60_000 })), '12 m/s, off duty since 13:59 · since 13:58:00');
+  assert.equal(lineWords(line({ since_ms: AT, off_duty_ms: AT + 60_000 })), '12 m/s, off duty since 13:59 · active since 13:58:00');
   assert.deepEqual([line({ priority: 'critical' }), line({ priority: 'warning' }), line({ kind: 'shelved', priority: 'critical' })].map(markOf), ['crit', 'warn', 'bell-off']);
 });
 

@@ -19,6 +19,7 @@ from tests.chromium import FLAGS, find_chromium
 from tests.page import canned_fleet
 from tests.page.canned import Canned, alarm, check, idle, live, slow, slowed
 from tests.page.canned_questions import NOT_CHOSEN, brake_unit, laser_offers, two_lasers
+from tests.page.work_scenes import WORK_SCENES
 from tests.server.web.map_files import png
 
 OUT = Path(__file__).resolve().parents[2] / "out" / "screenshots"
@@ -83,7 +84,7 @@ WATCH: dict[str, tuple[str, int, int, str]] = {
     "watch-phone-check-unknown": ("check-unknown", 412, 915, "light"),
 }
 Scene = Callable[[Canned, Page], Awaitable[None]]
-SCENES: dict[str, Scene] = {}
+SCENES: dict[str, Scene] = {**WORK_SCENES}
 # Roboto as on a phone: text takes the room it takes there.
 FONTS = """<?xml version="1.0"?><!DOCTYPE fontconfig SYSTEM "fonts.dtd"><fontconfig><dir>/usr/share/fonts</dir>
 <match target="pattern"><edit name="family" mode="prepend" binding="strong"><string>Roboto</string></edit></match>
@@ -646,6 +647,18 @@ async def fleet_asked(server: Canned, page: Page) -> None:
         ago_s=156, assigned=canned_fleet.holder(canned_fleet.DESK_2), offered=offered
     )
     await page.wait_for_selector("[data-act=accept]:visible")
+
+
+@scene("fleet-offered")
+async def fleet_offered(server: Canned, page: Page) -> None:
+    """An item is offered to somebody else, and control of a car is requested."""
+    cars = canned_fleet.three()
+    offered = {"by": "Desk 2", "name": "Field 2", "page": "field2", "since_ms": canned_fleet.now_ms() - 12_000}
+    assigned = canned_fleet.holder(canned_fleet.DESK_2)
+    cars[2]["summary"]["attention"] = canned_fleet.attention(ago_s=156, assigned=assigned, offered=offered)
+    requests = [{"page": "a", "name": "A. K. (Pixel 7)", "left_s": 14.0}, {"page": "b", "name": "Ben", "left_s": 19.0}]
+    cars[3]["summary"]["requests"] = requests
+    await _fleet(server, page, cars)
 
 
 @scene("fleet-lost")

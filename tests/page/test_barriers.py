@@ -19,6 +19,7 @@ STATES = {
     "settings": ("settings", "topic", "preferences"),
     "alarms": ("alarms", "check", "check-unknown"),
     "sources": ("question", "question-sheet", "signal"),
+    "work": ("files-search", "marks-wait", "handover"),
     "menu": ("menu", "stop", "scan", "signals", "alarm-log"),
     "connect": ("connect", "connect-saved", "connect-failed"),
 }

@@ -152,9 +152,12 @@ def _figures(found: Mapping[str, Any]) -> list[tuple[str, str | None, str, str, 
 
 
 def _not_recorded(found: Mapping[str, Any]) -> str:
-    """The time between the parts, which is not among what was lost."""
+    """The time between the parts, and the parts that are missing, which are not among what was lost."""
     seconds = sum(one["to_s"] - one["from_s"] for one in found["gaps"])
-    return f", and {report_text.length(seconds)} not recorded" if seconds else ""
+    missing = sum(len(one["parts"]) for one in found["no_record"])
+    more = [f"{report_text.length(seconds)} not recorded"] if seconds else []
+    more += [f"{report_text.counted(missing, 'part')} missing"] if missing else []
+    return f", and {', '.join(more)}" if more else ""
 
 
 def _people(people: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:

@@ -10,8 +10,9 @@ import { sinceTime, timeOfDay } from '../core/format.js';
 
 /** The second line of a line. @param {HandoverLine} line */
 export function lineWords({ text, since_ms, until_ms, off_duty_ms }) {
-  const line = off_duty_ms ? `${text.replace(/\.$/, '')}, off duty since ${sinceTime(off_duty_ms)}` : text; // who has acknowledged it ends the text
-  const since = since_ms === null ? '' : `since ${timeOfDay(since_ms)}`;
+  const plain = text.replace(/\.$/, '');
+  const line = off_duty_ms ? `${plain}, off duty since ${sinceTime(off_duty_ms)}` : plain; // who has acknowledged it ends the text
+  const since = since_ms === null ? '' : `${off_duty_ms ? 'active ' : ''}since ${timeOfDay(since_ms)}`;
   const until = until_ms === null ? '' : `back at ${timeOfDay(until_ms)}`;
   return [line, since || until].filter(Boolean).join(' · ');
 }

@@ -143,9 +143,10 @@ export class LineRow {
   tick = html('button', { type: 'button', class: 'tick' });
   element = html('li', {}, this.mark, this.title, this.text, this.tick);
 
-  /** @param {HandoverLine} line @param {(line: HandoverLine, event: Event) => void} read @param {boolean} isTaker */
-  constructor(line, read, isTaker) {
+  /** @param {HandoverLine} line @param {(line: HandoverLine, event: Event) => void} read @param {boolean} isTaker @param {string} [does] what a press on the next one does */
+  constructor(line, read, isTaker, does = 'Read') {
     this.line = line;
+    this.does = does;
     setAttribute(this.tick, 'data-line', line.key);
     setAttribute(this.tick, 'aria-disabled', isTaker ? null : 'true');
     if (isTaker) this.tick.addEventListener('click', (event) => read(this.line, event));
@@ -164,7 +165,7 @@ export class LineRow {
     setAttribute(this.tick, 'data-next', face === 'next');
     if (this.tick.dataset['face'] === face) return;
     setAttribute(this.tick, 'data-face', face);
-    this.tick.replaceChildren(face === 'read' ? icon('ok') : face === 'next' ? 'Read' : '');
+    this.tick.replaceChildren(face === 'read' ? icon('ok') : face === 'next' ? this.does : '');
   }
 }
 

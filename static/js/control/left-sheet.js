@@ -72,7 +72,7 @@ export class LeftSheet {
       this.#rows.delete(key);
     }
     lines.forEach((line, i) => {
-      const row = this.#rows.get(line.key) ?? new LineRow(line, (shown, event) => void this.#take(shown, event), true);
+      const row = this.#rows.get(line.key) ?? new LineRow(line, (shown, event) => void this.#take(shown, event), true, 'Take');
       this.#rows.set(line.key, row);
       row.draw(line, line.key === next);
       setAttribute(row.tick, 'aria-label', `Take over: ${line.title}`);

@@ -166,13 +166,15 @@ export function countWords(waiting, stored) {
 
 /** The head of the list where some wait. @param {Mark[]} waiting @param {boolean} isDurable @param {boolean} isAway */
 export function waitingWords(waiting, isDurable, isAway) {
+  const refused = waiting.filter((mark) => mark.refused !== '').length;
   const bytes = waiting.reduce((sum, { voice, photo }) => sum + (voice?.blob?.size ?? 0) + (photo?.blob?.size ?? 0), 0);
   return {
     title: `${counted(waiting.length, 'mark')} ${waiting.length === 1 ? 'waits' : 'wait'} on this device`,
     text: [
       isDurable ? 'They survive closing the page.' : 'This browser stores nothing: they are lost if the page is closed now.',
       ...(bytes ? [`${bytes < 1e5 ? 'Less than 0.1' : fixed(bytes / 1e6)} MB of voice and photos.`] : []),
-      isAway ? 'Delivered automatically when the server answers, oldest first.' : 'They are being delivered, oldest first.',
-    ].join(' '),
+      isAway ? 'Delivered automatically when the server answers, oldest first.' : refused < waiting.length ? 'They are being delivered, oldest first.' : '',
+      refused && !isAway ? `The server refused ${refused}: offered again every 30 s.` : '',
+    ].filter(Boolean).join(' '),
   };
 }

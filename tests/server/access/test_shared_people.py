@@ -146,3 +146,19 @@ def test_of_the_removed_so_many_are_kept() -> None:
     for number in range(2 * MOST_PEOPLE + 5):
         node.shared.take(f"person.p{number}", b'{"removed_ms": 1}')
     assert len(node.people.board.removed) == 2 * MOST_PEOPLE
+
+
+async def test_who_is_not_stated_as_off_duty_any_more_is_logged_at_each_node(caplog: pytest.LogCaptureFixture) -> None:
+    one, two = Node(), Node()
+    for number in range(MOST_PEOPLE + 1):
+        one.ms += 1
+        id = await one.people.add(f"P {number}", "operator")
+        await one.people.sign_on("phone", "Pixel", id, None, moves=False)
+        one.ms += 1
+        await one.people.sign_off("phone")
+        two.hear(one)
+        assert caplog.messages == []
+        one.ms += 1
+        await one.people.remove(id)
+        two.hear(one)
+    assert caplog.messages == 2 * ["removed_person_dropped name='P 0' off_ms=1002 most=50"]

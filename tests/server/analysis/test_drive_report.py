@@ -191,7 +191,9 @@ def test_rates_curve_and_link_are_in_it(parts: Path) -> None:
 def test_a_part_that_is_missing_is_said(tmp_path: Path) -> None:
     with open_recording(in_two_parts(tmp_path)[1:]) as recording:
         write_drive_page(recording, tmp_path / "page.html", name="drive")
-    assert "Part 1 of the drive of s1_p2 is not in this report" in text_of(tmp_path / "page.html")
+    plain = text_of(tmp_path / "page.html")
+    assert "Part 1 of the drive of s1_p2 is not in this report" in plain
+    assert "in 0 gaps, and 1 part missing" in plain
     bad = re.findall(r'<p class="bad">.*?<b>(.*?)</b>', (tmp_path / "page.html").read_text())
     assert bad == ["Missing: part 1"]
 
@@ -222,6 +224,7 @@ def test_a_time_without_a_record_is_never_said_to_be_without_alarms(tmp_path: Pa
     text = text_of(tmp_path / "page.html")
     assert "Alarms, time to acknowledge none in what was recorded" in text
     assert "Missing: part 2 see data lost" in text, "no chain that is intact stands alone"
+    assert "in 0 gaps, and 38.0 s not recorded, 1 part missing" in text
     bad = re.findall(r'<p class="bad">.*?<b>(.*?)</b>', (tmp_path / "page.html").read_text())
     assert bad == ["Missing: part 2"], "the lines of the parts that are intact are no alarm"
     assert "No record here from 22:13:30 to 22:14:08: whether there were alarms is not known." in text

@@ -254,7 +254,8 @@ def test_of_former_names_the_last_ones_are_known(board: DutyBoard) -> None:
 def test_of_the_removed_those_are_kept_whose_duty_ended_lately(board: DutyBoard) -> None:
     for number in range(MOST_PEOPLE + 2):
         board.people[f"p{number}"] = Person(id=f"p{number}", name=f"P {number}", off_ms=1000)
-        board.forget(f"p{number}", 2000)
+        dropped = board.forget(f"p{number}", 2000)
+        assert [one.id for one in dropped] == [f"p{one}" for one in [number - MOST_PEOPLE] if one >= 0]
     assert list(board.gone) == [f"p{number}" for number in range(2, MOST_PEOPLE + 2)]
     board.remove("mr", 3000)  # never on duty: nothing bears the name
     assert "mr" not in board.gone

@@ -39,15 +39,20 @@ class Attended:
     """`faults`: the priorities of the alarms that are active. `clock`: its own, else one that the test moves on."""
 
     def __init__(
-        self, name: str = "ocelot", clock: Callable[[], float] | None = None, *, scope: Scope = Scope.SERVER
+        self,
+        name: str = "ocelot",
+        clock: Callable[[], float] | None = None,
+        *,
+        scope: Scope = Scope.SERVER,
+        after: Attended | None = None,
     ) -> None:
-        """`scope`: of its checks; those of the car's link sound."""
-        self.now_s = 0.0
+        """`scope`: of its checks; those of the car's link sound. `after`: the same car before the server's restart."""
+        self.now_s = 0.0 if after is None else after.now_s
         self.name = name
-        self.faults: set[Priority] = set()
+        self.faults: set[Priority] = set() if after is None else after.faults
         self.say_what = "12.6 m/s, limit 11.0 m/s"  # by their checks
         self._clock = clock or (lambda: self.now_s)
-        self.bus = LocalBus(Journal(None), now=self._clock)
+        self.bus = LocalBus(Journal(None), now=self._clock) if after is None else after.bus
         self.session = Session(
             Vehicle(name=name),
             self.bus,
@@ -57,6 +62,8 @@ class Attended:
             checks=[self._check(priority, scope) for priority in Priority],
             open_source=Dialled(),
         )
+        if after is not None:
+            self.session._restoration.begin()
         self.session.connect("ws://127.0.0.1:9090", by=None)
         self.bus.serve(name, self.session._commands.handle)
         self.bus.watch(ALL, lambda _: None)

@@ -8,6 +8,7 @@ import pytest
 
 from monitor.alarm_spec import Priority
 from monitor.restoring import restore
+from server.control.authorization import MOST_DUTIES
 from server.protocol.commands import BY_KIND
 from server.vehicle.restore import recall
 from tests.server.vehicle.attended import ANN, BEN, PROGRAM, SEEN, WALL_MS, Attended
@@ -160,3 +161,46 @@ async def test_another_moment_of_the_same_end_is_not_logged_again() -> None:
         car.tick(0.5)
         assert listed(car)[2] == off_ms
     assert len(car.bus.past_events("ocelot", change="owner")) == 1
+
+
+async def test_after_a_restart_it_is_known_from_the_log_and_from_no_list_of_people() -> None:
+    """The list keeps so many who were removed, and each of them for so many days."""
+    car = Attended(after=await left())
+    car.tick(0.5)
+    assert listed(car) == ("ACKED", "A. K. (Ann)", OFF_MS)
+    await car.obeyed(SEEN | BEN | MR | {"duties": {"M. R.": None}}, "present")
+    assert listed(car) == ("ACKED", "A. K. (Ann)", OFF_MS)
+    assert len(car.bus.past_events("ocelot", change="owner")) == 2  # the recording that begins now has it too
+    await car.obeyed(BEN | MR, "take_alarm", **TAKE)
+    assert listed(car) == ("ACKED", "M. R. (Ben)", None)
+    again = Attended(after=car)
+    again.tick(0.5)
+    assert listed(again) == ("ACKED", "M. R. (Ben)", None)
+
+
+async def test_after_a_restart_who_came_back_or_acknowledged_it_later_is_not_off_duty() -> None:
+    car = await left()
+    await car.obeyed(SEEN | ANN | AK | BOTH, "present")
+    car.tick(0.5)
+    again = Attended(after=car)
+    again.tick(0.5)
+    assert listed(again)[2] is None
+    car = await left()
+    car.faults = set()
+    car.tick(30.0)
+    car.faults = {Priority.WARNING}
+    car.tick(0.5)
+    await car.obeyed(SEEN | ANN | AK | BOTH, "present")
+    await car.obeyed(ANN | AK, "acknowledge", **TAKE | {"occurrence": 2})
+    again = Attended(after=car)
+    again.tick(0.5)
+    assert listed(again) == ("ACKED", "A. K. (Ann)", None)
+
+
+async def test_among_many_who_are_off_duty_the_owners_stay_known() -> None:
+    car = await left()
+    for hundred in range(0, 500, 100):
+        many = {f"P {number}": OFF_MS for number in range(hundred, hundred + 100)}
+        await car.obeyed(SEEN | BEN | MR | {"duties": {"M. R.": None} | many}, "present")
+    assert listed(car)[2] == OFF_MS
+    assert len(car.session._parts.authorization._off_ms) == MOST_DUTIES + 1
