@@ -196,7 +196,8 @@ NOT_RUN = (
     NotRun(name="mcap CLI", why="a Go program that PyPI, npm and Debian do not have; pymcap-cli's doctor runs instead"),
     NotRun(
         name="Foxglove, Lichtblick",
-        why="npm has only the interface for their extensions; their readers of npm run instead",
+        why="npm has only the interface for their extensions; their readers of npm run instead, and Lichtblick's "
+        "player was run by hand",
     ),
     NotRun(name="ros2idl-parser", why="no drive here has definitions in IDL"),
 )
