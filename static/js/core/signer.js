@@ -9,8 +9,10 @@ const OWN = 'orders';
 /** A browser that has not found its key by then signs by a new one: no order may wait for its storage [ms]. */
 const KEPT_WITHIN_MS = 2000;
 
-/** Commands of this page alone, queries, and what agents accept without a signature: a mark may have waited on this phone. */
-const NO_ORDERS = new Set(['replay', 'outcome', 'mark', 'remove_mark', 'position', 'present']);
+/** Commands of this page alone, queries, and what agents accept without a signature. */
+const NO_ORDERS = new Set(['replay', 'outcome', 'position', 'present']);
+/** What is sent beside its signature too: an agent keeps a mark whose signature it does not accept, as one that is not signed. */
+const KEPT = new Set(['mark', 'remove_mark']);
 
 /**
  * @typedef {object} Context what is signed beside a command
@@ -121,7 +123,7 @@ export class Signer {
   async #sealed({ id, ...command }, context) {
     await this.#ready;
     const { kind } = command;
-    return this.id ? { kind, id, vehicle: context.vehicle, signed: await this.sign(command, context) } : { id, ...command };
+    return this.id ? { kind, id, vehicle: context.vehicle, ...(KEPT.has(kind) ? command : {}), signed: await this.sign(command, context) } : { id, ...command };
   }
 
   /** @param {Record<string, unknown>} command with its kind @param {Context} context @returns {Promise<Signed>} */
