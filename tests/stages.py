@@ -9,10 +9,11 @@ that fails again, a crash, a timeout, a test that never ended and a stage withou
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.summary import StageResult, faults, read_stage, summary
@@ -26,11 +27,13 @@ PASSED, FAILED = 0, 1  # pytest's exit codes of a run that reached its end
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """One run of pytest: which tests, and with which options. The options also hold where a test runs by itself."""
+    """One run of pytest: which tests, and with which options and further environment. Both also hold where a test runs
+    by itself."""
 
     name: str
     selection: tuple[str, ...]
     options: tuple[str, ...] = ()
+    environment: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +47,8 @@ class Alone:
 # More workers than the machine has cores: some tests wait for processes, browsers and timers.
 THREE, FOUR = (("-n", number, "--dist", "worksteal") for number in "34")
 NOT_PAGE = "--ignore=tests/page"
+# Pages of a real server, which is an agent, a broker and a web node in this stage.
+THROUGH_BROKER = ("tests/page/test_report_cases.py", "tests/page/test_alarms.py")
 TARGETS = {
     # asyncio's debug mode is on here only, and in the tests' own process only: it takes a fifth more time.
     "check": (
@@ -56,15 +61,21 @@ TARGETS = {
     "test-field": (
         Stage("field", (NOT_PAGE, *THREE, "-m", "field and not (browser or soak)")),
         Stage("field-page", ("tests/page", "tests/recipes", "-m", "browser and not (gate or soak)")),
+        Stage(
+            "page-through-broker",
+            (*THROUGH_BROKER, "-m", "browser and not soak"),
+            environment={"CATGRAPH_THROUGH_BROKER": "1"},
+        ),
     ),
 }
 
 
-def pytest_run(arguments: Sequence[str], log: Path, cwd: Path) -> int:
+def pytest_run(stage: Stage, arguments: Sequence[str], log: Path, cwd: Path) -> int:
     """Run pytest in a process of its own. Returns its exit code."""
     log.unlink(missing_ok=True)
-    command = [sys.executable, "-m", "pytest", f"--report-log={log}", *arguments]
-    return subprocess.run(command, cwd=cwd, stdin=subprocess.DEVNULL, check=False).returncode
+    command = [sys.executable, "-m", "pytest", f"--report-log={log}", *stage.options, *arguments]
+    environment = {**os.environ, **stage.environment}
+    return subprocess.run(command, cwd=cwd, stdin=subprocess.DEVNULL, check=False, env=environment).returncode
 
 
 def run_alone(stage: Stage, failed: dict[str, str], folder: Path, cwd: Path) -> Alone:
@@ -83,7 +94,7 @@ def run_alone(stage: Stage, failed: dict[str, str], folder: Path, cwd: Path) -> 
 
 def _passes(stage: Stage, name: str, log: Path, cwd: Path) -> bool:
     print(f"\nby itself: {name}", flush=True)
-    code = pytest_run((*stage.options, "-q", name), log, cwd)
+    code = pytest_run(stage, ("-q", name), log, cwd)
     return code == PASSED and read_stage(log).outcomes.get(name) == "passed"
 
 
@@ -95,7 +106,7 @@ def run(stages: Sequence[Stage], folder: Path = FOLDER, cwd: Path = Path()) -> i
     wrong: list[str] = []
     for stage in stages:
         log = folder / f"{stage.name}.jsonl"
-        code = pytest_run((*stage.options, *stage.selection), log, cwd)
+        code = pytest_run(stage, stage.selection, log, cwd)
         result = read_stage(log)
         results.append((stage, result))
         if code not in (PASSED, FAILED) or (code == FAILED and not result.failed):

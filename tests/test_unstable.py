@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -25,7 +26,13 @@ HANGS = "import threading\n\ndef test_hangs():\n    threading.Event().wait()\n"
 CRASHES = "import os\n\ndef test_crashes():\n    os._exit(3)\n"
 
 
-def run_in(folder: Path, *files: str, options: tuple[str, ...] = (), selection: tuple[str, ...] = (".",)) -> int:
+def run_in(
+    folder: Path,
+    *files: str,
+    options: tuple[str, ...] = (),
+    selection: tuple[str, ...] = (".",),
+    environment: Mapping[str, str] | None = None,
+) -> int:
     """Run these made-up test files as one stage."""
     folder.joinpath("pytest.ini").write_text(
         "[pytest]\nasyncio_default_fixture_loop_scope = function\n", encoding="utf-8"
@@ -33,7 +40,7 @@ def run_in(folder: Path, *files: str, options: tuple[str, ...] = (), selection: 
     for number, text in enumerate(files):
         folder.joinpath(f"test_{number}.py").write_text(text, encoding="utf-8")
     plain = ("-p", "no:cacheprovider", "-p", "no:schemathesis")
-    return run([Stage("made", selection, (*plain, *options))], folder / "out", folder)
+    return run([Stage("made", selection, (*plain, *options), environment or {})], folder / "out", folder)
 
 
 def unstable(folder: Path) -> list[str]:
@@ -100,3 +107,9 @@ def test_a_stage_without_tests_is_red(tmp_path: Path, capfd: pytest.CaptureFixtu
 def test_a_file_that_cannot_be_read_is_red(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert run_in(tmp_path, PASSES, "import nothing_of_this_name\n") == 1
     assert "STAGE made ended with exit code 2" in capfd.readouterr().err
+
+
+def test_the_environment_of_a_stage_holds_in_both_runs_of_a_test(tmp_path: Path) -> None:
+    made = f"{FAILS_ONCE.format(names=['it'])}    import os\n    assert os.environ['MADE'] == 'here'\n"
+    assert run_in(tmp_path, made, environment={"MADE": "here"}) == 0
+    assert len(unstable(tmp_path)) == 1

@@ -14,7 +14,7 @@ import re
 import secrets
 from collections import Counter
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Literal
 
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives import hashes
@@ -41,6 +41,7 @@ TOO_OLD = "This order was signed too long ago, and was not carried out. Give it 
 REPLAYED = "This order was carried out before: it was sent a second time, and refused."
 TOO_MANY = "Too many orders came at once: wait some seconds."
 FULL = "Too many devices have given orders to this car: no new one is taken."
+_OF_AGENT = ("mark_file",)  # of a route of the agent itself: no node sends it
 _SENDER = frozenset(
     {"by", "who", "page", "person", "supervisors", "duties", "listed", "replaying", "console", "signed"}
 )
@@ -91,8 +92,8 @@ class SignedOrders:
         self._wall_ms = wall_ms
         self._note = note
         self._challenges = Challenges()
-        self._seen: dict[tuple[str, bytes], float] = {}  # by key and hash, oldest first: remembered until then [s]
-        self._of_key: Counter[str] = Counter()  # how many of them
+        self._seen: dict[tuple[str, bytes], float] = {}  # by sender and hash, oldest first: remembered until then [s]
+        self._of_sender: Counter[str] = Counter()  # how many of them
         self._noted_s: dict[str, float] = {}  # when a refusal was written into a car's log
 
     def challenge(self) -> str:
@@ -104,31 +105,44 @@ class SignedOrders:
     async def admit(self, vehicle: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """The message with who gave it, as it is proved. Raises NotAdmitted."""
         kind = message.get("kind")
+        if kind in _OF_AGENT:
+            raise NotAdmitted(commands.NO_SUCH)
         command = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
-        if command is None or not command.is_signed:
-            return self._unsigned(message, "")
+        if command is None or command.signature == "none":
+            return self._stated(message, is_marked=False)
+        is_kept = command.signature == "wanted"  # whatever its signature is worth
         if message.get("signed") is None:
-            if self._is_required:
+            if self._is_required and not is_kept:
                 raise NotAdmitted(NOT_SIGNED)
-            return self._unsigned(message, " (not signed)")
+            return self._stated(message, is_marked=True)
         try:
-            return await self._proved(vehicle, message)
+            return await self._proved(vehicle, message, counts_as="record" if is_kept else "order")
         except NotAdmitted as why:
+            if is_kept:
+                return self._stated(message, is_marked=True)
             self._complain(vehicle, message, str(why))
             raise
 
-    def _unsigned(self, message: Mapping[str, Any], mark: str) -> Mapping[str, Any]:
-        """The command as the node states it, trusted; but its sender is never this machine, nor a device that signs."""
-        who = str(message.get("who") or "")
-        is_key = re.fullmatch(KEY_ID, who) is not None
-        known = self._keys.get(who) if is_key and not mark else None
-        given = display_name.clean(message.get("by")) or display_name.NAMELESS
-        by = f"{given[: display_name.MAX_LETTERS - len(mark)]}{mark}" if known is None else known.name
-        sender = {"by": by, "who": who if is_key and not mark else f"web:{who}", "console": False}
-        # A node's clock is another one; that what is not signed came in time is in the time given with the request.
-        return {**{name: value for name, value in message.items() if name != "heard_ms"}, **sender}
+    def _stated(self, message: Mapping[str, Any], *, is_marked: bool) -> Mapping[str, Any]:
+        """The command as the node states it, trusted; but its sender is never this machine, nor a device that signs.
 
-    async def _proved(self, vehicle: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        `is_marked`: it should have been signed, and the name of its sender shows that it was not.
+        """
+        who, by = str(message.get("who") or ""), display_name.clean(message.get("by")) or display_name.NAMELESS
+        is_key = re.fullmatch(KEY_ID, who) is not None and not is_marked
+        known = self._keys.get(who) if is_key else None
+        sender = {"by": by if known is None else known.name, "who": who if is_key else f"web:{who}", "console": False}
+        if is_marked:
+            sender["by"] = display_name.not_signed(by)
+            if self._is_required:  # a device that can sign would have signed who is on duty there
+                sender["person"] = None
+        # A node's clock is another one; that what is not signed came in time is in the time given with the request.
+        return {**{name: value for name, value in message.items() if name not in ("heard_ms", "signed")}, **sender}
+
+    async def _proved(
+        self, vehicle: str, message: Mapping[str, Any], *, counts_as: Literal["order", "record"]
+    ) -> Mapping[str, Any]:
+        """`counts_as`: the marks of a device, which may all come at once, leave its orders their room."""
         try:
             envelope = signed_order.read_envelope(message["signed"])
             id = _verify(envelope)
@@ -145,7 +159,7 @@ class SignedOrders:
         age_s = self._age_s(text)
         found = {**text.command, **_long(message, text)}
         listed = await self._listed(id)
-        self._remember(id, hashlib.sha256(envelope.text.encode()).digest())
+        self._remember(f"{counts_as} {id}", hashlib.sha256(envelope.text.encode()).digest())
         by, line = (listed, None) if listed is not None else self._keys.name(id, text.by, now_ms=self._wall_ms())
         if line is not None:
             self._note(vehicle, by, line)
@@ -185,21 +199,21 @@ class SignedOrders:
             raise NotAdmitted(FULL)
         return None
 
-    def _remember(self, id: str, digest: bytes) -> None:
+    def _remember(self, sender: str, digest: bytes) -> None:
         now_s = self._now()
         for old, until_s in tuple(self._seen.items()):
             if until_s >= now_s:
                 break
             del self._seen[old]
-            self._of_key[old[0]] -= 1
-            if self._of_key[old[0]] <= 0:
-                del self._of_key[old[0]]
-        if (id, digest) in self._seen:
+            self._of_sender[old[0]] -= 1
+            if self._of_sender[old[0]] <= 0:
+                del self._of_sender[old[0]]
+        if (sender, digest) in self._seen:
             raise NotAdmitted(REPLAYED)
-        if self._of_key[id] >= (ALWAYS_OF_ONE if len(self._seen) >= MOST_REMEMBERED else MOST_OF_ONE):
+        if self._of_sender[sender] >= (ALWAYS_OF_ONE if len(self._seen) >= MOST_REMEMBERED else MOST_OF_ONE):
             raise NotAdmitted(TOO_MANY)
-        self._seen[id, digest] = now_s + LIVES_S
-        self._of_key[id] += 1
+        self._seen[sender, digest] = now_s + LIVES_S
+        self._of_sender[sender] += 1
 
     def _complain(self, vehicle: str, message: Mapping[str, Any], why: str) -> None:
         """An order that is not what it claims is in the log of the car, at most one in 10 s."""

@@ -6,6 +6,7 @@ import unicodedata
 
 MAX_LETTERS = 40
 NAMELESS = "operator"  # a page that gives no name
+_NOT_SIGNED = " (not signed)"  # behind a name that only a web node states
 
 
 def clean(text: object) -> str | None:
@@ -18,6 +19,11 @@ def clean(text: object) -> str | None:
     start = text[: 8 * MAX_LETTERS]
     seen = "".join(letter if unicodedata.category(letter)[0] not in "CZ" else " " for letter in start)
     return " ".join(seen.split())[:MAX_LETTERS].strip() or None
+
+
+def not_signed(name: str) -> str:
+    """A name that only a web node states; the end that marks it is never cut off."""
+    return f"{name[: MAX_LETTERS - len(_NOT_SIGNED)]}{_NOT_SIGNED}"
 
 
 def with_person(person: str, device: str) -> str:

@@ -15,6 +15,9 @@ PageName = Annotated[str, Field(pattern=PAGE)]  # the name that a page, and the 
 # Any operator, or only the one who is in control. Slowing the car is to need no more than an operator, letting it go
 # control.
 Needs = Literal["operator", "control"]
+# What an agent does with a command that a web node passes on without its device's signature: required, it is refused;
+# wanted, it is kept and shown as not signed; none, it is never signed.
+Signature = Literal["required", "wanted", "none"]
 
 
 class BaseCommand(BaseModel):
@@ -27,7 +30,7 @@ class BaseCommand(BaseModel):
     has_body: ClassVar[bool] = True  # False: a program gives none of the fields
     passes_replay: ClassVar[bool] = False  # a page may send it to the live car while it replays
     from_fleet: ClassVar[bool] = False  # the page of all cars may send it
-    is_signed: ClassVar[bool] = True  # an order: where a web node passes it on, the agent requires a signature
+    signature: ClassVar[Signature] = "required"
     id: Annotated[str, Field(max_length=80)] | None = None
 
 

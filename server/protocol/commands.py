@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 from pydantic_core import PydanticCustomError
 
 from server.protocol import signed_order
-from server.protocol.command_base import BaseCommand, Name, Needs, Number, PageName, Prompt
+from server.protocol.command_base import BaseCommand, Name, Needs, Number, PageName, Prompt, Signature
 from server.protocol.doc import doc
 from server.protocol.drive_commands import (
     DepartureCommand,
@@ -167,7 +167,7 @@ class Position(BaseCommand):
 
     needs: ClassVar[Needs] = "operator"
     passes_replay: ClassVar[bool] = True  # the live monitor must know, whatever the page shows
-    is_signed: ClassVar[bool] = False
+    signature: ClassVar[Signature] = "none"
     kind: Literal["position"]
     phone: PageName
     handheld: bool
@@ -211,7 +211,7 @@ class PresentWord(BaseCommand):
     it. Nothing answers it but its refusal."""
 
     needs: ClassVar[Needs] = "operator"
-    is_signed: ClassVar[bool] = False
+    signature: ClassVar[Signature] = "none"
     kind: Literal["present"]
     visible: bool
     draws: Annotated[bool, doc("false: drawing fails, and the page covers its values")] = True
@@ -234,7 +234,7 @@ class AskOutcome(BaseCommand):
     needs: ClassVar[Needs] = "operator"
     passes_replay: ClassVar[bool] = True
     from_fleet: ClassVar[bool] = True
-    is_signed: ClassVar[bool] = False
+    signature: ClassVar[Signature] = "none"
     kind: Literal["outcome"]
     of: Annotated[str, Field(max_length=80, description="the `id` of the command")]
     ago_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False, description="since it was requested, at most")]

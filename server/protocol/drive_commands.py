@@ -11,7 +11,7 @@ from pydantic import Field
 
 from monitor.interventions import By
 from monitor.planned_stop import StopReason
-from server.protocol.command_base import Name, Needs, Number, OfCar, Prompt
+from server.protocol.command_base import Name, Needs, Number, OfCar, Prompt, Signature
 from server.protocol.departure import DepartureResult
 from server.protocol.doc import doc
 
@@ -28,7 +28,7 @@ class OfMark(OfCar):
 
     needs: ClassVar[Needs] = "operator"
     passes_replay: ClassVar[bool] = True  # the live drive is marked, whatever the page shows
-    is_signed: ClassVar[bool] = False  # nothing of the car changes by it, and it may have waited on a phone
+    signature: ClassVar[Signature] = "wanted"  # it changes nothing of the car, and none may be lost
 
 
 class PlaceMark(OfMark):

@@ -18,6 +18,13 @@ test('an order is signed by a key that cannot be taken out, and the signature is
   assert.match(signer.id, /^k[0-9a-f]{32}$/);
 });
 
+test('a mark is sent beside its signature too: one that cannot be proved is kept', async () => {
+  const sent = /** @type {any} */ (await new Signer().sealed({ kind: 'mark', id: 'p1', vehicle: 'margay', mark: 'm1' }, CONTEXT));
+  const { signed, ...plain } = sent;
+  assert.deepEqual(plain, { kind: 'mark', id: 'p1', vehicle: 'margay', mark: 'm1' });
+  assert.deepEqual(JSON.parse(signed.text).command, { kind: 'mark', vehicle: 'margay', mark: 'm1' });
+});
+
 test('what is of the page alone is not signed, and a page without TLS signs nothing', async (t) => {
   const signer = new Signer();
   assert.equal(signer.sealed({ kind: 'replay', id: 'p1' }, CONTEXT), null);

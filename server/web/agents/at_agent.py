@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import orjson
@@ -17,11 +17,13 @@ from starlette.types import Receive, Scope, Send
 
 from server.access.identity import SCOPE_KEY, Principal, Role, is_enough, needs_of
 from server.bus.nats_http import Begin, Refused
+from server.control import display_name
 from server.protocol.page_messages import ShortText
 from server.replay.manager import NoReplay, ReplayClient, ReplayManager
 from server.web.agents import kept
 from server.web.middleware import errors
 from server.web.middleware.methods import HeadAsGet
+from server.web.routes.session_request import NAME_HEADER
 from server.web.services import Services
 
 router = APIRouter(prefix=kept.REPLAYS)
@@ -220,7 +222,7 @@ def scope_of(begin: Begin) -> Scope:
         "root_path": begin.root_path,
         "headers": [
             (name.encode("latin-1", "replace"), value.encode("latin-1", "replace"))
-            for name, value in begin.headers.items()
+            for name, value in (begin.headers | {NAME_HEADER: _stated_name(begin.headers)}).items()
             if name in kept.REQUEST_HEADERS
         ],
         "client": None,
@@ -228,3 +230,9 @@ def scope_of(begin: Begin) -> Scope:
         "state": {},
         SCOPE_KEY: Principal(id=begin.sender.id, name=begin.sender.name, role=role),
     }
+
+
+def _stated_name(headers: Mapping[str, str]) -> str:
+    """Who sent it in the log of the car: requests for files are not signed."""
+    by = display_name.clean(headers.get(NAME_HEADER)) or display_name.of_program(headers.get("user-agent"))
+    return display_name.not_signed(by)

@@ -9,8 +9,10 @@ const OWN = 'orders';
 /** A browser that has not found its key by then signs by a new one: no order may wait for its storage [ms]. */
 const KEPT_WITHIN_MS = 2000;
 
-/** Commands of this page alone, queries, and what agents accept without a signature: a mark may have waited on this phone. */
-const NO_ORDERS = new Set(['replay', 'outcome', 'mark', 'remove_mark', 'position', 'present']);
+/** Commands of this page alone, queries, and what agents accept without a signature. */
+const NO_ORDERS = new Set(['replay', 'outcome', 'position', 'present']);
+/** Marks are sent beside their signature too: an agent keeps one whose signature it does not accept, as one that is not signed. */
+const KEPT = /mark$/;
 
 /**
  * @typedef {object} Context what is signed beside a command
@@ -60,7 +62,7 @@ export class Seal {
   sealed(message, vehicle, challenge) {
     if (!this.#signs) return null;
     if (!challenge) {
-      if (!NO_ORDERS.has(message.kind)) console.error(`Sent unsigned, for no state of ${vehicle || 'the car'} names what to sign:`, message.kind);
+      if (!NO_ORDERS.has(message.kind)) console.error('Sent unsigned, without a state:', message.kind);
       return null;
     }
     return this.#signer?.sealed(message, this.#context(vehicle, challenge)) ?? null;
@@ -121,7 +123,7 @@ export class Signer {
   async #sealed({ id, ...command }, context) {
     await this.#ready;
     const { kind } = command;
-    return this.id ? { kind, id, vehicle: context.vehicle, signed: await this.sign(command, context) } : { id, ...command };
+    return this.id ? { kind, id, vehicle: context.vehicle, ...(KEPT.test(kind) && command), signed: await this.sign(command, context) } : { id, ...command };
   }
 
   /** @param {Record<string, unknown>} command with its kind @param {Context} context @returns {Promise<Signed>} */
@@ -162,12 +164,7 @@ export class Signer {
 
 /** Rejects where it is not found in time. @template T @param {Promise<T>} found @returns {Promise<T>} */
 function soon(found) {
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  let timer;
-  const late = new Promise((/** @type {(value: never) => void} */ _, reject) => {
-    timer = setTimeout(() => reject(new Error('The storage of this browser does not answer')), KEPT_WITHIN_MS);
-  });
-  return Promise.race([found, late]).finally(() => clearTimeout(timer));
+  return Promise.race([found, new Promise((/** @type {(value: never) => void} */ _, reject) => { setTimeout(reject, KEPT_WITHIN_MS); })]);
 }
 
 /** @returns {Promise<CryptoKeyPair>} */

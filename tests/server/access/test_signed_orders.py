@@ -179,7 +179,7 @@ async def test_an_order_counts_once_and_only_for_a_while() -> None:
 async def test_the_memory_of_orders_is_bounded_and_one_device_takes_no_room_of_another() -> None:
     agent = Agent()
     for number in range(MOST_OF_ONE):
-        agent.orders._remember(ANN.id, bytes(number))
+        agent.orders._remember(f"order {ANN.id}", bytes(number))
     assert await agent.refusal(agent.signed()) == TOO_MANY
     await agent.orders.admit("ocelot", agent.signed(BEN))
     for device in range(MOST_REMEMBERED // ALWAYS_OF_ONE):  # as a node can make them up
@@ -192,7 +192,7 @@ async def test_the_memory_of_orders_is_bounded_and_one_device_takes_no_room_of_a
     assert await agent.refusal(agent.signed(BEN)) == TOO_MANY
     agent.now_s += LIVES_S + 0.1
     await agent.orders.admit("ocelot", agent.signed())
-    assert (len(agent.orders._seen), agent.orders._of_key) == (1, {ANN.id: 1})
+    assert (len(agent.orders._seen), agent.orders._of_sender) == (1, {f"order {ANN.id}": 1})
 
 
 async def test_the_name_that_a_node_gives_is_one_short_line_in_the_log() -> None:
@@ -229,8 +229,44 @@ def test_pages_and_agents_agree_on_what_needs_no_signature() -> None:
     """What a page signs has its arguments in the signed text alone: an agent that reads none of it refuses it."""
     text = (PROJECT / "static" / "js" / "core" / "signer.js").read_text(encoding="utf-8")
     (kinds,) = re.findall(r"NO_ORDERS = new Set\(\[([^]]*)\]\)", text)
-    unsigned = {kind for kind, command in commands.BY_KIND.items() if not command.is_signed}
-    assert set(re.findall(r"'(\w+)'", kinds)) == unsigned | {"replay"}  # which is of the node alone
+    (kept,) = re.findall(r"KEPT = /(.*)/;", text)
+    assert set(re.findall(r"'(\w+)'", kinds)) == kinds_of("none") | {"replay"}  # which is of the node alone
+    assert {kind for kind in commands.BY_KIND if re.search(kept, kind)} == kinds_of("wanted")
+
+
+def kinds_of(signature: str) -> set[str]:
+    return {kind for kind, command in commands.BY_KIND.items() if command.signature == signature}
+
+
+async def test_a_mark_is_of_who_signed_it_and_any_other_is_kept_as_not_signed() -> None:
+    agent = Agent()
+    plain = {"mark": "m1", "words": "wet", "page": PAGE}
+    signed = agent.signed(kind="mark", **plain) | plain | {"person": {"name": "M. R.", "role": "operator"}}
+    altered = signed | {"words": "dry"}
+    found = await agent.orders.admit("ocelot", altered)
+    assert (found["by"], found["who"], found["words"]) == ("Ann", ANN.id, "wet"), "what was signed counts"
+    lies = [
+        signed,  # sent a second time
+        signed | {"signed": None},
+        signed | {"signed": agent.signed(BEN, kind="mark", **plain)["signed"]},
+        signed | {"signed": agent.signed(vehicle="margay", kind="mark", **plain)["signed"]},
+    ]
+    for lie in lies:
+        found = await agent.orders.admit("ocelot", lie)
+        assert (found["by"], found["who"], found["person"]) == ("lies (not signed)", f"web:{ANN.id}", None)
+        assert found["mark"] == "m1", "none is lost"
+        assert "signed" not in found
+    assert [text for _, text in agent.log if "not carried out" in text] == []
+
+
+async def test_many_marks_at_once_leave_the_orders_of_their_device_room() -> None:
+    agent = Agent()
+    names = [
+        (await agent.orders.admit("ocelot", agent.signed(kind="mark", mark=f"m{n}")))["by"]
+        for n in range(MOST_OF_ONE + 1)
+    ]
+    assert names == ["Ann"] * MOST_OF_ONE + ["lies (not signed)"]
+    assert (await agent.orders.admit("ocelot", agent.signed()))["by"] == "Ann"
 
 
 async def test_a_name_belongs_to_the_key_that_used_it_first(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import httpx
 import orjson
+import pytest
 
 from server.bus import broker_users
 from tests.http import http_client
@@ -43,8 +44,11 @@ class Part:
 
 
 @contextlib.asynccontextmanager
-async def parts(folder: Path, *, guarded: Path | None = None) -> AsyncIterator[tuple[Broker, dict[str, Part]]]:
-    """`guarded`: the car has a guard, and this file has what became of it."""
+async def parts(
+    folder: Path, *, guarded: Path | None = None, needs_network: bool = False
+) -> AsyncIterator[tuple[Broker, dict[str, Part]]]:
+    """`guarded`: the car has a guard, and this file has what became of it. `needs_network`: skips the test where none
+    can be made, as it would prove nothing of a lost one."""
     car_of = (str(guarded),) if guarded else simulate()
     module = "tests.server.bus.guarded_car" if guarded else "server"
     users: list[tuple[str, broker_users.Kind]] = [("ocelot", "agent"), *((node, "web") for node in NODES)]
@@ -55,6 +59,8 @@ async def parts(folder: Path, *, guarded: Path | None = None) -> AsyncIterator[t
         running_broker(include=folder / broker_users.CONF, host=net.here if net else "127.0.0.1") as broker,
         running(*car_of, module=module, within=net.within if net else ()) as car,
     ):
+        if net is None and needs_network:
+            pytest.skip("no network of its own can be made here: Linux, as root")
 
         def part(command: str, name: str, *more: str, net: Apart | None = None) -> Part:
             key, data = str(folder / f"{name}.key"), str(folder / name)

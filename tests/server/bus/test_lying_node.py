@@ -12,6 +12,7 @@ from typing import Any
 import nats
 import pytest
 from nats.aio.client import Client
+from starlette.requests import Request
 
 from server.access.order_signer import OrderSigner
 from server.access.signed_orders import FORGED, NOT_SIGNED, OTHER_CAR, REPLAYED, TOO_OLD
@@ -19,9 +20,12 @@ from server.app.config import Config
 from server.bus import broker_users
 from server.bus import nats_wire as wire
 from server.bus.broker import Broker
+from server.bus.nats_http import Begin, Sender
+from server.protocol.commands import NO_SUCH
 from server.protocol.signed_order import short
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
+from server.web.agents.at_agent import scope_of
 from tests.http import http_client
 from tests.server.bus.broker import running_broker
 from tests.server.bus.buses import until
@@ -173,6 +177,33 @@ async def test_a_program_signs_its_requests(bridge: RosBridge) -> None:
                 assert (await client.post("/api/pause", headers={"X-Catgraph-Signed": "x"})).status_code == 422
                 events = (await client.get("/api/events")).json()["events"]
                 assert any(event["change"] == "paused" and event["by"] == "nightly test" for event in events)
+
+
+async def test_no_mark_is_of_a_person_whose_device_did_not_sign_it(bridge: RosBridge, tmp_path: Path) -> None:
+    ann = OrderSigner()
+    async with lying(tmp_path, bridge) as (node, base):
+        mark = {"kind": "mark", "mark": "m1", "words": "wet"}
+        ends = ann.sign(mark, vehicle="ocelot", by="Ann", challenge=await node.challenge(), page=PAGE)
+        stated = {"by": "Ann", "who": ann.id, "page": PAGE, "person": {"name": "Ann B.", "role": "supervisor"}}
+        assert await node.pass_on(**mark, signed=ends, **stated) == {"ok": True}
+        assert await node.pass_on(**{**mark, "mark": "m2"}, **stated) == {"ok": True}
+        file = {"kind": "mark_file", "mark": "m1", "file": "m1.photo.jpg", **stated}
+        assert await node.pass_on(**file) == {"ok": False, "reason": NO_SUCH}
+        async with http_client(base_url=base) as car:
+            marks = (await car.get("/api/marks")).json()["marks"]
+        assert {one["mark"]: one["by"] for one in marks} == {"m1": "Ann", "m2": "Ann (not signed)"}
+
+
+def test_a_request_for_files_names_nobody_for_sure() -> None:
+    sender = Sender(id="device", name="tablet", role="operator")
+
+    def name(**headers: str) -> str:
+        begin = Begin(id="0" * 32, method="POST", path="/api/marks/m1/photo", headers=headers, sender=sender)
+        return Request(scope_of(begin)).headers["x-catgraph-name"]
+
+    assert name(**{"x-catgraph-name": "Ann"}) == "Ann (not signed)"
+    assert name(**{"x-catgraph-name": "A" * 99}) == f"{'A' * 27} (not signed)"
+    assert name(**{"user-agent": "curl/8"}) == "api · curl (not signed)"
 
 
 @pytest.mark.parametrize("kind", ["state", "signals", "settings"])
