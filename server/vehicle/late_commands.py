@@ -36,7 +36,7 @@ class LateCommands:
         """
         now_s, kind = self._now(), command.get("kind")
         order = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
-        if order is None or not order.is_signed:
+        if order is None or order.signature != "required":
             return
         allowance = self._allowances.setdefault(vehicle, Allowance(OF_NODES, now_s))
         if (note := self._find(vehicle)) is not None and allowance.takes(now_s):
