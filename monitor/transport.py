@@ -38,7 +38,8 @@ FAST_S = 0.5  # … nor does one that comes less often than this, where others c
 USUAL_S = 30.0  # what a link needs when nothing waits is the least round trip of one to two of these …
 USUAL_AT_MOST_S = 1.0
 EXCESS_S = 0.1
-TOGETHER_S = 0.3  # what came so long before the newest message shows nothing of the link now
+TOGETHER_S = 0.3  # what came so long before the newest message shows nothing of the link now …
+DUE_PERIODS = 1.5  # … but where its topic comes more rarely: so many of its periods
 NEIGHBOURS, NEIGHBOUR_S = 2, 1.0
 PERIOD_WEIGHT = 0.1
 MOST_UNANSWERED = 600
@@ -129,6 +130,11 @@ class _Topic:
             return
         gap_s = at_s - self.at_s
         self.period_s = gap_s if self.period_s is None else self.period_s + PERIOD_WEIGHT * (gap_s - self.period_s)
+
+    @property
+    def counts_s(self) -> float:
+        """Until when its last message shows how late the link is, where others come: its next one is due by then."""
+        return (self.at_s or 0.0) + max(TOGETHER_S, DUE_PERIODS * (self.period_s or 0.0))
 
     @property
     def held_s(self) -> float:
@@ -311,9 +317,10 @@ class TransportDelay:
         recent = [topic for topic in self._topics.values() if topic.at_s is not None and now_s - topic.at_s <= RECENT_S]
         fast = [topic for topic in recent if topic.period_s is not None and topic.period_s <= FAST_S]
         shared = [topic for topic in fast if not topic.is_own]
-        came = [(topic.at_s, topic.delay_s) for topic in shared or fast or recent if topic.at_s is not None]
-        since_s = max((at_s for at_s, _ in came), default=0.0) - TOGETHER_S
-        return max((delay_s for at_s, delay_s in came if at_s >= since_s), default=self._trip_s)
+        counted = [topic for topic in shared or fast or recent if topic.at_s is not None]
+        newest_s = max((topic.at_s or 0.0 for topic in counted), default=0.0)
+        now = (topic.delay_s for topic in counted if topic.counts_s >= newest_s)
+        return max(now, default=self._trip_s)
 
     def delays(self) -> dict[str, float]:
         """How old the newest message of each topic was when it came."""

@@ -21,7 +21,7 @@ from server.protocol.state import LiveState
 from server.rosbridge.address import BadAddress
 from server.storage.storage_thread import StorageThread
 from server.vehicle import departure_seen, phone, queries
-from server.vehicle.late_commands import log_late
+from server.vehicle.late_commands import log_late, order_of
 from server.vehicle.outcomes import Outcomes
 from server.vehicle.queries import check_answer
 from server.vehicle.session_parts import SessionActions, SessionParts
@@ -70,7 +70,8 @@ class CommandHandler:
         return await self._outcomes.keep(message, self._carry_out)
 
     def _log_given_up(self, message: Mapping[str, Any], why: str) -> None:
-        log_late(self._parts.event_log.note, str(message.get("kind")), why, by=Caller.of(message).name)
+        if (kind := order_of(message)) is not None:
+            log_late(self._parts.event_log.note, kind, why, by=Caller.of(message).name)
 
     async def _carry_out(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         caller = Caller.of(message)

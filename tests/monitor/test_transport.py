@@ -278,6 +278,25 @@ def test_a_topic_that_came_late_and_is_throttled_since_is_not_how_late_the_link_
     assert link.delays()["/cmd"] == late_s
 
 
+def test_a_topic_that_comes_late_and_rarely_makes_the_link_late_between_its_messages() -> None:
+    """Its bridge holds it back: a neighbour that comes often is in time."""
+    link = opened()
+    for topic, length in (("/vel", 1), ("/odom", 10)):
+        link.subscribe(topic, length)
+    stated = []
+    for n in range(400):
+        at_s = n / 20
+        ping(link, at_s - 0.01, at_s)
+        link.clock.answered(at_s, at_s, 100.0 + at_s)
+        link.receive("/vel", at_s)
+        if n % 8 == 0:
+            link.receive("/odom", at_s, stamp_s=100.0 + at_s - min(3.0, max(0.0, at_s - 5.0)))
+        if at_s > 10.0:
+            stated.append(link.late_s(at_s))
+    assert link.delays()["/vel"] < 0.2
+    assert min(stated) > 2.5
+
+
 def test_a_long_queue_makes_its_own_messages_old_and_the_link_only_where_no_other_topic_comes_often() -> None:
     def late_s(lengths: dict[str, int]) -> tuple[float, dict[str, float]]:
         link = opened()

@@ -174,10 +174,14 @@ def forget(database: sqlite3.Connection, paths: Iterable[str]) -> None:
     database.executemany("DELETE FROM recording WHERE path = ?", [(os.fsencode(path),) for path in paths])
 
 
-def put_body(database: sqlite3.Connection, table: Table, sha256: str, body: dict[str, Any]) -> None:
-    """Keeps trends, course or figures of a file by its content, so that a file that is moved has them still."""
+def encoded(table: Table, body: dict[str, Any]) -> bytes | str:
+    """Trends, course or figures of a drive as they are kept. Takes a while for a long one."""
     text = orjson.dumps(body)
-    kept = text.decode() if table == "figures" else zlib.compress(text, 6)
+    return text.decode() if table == "figures" else zlib.compress(text, 6)
+
+
+def put_body(database: sqlite3.Connection, table: Table, sha256: str, kept: bytes | str) -> None:
+    """Keeps what `encoded` gave of a file by its content, so that a file that is moved has it still."""
     database.execute(f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", (sha256, kept))
 
 

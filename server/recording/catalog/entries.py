@@ -70,9 +70,10 @@ class Entries:
 
     def put_body(self, table: Table, sha256: str, body: dict[str, Any]) -> None:
         """Keeps trends, course or figures of a drive."""
+        kept = catalog_db.encoded(table, body)  # others need not wait for it
         with self.lock:
             if not self._is_closed:
-                self._write(lambda database: catalog_db.put_body(database, table, sha256, body))
+                self._write(lambda database: catalog_db.put_body(database, table, sha256, kept))
 
     def body(self, table: Literal["trends", "course"], sha256: str) -> bytes | None:
         """What `put_body` kept, as JSON; None: nothing."""

@@ -78,8 +78,11 @@ class PageFiles:
 
     def warm(self) -> None:
         """Compile all templates, for which the first page would wait a quarter of a second."""
-        for name in self._templates.env.list_templates():
-            self._templates.env.get_template(name)
+        for name in self._templates.env.list_templates(extensions=["html"]):
+            try:
+                self._templates.env.get_template(name)
+            except Exception:  # whatever is wrong with one shows where it is used
+                log.exception("template_not_compiled name=%s", name)
 
     def response(self, body: bytes, request: Request, built: Built | None) -> Response:
         """HTML with the policy that allows its early script, and nothing else of that kind."""

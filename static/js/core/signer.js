@@ -123,7 +123,9 @@ export class Signer {
   async #sealed({ id, ...command }, context) {
     await this.#ready;
     const { kind } = command;
-    return this.id ? { kind, id, vehicle: context.vehicle, ...(KEPT.test(kind) && command), signed: await this.sign(command, context) } : { id, ...command };
+    const isKept = KEPT.test(kind);
+    const signed = this.id ? await this.sign(command, context).catch((error) => { if (!isKept) throw error; }) : undefined;
+    return signed ? { kind, id, vehicle: context.vehicle, ...(isKept && command), signed } : { id, ...command };
   }
 
   /** @param {Record<string, unknown>} command with its kind @param {Context} context @returns {Promise<Signed>} */

@@ -37,6 +37,8 @@ export class Marks {
   #spoken = new Spoken();
   /** Those that were found or put in the storage. @type {Set<string>} */
   #kept = new Set();
+  /** Those whose last change was stored, with voice and photo. @type {Set<string>} */
+  #whole = new Set();
   /** Those that are none any more. @type {Set<string>} */
   #dropped = new Set();
   /** Nothing of a mark would outlast the page. */
@@ -95,9 +97,9 @@ export class Marks {
     return this.#marks.get(id) ?? null;
   }
 
-  /** It is on the disk of this device. @param {string} id */
+  /** It is on the disk of this device as it is shown. @param {string} id */
   isKept(id) {
-    return this.#kept.has(id);
+    return this.#whole.has(id);
   }
 
   /** The server can take a mark now. */
@@ -194,6 +196,7 @@ export class Marks {
 
   /** Keep what is changed of it. @param {string} id @param {(mark: Mark) => Mark | null} change @param {Mark} before @returns {Promise<void>} */
   #write(id, change, before) {
+    this.#whole.delete(id);
     this.#notify();
     const written = (this.#writing.get(id) ?? Promise.resolve()).then(async () => {
       const { mark, kept } = await this.keep.change(id, change, this.#marks.get(id) ?? before, this.#kept.has(id));
@@ -201,6 +204,7 @@ export class Marks {
       if (!this.get(id)?.voice?.isOpen) this.#spoken.end(id);
       if (!mark) return;
       if (kept !== 'memory') this.#kept.add(id);
+      if (kept === 'whole') this.#whole.add(id);
       this.isDurable = kept !== 'memory';
       if (stepOf(mark) === null || kept === 'whole') return;
       const trouble = kept === 'memory' ? MEMORY : FULL;

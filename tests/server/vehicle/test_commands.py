@@ -138,7 +138,10 @@ async def test_what_its_page_had_given_up_is_logged_when_it_comes(bus: LocalBus,
     assert (await bus.request("car", asked))["became"] == "never"
     answer = await bus.request("car", {"kind": "resume", "id": "p1", **PHONE_A})
     assert answer == {"ok": False, "reason": GIVEN_UP}
-    (event,) = bus.past_events("car", change="late")
+    for n, other in enumerate((example("mark"), {"kind": "none such"})):
+        await bus.request("car", asked | {"of": f"q{n}"})
+        assert (await bus.request("car", other | {"id": f"q{n}", **PHONE_A}))["reason"] == GIVEN_UP
+    (event,) = bus.past_events("car", change="late")  # of orders only: others are delivered again, or are none
     assert (event["text"], event["by"]) == (f"“resume” was not carried out: {GIVEN_UP}", PHONE_A["by"])
 
 

@@ -32,9 +32,9 @@ def test_it_is_logged_with_its_kind_the_reason_and_the_name_that_the_node_gave()
     car.late.note("ocelot", {"kind": "pause", "by": "\u202eAnn\n"}, WHY)
     car.late.note("ocelot", {"kind": "resume", "by": 7}, WHY)
     assert car.events == [
-        ("late", f"“release” was not carried out: {WHY}", "Ann"),
-        ("slow_down", f"Slow-down refused: {WHY}", "Ann"),
-        ("late", f"“pause” was not carried out: {WHY}", "Ann"),
+        ("late", f"“release” was not carried out: {WHY}", "Ann (not signed)"),
+        ("slow_down", f"Slow-down refused: {WHY}", "Ann (not signed)"),
+        ("late", f"“pause” was not carried out: {WHY}", "Ann (not signed)"),
         ("late", f"“resume” was not carried out: {WHY}", None),
     ]
 
@@ -51,6 +51,8 @@ def test_a_flood_does_not_fill_the_log() -> None:
     for _ in range(1000):
         car.late.note("ocelot", {"kind": "pause"}, WHY)
     assert len(car.events) == OF_NODES.at_once
+    car.late.note("ocelot", {"kind": "slow_down"}, WHY)
+    assert car.events.pop()[0] == "slow_down"  # others take no room from it
     car.now_s += 5.0
     for _ in range(1000):
         car.late.note("ocelot", {"kind": "pause"}, WHY)

@@ -168,10 +168,10 @@ async def test_after_a_restart_it_is_known_from_the_log_and_from_no_list_of_peop
     car = Attended(after=await left())
     car.tick(0.5)
     assert listed(car) == ("ACKED", "A. K. (Ann)", OFF_MS)
-    await car.obeyed(SEEN | BEN | MR | {"duties": {"M. R.": None}}, "present")
+    await car.accepted(SEEN | BEN | MR | {"duties": {"M. R.": None}}, "present")
     assert listed(car) == ("ACKED", "A. K. (Ann)", OFF_MS)
     assert len(car.bus.past_events("ocelot", change="owner")) == 2  # the recording that begins now has it too
-    await car.obeyed(BEN | MR, "take_alarm", **TAKE)
+    await car.accepted(BEN | MR, "take_alarm", **TAKE)
     assert listed(car) == ("ACKED", "M. R. (Ben)", None)
     again = Attended(after=car)
     again.tick(0.5)
@@ -180,7 +180,7 @@ async def test_after_a_restart_it_is_known_from_the_log_and_from_no_list_of_peop
 
 async def test_after_a_restart_who_came_back_or_acknowledged_it_later_is_not_off_duty() -> None:
     car = await left()
-    await car.obeyed(SEEN | ANN | AK | BOTH, "present")
+    await car.accepted(SEEN | ANN | AK | BOTH, "present")
     car.tick(0.5)
     again = Attended(after=car)
     again.tick(0.5)
@@ -190,8 +190,8 @@ async def test_after_a_restart_who_came_back_or_acknowledged_it_later_is_not_off
     car.tick(30.0)
     car.faults = {Priority.WARNING}
     car.tick(0.5)
-    await car.obeyed(SEEN | ANN | AK | BOTH, "present")
-    await car.obeyed(ANN | AK, "acknowledge", **TAKE | {"occurrence": 2})
+    await car.accepted(SEEN | ANN | AK | BOTH, "present")
+    await car.accepted(ANN | AK, "acknowledge", **TAKE | {"occurrence": 2})
     again = Attended(after=car)
     again.tick(0.5)
     assert listed(again) == ("ACKED", "A. K. (Ann)", None)
@@ -201,6 +201,6 @@ async def test_among_many_who_are_off_duty_the_owners_stay_known() -> None:
     car = await left()
     for hundred in range(0, 500, 100):
         many = {f"P {number}": OFF_MS for number in range(hundred, hundred + 100)}
-        await car.obeyed(SEEN | BEN | MR | {"duties": {"M. R.": None} | many}, "present")
+        await car.accepted(SEEN | BEN | MR | {"duties": {"M. R.": None} | many}, "present")
     assert listed(car)[2] == OFF_MS
     assert len(car.session._parts.authorization._off_ms) == MOST_DUTIES + 1
