@@ -40,8 +40,7 @@ USUAL_AT_MOST_S = 1.0
 EXCESS_S = 0.1
 TOGETHER_S = 0.3  # what came so long before the newest message shows nothing of the link now …
 DUE_PERIODS = 1.5  # … but where its topic comes more rarely: so many of its periods
-NEIGHBOURS, NEIGHBOUR_S = 2, 1.0
-PERIOD_WEIGHT = 0.1
+NEIGHBOURS, NEIGHBOUR_S, PERIOD_WEIGHT = 2, 1.0, 0.1
 MOST_UNANSWERED = 600
 
 
@@ -133,7 +132,7 @@ class _Topic:
 
     @property
     def counts_s(self) -> float:
-        """Until when its last message shows how late the link is, where others come: its next one is due by then."""
+        """Until then its last message shows how late the link is: its next one is due."""
         return (self.at_s or 0.0) + max(TOGETHER_S, DUE_PERIODS * (self.period_s or 0.0))
 
     @property
@@ -304,8 +303,7 @@ class TransportDelay:
     def _excess_s(self, at_s: float) -> float:
         """How much later the stamped neighbours are than the pings indicate: all of them, and more than one."""
         found = list(self._excesses(at_s))
-        least_s = min(found, default=0.0)
-        return least_s if len(found) >= NEIGHBOURS and least_s > EXCESS_S else 0.0
+        return least_s if len(found) >= NEIGHBOURS and (least_s := min(found)) > EXCESS_S else 0.0
 
     def _excesses(self, at_s: float) -> Iterator[float]:
         for topic in self._topics.values():
@@ -317,10 +315,9 @@ class TransportDelay:
         recent = [topic for topic in self._topics.values() if topic.at_s is not None and now_s - topic.at_s <= RECENT_S]
         fast = [topic for topic in recent if topic.period_s is not None and topic.period_s <= FAST_S]
         shared = [topic for topic in fast if not topic.is_own]
-        counted = [topic for topic in shared or fast or recent if topic.at_s is not None]
+        counted = shared or fast or recent
         newest_s = max((topic.at_s or 0.0 for topic in counted), default=0.0)
-        now = (topic.delay_s for topic in counted if topic.counts_s >= newest_s)
-        return max(now, default=self._trip_s)
+        return max((topic.delay_s for topic in counted if topic.counts_s >= newest_s), default=self._trip_s)
 
     def delays(self) -> dict[str, float]:
         """How old the newest message of each topic was when it came."""

@@ -1,7 +1,7 @@
 """Authenticates and authorizes every request and socket: the outermost middleware, and the only place for it.
 
-The order of checks: Host, Origin, identity (key, cookie, and a ticket for a socket), role (server/access/identity.py). The identity is
-stored in the ASGI scope.
+The order of checks: Host, Origin, identity (key, cookie, and a ticket for a socket), role (server/access/identity.py).
+The identity is stored in the ASGI scope.
 """
 
 from __future__ import annotations
