@@ -8,7 +8,6 @@ import random
 import time
 from collections import Counter
 from collections.abc import AsyncIterator, Callable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,6 @@ from tests.ports import free_port
 
 SETTINGS = "[limits.link_late]\nlate_s = 10.0\ncritical_s = 20.0\n"  # this machine is shared: that is not tested here
 OLD_MS = 1000  # a mark so old outlives everything; the browser's database confirms one some milliseconds too early
-SAME_MS = 100  # marks of two presses are farther apart
 SERVER_TOO = 0.3  # of the kills
 # The page presses its own key, until it is killed, and reports each press and each mark that it shows as stored.
 MARKS = """() => {
@@ -157,7 +155,7 @@ async def test_what_the_page_said_is_stored_survives_its_kill(
             marks = await recorded(watch.address, must)
         finally:
             await watch.kill()
-    moments = sorted(marks.values())
+    unreported = marks.keys() - phone.pressed_ms.keys()  # a kill came between the press and its report
     off_ms = max(abs(marks[mark] - at_ms) for mark, at_ms in phone.pressed_ms.items() if mark in marks)
     record_property("marks that had to survive", len(must))
     record_property("marks in the recordings", len(marks))
@@ -166,7 +164,7 @@ async def test_what_the_page_said_is_stored_survives_its_kill(
     print(f"{kills} kills, {len(must)} marks had to survive, {len(marks)} are there, at most {off_ms:.0f} ms off")
     print(f"shown as stored: {len(phone.confirmed)}, of them lost: {len(phone.confirmed - marks.keys())}")
     assert {mark: phone.pressed_ms[mark] for mark in must - marks.keys()} == {}
-    assert [b - a for a, b in pairwise(moments) if b - a < SAME_MS] == [], "one press, two marks"
+    assert len(unreported) <= kills, "one press, two marks"
 
 
 async def is_there(address: str) -> bool:
