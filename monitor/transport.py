@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 from monitor.car_clock import CarClock, StampedDelay
 
@@ -39,6 +40,7 @@ USUAL_S = 30.0  # what a link needs when nothing waits is the least round trip o
 USUAL_AT_MOST_S = 1.0
 EXCESS_S = 0.1
 TOGETHER_S = 0.3  # what came so long before the newest message shows nothing of the link now …
+MIDDLE_AT_MOST_S = 0.15  # where the ways differ the delay is so much more at most
 DUE_PERIODS = 1.5  # … but where its topic comes more rarely: so many of its periods
 NEIGHBOURS, NEIGHBOUR_S, PERIOD_WEIGHT = 2, 1.0, 0.1
 MOST_UNANSWERED = 600
@@ -65,44 +67,30 @@ class _Clock:
         return max(min(self._now_s, self._before_s) - ahead_s, bound_s - TRIM_S, 0.0)
 
 
+@dataclass(slots=True)
 class _Topic:
     """What is kept of one subscription."""
 
-    __slots__ = (
-        "at_s",
-        "by_clock",
-        "came",
-        "clock",
-        "delay_s",
-        "excess_s",
-        "first",
-        "former_length",
-        "is_given",
-        "is_own",
-        "marks",
-        "older_s",
-        "period_s",
-        "queue_length",
-        "stamped",
-        "throttle_s",
-    )
+    queue_length: int
+    former_length: int = 0
+    came: int = 0  # messages since the queue has this length
+    throttle_s: float = 0.0
+    period_s: float | None = None  # between two messages while all are sent
+    marks: deque[float] = field(default_factory=deque)  # the mark known when each of the last ones came
+    clock: _Clock = field(default_factory=_Clock)
+    by_clock: StampedDelay = field(default_factory=StampedDelay)
+    at_s: float | None = None
+    delay_s: float = 0.0
+    is_own: bool = False  # that delay is of this topic only: its queue was long when the message came
+    excess_s: float | None = None  # later by the clock of ROS than by the pings; None: it is not known
+    first: tuple[float, float | None] | None = None  # when the only message came, and its stamp
+    older_s: float = 0.0  # how old the newest message was when it came, where that is not due to its transport
+    is_given: bool = False  # it had such a message, on any connection
+    stamped: int = 0  # messages with a stamp on this connection
 
-    def __init__(self, queue_length: int) -> None:
-        self.queue_length = self.former_length = queue_length
-        self.came = 0  # messages since the queue has this length
-        self.throttle_s = 0.0
-        self.period_s: float | None = None  # between two messages while all are sent
-        self.marks: deque[float] = deque(maxlen=queue_length + 1)  # the mark known when each of the last ones came
-        self.clock = _Clock()
-        self.by_clock = StampedDelay()
-        self.at_s: float | None = None
-        self.delay_s = 0.0
-        self.is_own = False  # that delay is of this topic only: its queue was long when the message came
-        self.excess_s: float | None = None  # later by the clock of ROS than by the pings; None: it is not known
-        self.first: tuple[float, float | None] | None = None  # when the only message came, and its stamp
-        self.older_s = 0.0  # how old the newest message was when it came, where that is not due to its transport
-        self.is_given = False  # it had such a message, on any connection
-        self.stamped = 0  # messages with a stamp on this connection
+    def __post_init__(self) -> None:
+        self.former_length = self.queue_length
+        self.marks = deque(maxlen=self.queue_length + 1)
 
     def restart(self) -> None:
         """Begin anew on another connection: of the one before only the usual intervals are kept."""
@@ -311,7 +299,12 @@ class TransportDelay:
                 yield topic.excess_s
 
     def late_s(self, now_s: float) -> float:
-        """How late is what comes now: the most of the topics that come often, by those that came last."""
+        """How late is what comes now, estimated: the bound takes both ways of a round trip for the delay, which is in
+        the middle where these are alike."""
+        return max(0.0, self._most_s(now_s) - min(self._least_trip_s / 2.0, MIDDLE_AT_MOST_S))
+
+    def _most_s(self, now_s: float) -> float:
+        """How late is what comes now at most: the most of the topics that come often, by those that came last."""
         recent = [topic for topic in self._topics.values() if topic.at_s is not None and now_s - topic.at_s <= RECENT_S]
         fast = [topic for topic in recent if topic.period_s is not None and topic.period_s <= FAST_S]
         shared = [topic for topic in fast if not topic.is_own]
@@ -329,7 +322,7 @@ class TransportDelay:
 
     def queued_s(self, now_s: float) -> float:
         """How much of that is queueing: more is requested than the link carries."""
-        return max(0.0, self.late_s(now_s) - min(self._usual_trip_s, self._usual_before_s, USUAL_AT_MOST_S))
+        return max(0.0, self._most_s(now_s) - min(self._usual_trip_s, self._usual_before_s, USUAL_AT_MOST_S))
 
     @property
     def trip_s(self) -> float:

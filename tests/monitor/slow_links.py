@@ -19,6 +19,7 @@ PING_EVERY_S = 0.1
 PING_BYTES = 30
 BUFFER_BYTES = 65_536  # the bridge writes no more while so much waits in its own buffer …
 ANSWER_S = 0.003
+CALL_EVERY_S, CALL_WITHIN_S, CALL_BYTES = 1.0, 1.5, 110  # of the car's time, once the one before is over
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +64,14 @@ class Arrival:
 
 
 @dataclass(slots=True)
+class _Call:
+    """One call of the car's time."""
+
+    requested_s: float
+    car_s: float = 0.0
+
+
+@dataclass(slots=True)
 class _Queue:
     stream: Stream
     next_s: float
@@ -86,9 +95,16 @@ class _Queue:
 
 
 def run(
-    link: Link, streams: list[Stream], *, lasts_s: float, seed: int, load: LinkLoad | None = None
+    link: Link,
+    streams: list[Stream],
+    *,
+    lasts_s: float,
+    seed: int,
+    load: LinkLoad | None = None,
+    ros_s: Callable[[float], float] | None = None,
 ) -> Iterator[Arrival]:
-    """What arrives, judged by `TransportDelay`; `load` decides what is subscribed to."""
+    """What arrives, judged by `TransportDelay`; `load` decides what is subscribed to. `ros_s`: the clock of ROS, by
+    the time; None: the bridge has no rosapi."""
     rng = random.Random(seed)
     transport = TransportDelay()
     transport.is_fifo = link.is_fifo
@@ -101,9 +117,9 @@ def run(
     buffered = 0  # bytes, the system's part included
     credit = 0.0
     is_shut = False
-    pings_under_way: deque[tuple[float, float]] = deque()  # (reaches the bridge, sent)
+    under_way: deque[tuple[float, float | _Call]] = deque()  # (reaches the bridge, a ping's sending or a call)
     coming: deque[tuple[float, object]] = deque()
-    next_ping_s = 0.0
+    next_ping_s = next_call_s = 0.0
     last_up_s = last_down_s = 0.0
     for step in range(int(lasts_s / STEP_S)):
         now_s = step * STEP_S
@@ -112,13 +128,19 @@ def run(
                 queue.subscribe(transport, load)
         if now_s >= next_ping_s:
             last_up_s = max(last_up_s, now_s + link.up_s(now_s))
-            pings_under_way.append((last_up_s + ANSWER_S, now_s))
+            under_way.append((last_up_s + ANSWER_S, now_s))
             transport.sent(now_s)
             next_ping_s = now_s + PING_EVERY_S
-        while pings_under_way and pings_under_way[0][0] <= now_s:
-            _, sent_s = pings_under_way.popleft()
-            buffer.append((PING_BYTES, sent_s))
-            buffered += PING_BYTES
+        if ros_s is not None and now_s >= next_call_s:
+            last_up_s = max(last_up_s, now_s + link.up_s(now_s))
+            under_way.append((last_up_s + ANSWER_S, _Call(now_s)))
+            next_call_s = now_s + CALL_WITHIN_S + CALL_EVERY_S
+        while under_way and under_way[0][0] <= now_s:
+            _, request = under_way.popleft()
+            if isinstance(request, _Call) and ros_s is not None:
+                request.car_s = ros_s(now_s)
+            buffer.append((CALL_BYTES if isinstance(request, _Call) else PING_BYTES, request))
+            buffered += buffer[-1][0]
         for queue in queues:
             if now_s >= queue.next_s:
                 queue.next_s += 1 / queue.stream.hz
@@ -162,10 +184,17 @@ def run(
             credit = min(credit, link.rate_Bps(now_s) * STEP_S)
         while coming and coming[0][0] <= now_s:
             _, what = coming.popleft()
-            transport.took(PING_BYTES if isinstance(what, float) else what[0].size)  # type: ignore[index]
             if isinstance(what, float):
+                transport.took(PING_BYTES)
                 transport.answered(what, now_s)
                 continue
+            if isinstance(what, _Call):
+                transport.took(CALL_BYTES)
+                if now_s - what.requested_s <= CALL_WITHIN_S:
+                    transport.clock.answered(what.requested_s, now_s, what.car_s)
+                    next_call_s = now_s + CALL_EVERY_S
+                continue
             stream, source_s = what  # type: ignore[misc]
+            transport.took(stream.size)
             delay_s = transport.receive(stream.topic, now_s, stream.stamp_s(source_s))
             yield Arrival(stream.topic, now_s, now_s - source_s, delay_s, transport.late_s(now_s))

@@ -9,6 +9,7 @@ from monitor.transport import (
     FAST_S,
     KEPT_S,
     LONG_QUEUE,
+    MIDDLE_AT_MOST_S,
     PLACE_PERIODS,
     RECENT_S,
     SHUT_BYTES,
@@ -252,9 +253,9 @@ def test_the_link_is_as_late_as_the_latest_of_the_frequent_topics() -> None:
         link.receive("/vel", n * FAST_S + 0.02)  # at the limit of what is frequent
     link.receive("/map", 10.4)
     assert link.delays() == pytest.approx({"/vel": 0.02, "/map": 0.4})
-    assert link.late_s(10.5) == pytest.approx(0.02)
-    assert link.late_s(10.02 + RECENT_S) == pytest.approx(0.02)
-    assert link.late_s(10.1 + RECENT_S) == pytest.approx(0.4)  # no frequent one came of late: the others tell
+    assert link.late_s(10.5) == pytest.approx(0.015)
+    assert link.late_s(10.02 + RECENT_S) == pytest.approx(0.015)
+    assert link.late_s(10.1 + RECENT_S) == pytest.approx(0.395)  # no frequent one came of late: the others tell
 
 
 def test_a_topic_that_came_late_and_is_throttled_since_is_not_how_late_the_link_is_now() -> None:
@@ -274,8 +275,9 @@ def test_a_topic_that_came_late_and_is_throttled_since_is_not_how_late_the_link_
     assert link.late_s(2.31) == late_s
     ping(link, 2.3, 2.32)
     link.receive("/vel", 2.33)
-    assert link.late_s(2.33) == link.delays()["/vel"] < 0.1
-    assert link.delays()["/cmd"] == late_s
+    assert link.late_s(2.33) == pytest.approx(link.delays()["/vel"], abs=0.01)
+    assert link.delays()["/vel"] < 0.1
+    assert link.delays()["/cmd"] == pytest.approx(late_s, abs=0.01)
 
 
 def test_a_topic_that_comes_late_and_rarely_makes_the_link_late_between_its_messages() -> None:
@@ -310,9 +312,10 @@ def test_a_long_queue_makes_its_own_messages_old_and_the_link_only_where_no_othe
         return link.late_s(4.95), link.delays()
 
     late, delays = late_s({"/vel": 2, "/mode": LONG_QUEUE + 1})
-    assert late == delays["/vel"] < 0.7
+    assert late == pytest.approx(delays["/vel"], abs=0.01)
+    assert late < 0.7
     assert delays["/mode"] > late + 0.1
-    assert late_s({"/mode": LONG_QUEUE + 1})[0] == pytest.approx(delays["/mode"])
+    assert late_s({"/mode": LONG_QUEUE + 1})[0] == pytest.approx(delays["/mode"], abs=0.01)
     assert late_s({"/vel": 2, "/mode": LONG_QUEUE})[0] > late + 0.1
 
 
@@ -328,17 +331,26 @@ def test_a_message_from_a_long_queue_makes_its_own_topic_old_also_after_the_queu
             link.receive(topic, n / 20)
     link.subscribe("/mode", 1, throttle_s=0.2)
     assert link.delays()["/mode"] > link.delays()["/vel"] + 0.1
-    assert link.late_s(4.96) == link.delays()["/vel"]
+    assert link.late_s(4.96) == pytest.approx(link.delays()["/vel"], abs=0.01)
     link.receive("/mode", 5.0)
     link.receive("/vel", 5.0)
-    assert link.late_s(5.0) == max(link.delays().values())  # it came through the short one
+    assert link.late_s(5.0) == pytest.approx(max(link.delays().values()), abs=0.01)  # it came through the short one
 
 
 def test_without_messages_the_round_trip_tells() -> None:
     link = opened()
     assert link.late_s(5.0) == 0.0
     ping(link, 1.0, 1.3)
-    assert link.late_s(5.0) == pytest.approx(0.3)
+    assert link.late_s(5.0) == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize("trip_s", [0.1, 2 * MIDDLE_AT_MOST_S, 1.0])
+def test_the_link_is_stated_as_late_as_the_middle_of_a_round_trip_but_little_below_the_bound(trip_s: float) -> None:
+    link = opened()
+    for n in range(40):
+        ping(link, n / 4, n / 4 + trip_s)
+        link.receive("/vel", n / 4 + trip_s)
+    assert link.late_s(10.0) == pytest.approx(link.delays()["/vel"] - min(trip_s / 2, MIDDLE_AT_MOST_S))
 
 
 def test_what_the_link_always_needs_does_not_wait() -> None:

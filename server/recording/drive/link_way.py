@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from monitor.reading import AGEING_FLOOR_S
+from monitor.transport import MIDDLE_AT_MOST_S
 from monitor.unseen import unseen_m
 from server.recording.drive.facts import DriveFacts
 from server.recording.drive.parts import Span
@@ -66,7 +67,7 @@ class UnseenTime:
 
     from_s: float
     to_s: float
-    late_s: float | None = None  # the most that messages were late; None: none came, or their delay is not known
+    late_s: float | None = None  # the most that messages were late, estimated; None: none came, or it is not known
     metres: float | None  # the most that the car can have driven since a value that was shown; None: not known
 
 
@@ -76,7 +77,7 @@ def blind_times(facts: DriveFacts) -> list[UnseenTime]:
     for from_s, to_s in facts.motion.blind_spans()[:MOST_TIMES]:
         last = facts.last_speed(from_s)
         late_s = _in_force(facts.late, from_s)
-        age_s = None if last is None else to_s - last[0] + (late_s or 0.0)
+        age_s = None if last is None else to_s - last[0] + _most_late_s(late_s)
         metres = unseen_m(None if last is None else last[1], age_s, _most(facts.accelerations, from_s, to_s))
         found.append(UnseenTime(from_s=from_s, to_s=to_s, metres=metres))
     return found
@@ -102,8 +103,16 @@ def _farthest_m(facts: DriveFacts, from_s: float, to_s: float, late_s: float) ->
     before = facts.last_speed(from_s)
     shown = ([] if before is None else [before]) + facts.motion.speed.between(from_s, to_s)
     limit = _most(facts.accelerations, from_s, to_s)
-    ways = (unseen_m(v, next_s - at_s + late_s, limit) for (at_s, v), (next_s, _) in pairwise([*shown, (to_s, 0.0)]))
+    ways = (
+        unseen_m(v, next_s - at_s + _most_late_s(late_s), limit)
+        for (at_s, v), (next_s, _) in pairwise([*shown, (to_s, 0.0)])
+    )
     return max((way for way in ways if way is not None), default=None)
+
+
+def _most_late_s(late_s: float | None) -> float:
+    """The recorded delay is an estimate: how late messages may have been."""
+    return 0.0 if late_s is None else late_s + MIDDLE_AT_MOST_S
 
 
 def _in_force(steps: Sequence[tuple[float, float]], at_s: float) -> float | None:

@@ -984,7 +984,7 @@ export interface LinkState {
   trying_for_s: number;
   topics_subscribed: number;
   topics_heard: number;
-  /** how old messages are when they come, at most; null: not known */
+  /** how old messages are when they come, estimated, at most 0.2 s too little; null: not known */
   late_s: number | null;
   /** what is not requested in full because the link is slow, as a sentence */
   reduced: string | null;

@@ -89,7 +89,7 @@ def test_a_speed_that_fell_silent_before_the_gap_counts_from_then() -> None:
 
 def test_the_delay_of_the_link_is_part_of_the_way() -> None:
     facts = drive([*steady(4.0, 0.0, 10.0), *steady(4.0, 14.0)], late=[(-2.0, 0.1), (9.0, 0.3), (12.0, 2.0)])
-    assert blind_times(facts)[0].metres == pytest.approx(4 * 4.3 + 3 * 4.3**2 / 2)
+    assert blind_times(facts)[0].metres == pytest.approx(4 * 4.45 + 3 * 4.45**2 / 2)
 
 
 def test_without_a_speed_or_a_limit_it_is_not_known() -> None:
@@ -110,7 +110,7 @@ def test_a_late_link_has_the_farthest_way_of_what_it_showed() -> None:
     facts = drive(speeds, late=[(0.0, 0.1), (8.0, 0.9), (11.0, 1.5), (13.0, 0.4)])
     (late,) = late_times(facts)
     assert (late.from_s, late.to_s, late.late_s) == (8.0, 13.0, 1.5)
-    assert late.metres == pytest.approx(6 * 2.0 + 3 * 4 / 2)  # 1.5 s under way, and half a second until the next one
+    assert late.metres == pytest.approx(6 * 2.15 + 3 * 2.15**2 / 2)  # 1.5 s under way, half a second until the next one
     assert late_times(drive([], late=[(0.0, 3.0)], others=steady_times()))[0].metres is None
     assert late_times(drive(speeds, late=[(0.0, 0.4)])) == []
 
@@ -127,15 +127,15 @@ def steady_times() -> list[float]:
 def test_the_report_has_them_on_its_sheet_and_in_its_tables() -> None:
     facts = drive([*steady(4.0, 0.0, 10.0), *steady(4.0, 14.0)], late=[(0.0, 0.1), (20.0, 0.8), (25.0, 0.1)])
     found = shown(facts)
-    assert found["blind"] == [{"from_s": 10.0, "to_s": 14.0, "unseen_m": 41.62}]
-    assert found["late"] == [{"from_s": 20.0, "to_s": 25.0, "unseen_m": 7.74, "late_s": 0.8}]
+    assert found["blind"] == [{"from_s": 10.0, "to_s": 14.0, "unseen_m": 44.1}]
+    assert found["late"] == [{"from_s": 20.0, "to_s": 25.0, "unseen_m": 8.96, "late_s": 0.8}]
     assert _blind(found, 0) == [
-        ("00:00:10", "no message from the car", "≤ 41.7 m unseen", "4.0 s"),
-        ("00:00:20", "messages up to 0.8 s late", "≤ 7.8 m unseen", "5.0 s"),
+        ("00:00:10", "no message from the car", "≤ 44.1 m unseen", "4.0 s"),
+        ("00:00:20", "messages up to 0.8 s late", "≤ 9.0 m unseen", "5.0 s"),
     ]
     assert _blind_head(found) == "metres: last speed and at most 3.0 m/s²"
     rows = {row[0]: row[-1] for row in report_rows(found) if row[0] in ("blind", "late")}
-    assert rows == {"blind": "≤ 41.7 m unseen", "late": "≤ 7.8 m unseen"}
+    assert rows == {"blind": "≤ 44.1 m unseen", "late": "≤ 9.0 m unseen"}
     other = replace(facts, late=(), are_settings_recorded=False)
     found = shown(other)
     assert _blind_head(found) == ("metres: last speed and at most 3.0 m/s² (as set today), delay of the link not known")
