@@ -14,10 +14,9 @@ from server.mail import address
 from server.mail.mail_folder import MailFolder, MailRefused
 from server.mail.order import Mail, Outcome, Recipient
 from server.mail.outbox import Outbox
-from server.mail.replies import Trouble
 from server.mail.settings import MailSettings
 from server.mail.smtp_connection import Connection, Envelope, Reply, connect
-from server.mail.smtp_dial import Account
+from server.mail.smtp_dial import Account, Trouble
 from server.mail.under_way import Underway, joined
 
 log = logging.getLogger("catgraph.mail")

@@ -19,8 +19,7 @@ from typing import Any, BinaryIO
 import aiosmtplib
 from aiosmtplib.protocol import SMTPProtocol
 
-from server.mail.replies import Trouble, clean
-from server.mail.smtp_dial import DIAL_S, Account, as_trouble, dial, own_name
+from server.mail.smtp_dial import DIAL_S, Account, Trouble, as_trouble, clean, dial, own_name
 
 REPLY_S = 60.0  # RFC 5321 4.5.3.2 has minutes; a server that thinks so long is tried again
 END_S = 300.0  # for the reply to a whole mail, which a server may take apart and scan first

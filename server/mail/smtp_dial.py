@@ -1,9 +1,12 @@
-"""Which SMTP server an account names, a socket to it, and failures of its connection as sentences for the operator."""
+"""Which SMTP server an account names, a socket to it, and its replies and failures as sentences for the operator."""
 
 from __future__ import annotations
 
 import asyncio
+import base64
+import binascii
 import ipaddress
+import re
 import socket
 import ssl
 from collections.abc import Iterator
@@ -12,11 +15,38 @@ from dataclasses import dataclass
 
 import aiosmtplib
 
-from server.mail.replies import Trouble, clean
 from server.mail.settings import MailSettings
 from server.rosbridge.address import BadAddress, refuse_forbidden
 
+_LONGEST = 300
+_BASE64 = re.compile(r"[A-Za-z0-9+/]{4,}={0,2}")
 DIAL_S = 20.0
+
+
+class Trouble(Exception):
+    """No mail was accepted; `str()` is one sentence, with the server's reply if there was one."""
+
+    def __init__(self, sentence: str, *, is_permanent: bool = False, is_of_account: bool = False) -> None:
+        super().__init__(sentence)
+        self.is_permanent = is_permanent  # trying again changes nothing
+        self.is_of_account = is_of_account  # it holds for every mail, not for this one
+
+
+def clean(text: str, password: str) -> str:
+    """A server's reply on one line, cut, without control characters; a password that it repeats is masked."""
+    if password:
+        text = _BASE64.sub(lambda found: "•••" if _holds(found[0], password) else found[0], text)
+        text = text.replace(password, "•••")
+    line = "".join(letter if letter.isprintable() else " " for letter in text[: 8 * _LONGEST])
+    return " ".join(line.split())[:_LONGEST]
+
+
+def _holds(text: str, password: str) -> bool:
+    """Whether it is the password, or a login with it, in base64."""
+    try:
+        return password.encode() in base64.b64decode(text, validate=True)
+    except (binascii.Error, ValueError):
+        return False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,9 +8,9 @@ import pytest
 
 from server.mail import sender
 from server.mail.order import Mail, Recipient
-from server.mail.replies import Trouble, clean
 from server.mail.sender import answered, troubled
 from server.mail.smtp_connection import Reply
+from server.mail.smtp_dial import Trouble, clean
 from tests.server.mail.mailing import START_MS as T
 
 OK, LATER, NEVER = (
