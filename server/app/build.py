@@ -23,7 +23,7 @@ from server.bus.journal_db import nothing_lost
 from server.bus.local import LocalBus
 from server.judge.settings import SettingsFile
 from server.mail.mailer import Mailer
-from server.mail.recorded import Recorded
+from server.mail.source import Recorded
 from server.protocol.alarm_state import Note
 from server.recording.catalog.catalog import Catalog
 from server.recording.export.jobs import Exports
@@ -35,8 +35,8 @@ from server.replay.manager import ReplayManager, ReplaySource
 from server.storage.data_folder import DataFolder
 from server.storage.storage_thread import StorageThread
 from server.system.page_files import static_dir
-from server.vehicle.late_commands import LateCommands
 from server.vehicle.marks import MarksPlace
+from server.vehicle.outcomes import LateCommands
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
 from server.version import catgraph_version

@@ -20,7 +20,7 @@ from nats.errors import Error as NatsError
 from server.bus import nats_wire as wire
 from server.bus.bus import ALL, SUMMARY, Frame, NotAdmitted, NotServed
 from server.bus.local import LocalBus
-from server.bus.nats_sync import processed
+from server.bus.nats_link import processed
 from server.system import log_context
 
 log = logging.getLogger("catgraph.bus")

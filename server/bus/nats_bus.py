@@ -12,11 +12,10 @@ from nats.aio.msg import Msg
 from server.bus import nats_wire as wire
 from server.bus.bus import ALL, FRAME_LIVES_S, SUMMARY, UNSERVED, Frame, NotServed, Watcher
 from server.bus.log_runs import Resumed
-from server.bus.nats_liveness import GONE_AFTER_S, AgentLiveness
+from server.bus.nats_link import processed
 from server.bus.nats_logs import RemoteLogs
 from server.bus.nats_pulls import Pulls
-from server.bus.nats_questions import Questions, ReadEvent
-from server.bus.nats_sync import processed
+from server.bus.nats_questions import GONE_AFTER_S, AgentLiveness, Questions, ReadEvent
 from server.bus.watchers import Watchers
 
 NOTIFY_EVERY_S = 0.5

@@ -15,7 +15,7 @@ from nats.errors import Error as NatsError
 
 from server.bus import nats_http as http
 from server.bus import nats_wire as wire
-from server.bus.nats_sync import processed
+from server.bus.nats_link import processed
 
 log = logging.getLogger("catgraph.bus")
 

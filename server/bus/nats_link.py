@@ -202,3 +202,13 @@ def _context(broker: Broker) -> ssl.SSLContext | None:
         return ssl.create_default_context(cafile=broker.authority)
     except OSError as why:
         raise BrokerRefused(f"The certificate {broker.authority} cannot be used: {why}.") from None
+
+
+async def processed(client: Client, *, within_s: int = 10) -> None:
+    """Return once the broker has processed all that was sent before. Raises the errors of the client and TimeoutError.
+
+    One flush is not enough: nats-py writes its PING at once, ahead of what waits for its writing task, so the PONG of
+    the first shows only that this task has run meanwhile.
+    """
+    for _ in range(2):
+        await client.flush(timeout=within_s)

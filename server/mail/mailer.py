@@ -10,11 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from server.mail import address, retry_backoff
+from server.mail import address, sender
 from server.mail.mail_folder import MailFolder, MailRefused
 from server.mail.order import Letter, Order
 from server.mail.outbox import OutboxFull, WrongState
-from server.mail.preparer import Preparer
+from server.mail.prepare import Preparer
 from server.mail.sender import Sender
 from server.mail.settings import MailSettings, checked
 from server.mail.source import Source
@@ -33,7 +33,7 @@ class Mailer:
         source: Source,
         *,
         wall_ms: Callable[[], int],
-        pause_s: Callable[[int], float] = retry_backoff.pause_s,
+        pause_s: Callable[[int], float] = sender.pause_s,
     ) -> None:
         self.settings = MailSettings()
         self.place = folder
@@ -176,7 +176,7 @@ class Mailer:
                 log.error("%s: %s", what, why)
             except Exception:
                 log.exception("task failed, restarting: task=%s", what)
-            await asyncio.sleep(retry_backoff.AGAIN_S)
+            await asyncio.sleep(sender.AGAIN_S)
 
 
 def _unknown(n: int) -> MailRefused:

@@ -5,22 +5,36 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from server.mail import address, attempt, retry_backoff
+from server.mail import address
 from server.mail.mail_folder import MailFolder, MailRefused
-from server.mail.order import Mail, Outcome
+from server.mail.order import Mail, Outcome, Recipient
 from server.mail.outbox import Outbox
-from server.mail.replies import Trouble
 from server.mail.settings import MailSettings
-from server.mail.smtp_connection import Connection, Envelope, connect
-from server.mail.smtp_dial import Account
+from server.mail.smtp_connection import Connection, Envelope, Reply, connect
+from server.mail.smtp_dial import Account, Trouble
 from server.mail.under_way import Underway, joined
 
 log = logging.getLogger("catgraph.mail")
-_LONGEST_MS = round(1000 * retry_backoff.LONGEST_S)
+
+# How long a mail waits before it is tried again, and when it is given up.
+_PAUSES_S = (10, 30, 60, 120, 300, 600, 1200, 1800)
+LONGEST_S = 3600.0
+_LONGEST_MS = round(1000 * LONGEST_S)
+AGAIN_S = 5.0  # until a failed task is restarted, and a failed disk is tried again
+# Three days, though RFC 5321 4.5.4.1 wants four to five from relays that nobody watches: an operator does here. Counted
+# in attempts, not by the clock: a computer in a car may only learn the date after a day.
+MAX_ATTEMPTS = len(_PAUSES_S) + 72
+_MOST_NAMED = 5  # recipients named in a sentence
+
+
+def pause_s(attempts: int) -> float:
+    """The pause after so many attempts that came to nothing (1: the first)."""
+    return float(_PAUSES_S[attempts - 1]) if attempts <= len(_PAUSES_S) else LONGEST_S
 
 
 class Sender:
@@ -82,7 +96,7 @@ class Sender:
         earliest = await self._folder.ask(lambda outbox: outbox.queue.earliest_ms())
         timeout = None if earliest is None else max(0.0, (earliest - self._wall_ms()) / 1000)
         if timeout is not None:
-            timeout = min(timeout, retry_backoff.LONGEST_S)
+            timeout = min(timeout, LONGEST_S)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(timeout):  # wait_for of Python 3.11 may swallow the end of the task
                 await self._due.wait()
@@ -123,7 +137,7 @@ class Sender:
             outcome = Outcome(state="cancelled", detail="", recipients=mail.recipients)
         elif (error := task.exception()) is None:
             answers, of_mail = task.result()
-            outcome = attempt.answered(mail, answers, of_mail, now_ms, self._pause_s)
+            outcome = answered(mail, answers, of_mail, now_ms, self._pause_s)
             self._failures = 0
         else:
             trouble = error if isinstance(error, Trouble) else self._fault(mail, error)
@@ -146,7 +160,7 @@ class Sender:
 
     def _troubled(self, mail: Mail, trouble: Trouble, under_way: Underway, now_ms: int) -> Outcome:
         is_doubtful = under_way.connection is not None and under_way.connection.is_doubtful
-        return attempt.troubled(mail, trouble, is_doubtful=is_doubtful, now_ms=now_ms, pause_s=self._pause_s)
+        return troubled(mail, trouble, is_doubtful=is_doubtful, now_ms=now_ms, pause_s=self._pause_s)
 
     async def _hand_over(self, mail: Mail, under_way: Underway) -> Any:
         if under_way.connection is None or not under_way.connection.is_open:
@@ -211,8 +225,76 @@ class Sender:
                 return
             except MailRefused as why:
                 log.error("mail state not saved yet: mail=%d error=%s", mail.letter, why)
-                await asyncio.sleep(retry_backoff.AGAIN_S)
+                await asyncio.sleep(AGAIN_S)
 
 
 def _next_due(outbox: Outbox, now_ms: int) -> Mail | None:
     return outbox.queue.next_due(now_ms, _LONGEST_MS)
+
+
+def answered(
+    mail: Mail,
+    answers: Mapping[str, Reply],
+    of_mail: Reply | None,
+    now_ms: int,
+    pause_s: Callable[[int], float],
+) -> Outcome:
+    """Return the outcome of the server's replies: one for each recipient, and one for the mail if any was accepted."""
+    recipients = tuple(_settled(one, answers.get(one.address), of_mail) for one in mail.recipients)
+    waiting = [one for one in recipients if one.state == "waiting"]
+    refused = [one for one in recipients if one.state == "refused"]
+    if waiting:
+        detail = waiting[0].detail
+        if len(recipients) > 1:
+            detail = f"{_named(waiting)}; {_count(recipients)}"
+        return _again(mail, recipients, detail, now_ms, pause_s)
+    if refused:
+        detail = refused[0].detail if len(recipients) == 1 else f"{_named(refused)}; {_count(recipients)}"
+        return Outcome(state="failed", detail=detail, recipients=recipients)
+    detail = recipients[-1].detail if recipients else ""
+    return Outcome(state="sent", detail=detail, recipients=recipients)
+
+
+def troubled(
+    mail: Mail, trouble: Trouble, *, is_doubtful: bool, now_ms: int, pause_s: Callable[[int], float]
+) -> Outcome:
+    """Return the outcome of an attempt that failed before the server's final reply."""
+    detail = str(trouble)
+    if is_doubtful:
+        detail = f"{detail} It may have arrived; it is sent again under the same Message-ID."
+    if trouble.is_permanent:
+        return Outcome(state="failed", detail=detail, recipients=mail.recipients, of_account=trouble.is_of_account)
+    return _again(mail, mail.recipients, detail, now_ms, pause_s)
+
+
+def _settled(one: Recipient, answer: Reply | None, of_mail: Reply | None) -> Recipient:
+    if one.state != "waiting" or answer is None:
+        return one  # already accepted or refused
+    if answer.code >= 300:
+        return replace(one, state="refused" if answer.is_permanent else "waiting", detail=answer.text)
+    if of_mail is None:
+        return one
+    if of_mail.code < 300:
+        return replace(one, state="accepted", detail=of_mail.text)
+    return replace(one, state="refused" if of_mail.is_permanent else "waiting", detail=of_mail.text)
+
+
+def _again(
+    mail: Mail, recipients: tuple[Recipient, ...], detail: str, now_ms: int, pause_s: Callable[[int], float]
+) -> Outcome:
+    if mail.attempts >= MAX_ATTEMPTS:
+        return Outcome(
+            state="failed", detail=f"Given up after {mail.attempts} attempts: {detail}", recipients=recipients
+        )
+    next_ms = now_ms + round(1000 * pause_s(mail.attempts))
+    return Outcome(state="queued", detail=detail, recipients=recipients, next_ms=next_ms)
+
+
+def _named(some: Sequence[Recipient]) -> str:
+    listed = ", ".join(f"{one.address}: {one.detail}" if one.detail else one.address for one in some[:_MOST_NAMED])
+    return listed + (f" and {len(some) - _MOST_NAMED} more" if len(some) > _MOST_NAMED else "")
+
+
+def _count(recipients: Sequence[Recipient]) -> str:
+    accepted = sum(one.state == "accepted" for one in recipients)
+    return f"{accepted} of {len(recipients)} recipients have it"

@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 import tomli_w
 
 from server.mail import address
-from server.mail.header_text import is_one_line
+from server.mail.compose import is_one_line
 from server.storage import bounded_toml, durable_file
 from server.storage.durable_file import set_aside
 

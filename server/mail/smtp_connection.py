@@ -1,7 +1,8 @@
 """One connection to the SMTP server: dial, encrypt, log in, send mails in pieces.
 
 aiosmtplib (written against 5.1) dials, encrypts, logs in and sends commands. Its own send method takes a whole mail as
-bytes and blocks the loop with regular expressions; here `smtp_stream` sends the text.
+bytes and blocks the loop with regular expressions; here the text is read off the loop, and written as fast as the
+server takes it.
 """
 
 from __future__ import annotations
@@ -13,16 +14,17 @@ from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import aiosmtplib
+from aiosmtplib.protocol import SMTPProtocol
 
-from server.mail.replies import Trouble, clean
-from server.mail.smtp_dial import DIAL_S, Account, dial, own_name
-from server.mail.smtp_errors import as_trouble
-from server.mail.smtp_stream import next_piece, opened, write
+from server.mail.smtp_dial import DIAL_S, Account, Trouble, as_trouble, clean, dial, own_name
 
 REPLY_S = 60.0  # RFC 5321 4.5.3.2 has minutes; a server that thinks so long is tried again
 END_S = 300.0  # for the reply to a whole mail, which a server may take apart and scan first
+STALL_S = 60.0  # without a byte taken; RFC 5321 4.5.3.2 has minutes
+_PIECE = 1 << 18
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,3 +248,46 @@ def _context(ca: str) -> ssl.SSLContext:
 
 def _encoding(needs_utf8: bool) -> str:
     return "utf-8" if needs_utf8 else "ascii"
+
+
+@contextlib.asynccontextmanager
+async def opened(path: Path) -> AsyncIterator[BinaryIO]:
+    """The file, opened for reading in a thread; closed at the end, also if that comes while it is being opened."""
+    opening: asyncio.Future[BinaryIO] = asyncio.ensure_future(asyncio.to_thread(open, path, "rb"))
+    try:
+        file = await asyncio.shield(opening)
+    except asyncio.CancelledError:
+        opening.add_done_callback(_close)
+        raise
+    with file:
+        yield file
+
+
+def _close(opening: asyncio.Future[BinaryIO]) -> None:
+    if not opening.cancelled() and opening.exception() is None:
+        opening.result().close()
+
+
+def next_piece(file: BinaryIO, is_line_start: bool) -> tuple[bytes, bool, int]:
+    """The next piece with its dots doubled (RFC 5321 4.5.2), whether it ends a line, and how long it was."""
+    piece = file.read(_PIECE)
+    escaped = piece.replace(b"\n.", b"\n..")
+    if is_line_start and piece.startswith(b"."):
+        escaped = b"." + escaped
+    return escaped, piece.endswith(b"\n"), len(piece)
+
+
+async def write(protocol: SMTPProtocol, piece: bytes, answer: asyncio.Future[Any]) -> None:
+    """Writes, and waits until the line has taken most of it, the server answers, or nothing moves any more."""
+    protocol.write(piece)
+    drained: asyncio.Future[Any] = asyncio.ensure_future(protocol._drain_helper())
+    try:
+        done, _ = await asyncio.wait({drained, answer}, timeout=STALL_S, return_when=asyncio.FIRST_COMPLETED)
+        if not done:
+            raise TimeoutError
+        if drained in done:
+            drained.result()
+    finally:
+        drained.cancel()
+        with contextlib.suppress(asyncio.CancelledError, OSError):
+            await drained

@@ -1,17 +1,52 @@
-"""Which SMTP server an account names, and a socket to it."""
+"""Which SMTP server an account names, a socket to it, and its replies and failures as sentences for the operator."""
 
 from __future__ import annotations
 
 import asyncio
+import base64
+import binascii
 import ipaddress
+import re
 import socket
+import ssl
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
-from server.mail.replies import Trouble
+import aiosmtplib
+
 from server.mail.settings import MailSettings
 from server.rosbridge.address import BadAddress, refuse_forbidden
 
+_LONGEST = 300
+_BASE64 = re.compile(r"[A-Za-z0-9+/]{4,}={0,2}")
 DIAL_S = 20.0
+
+
+class Trouble(Exception):
+    """No mail was accepted; `str()` is one sentence, with the server's reply if there was one."""
+
+    def __init__(self, sentence: str, *, is_permanent: bool = False, is_of_account: bool = False) -> None:
+        super().__init__(sentence)
+        self.is_permanent = is_permanent  # trying again changes nothing
+        self.is_of_account = is_of_account  # it holds for every mail, not for this one
+
+
+def clean(text: str, password: str) -> str:
+    """A server's reply on one line, cut, without control characters; a password that it repeats is masked."""
+    if password:
+        text = _BASE64.sub(lambda found: "•••" if _holds(found[0], password) else found[0], text)
+        text = text.replace(password, "•••")
+    line = "".join(letter if letter.isprintable() else " " for letter in text[: 8 * _LONGEST])
+    return " ".join(line.split())[:_LONGEST]
+
+
+def _holds(text: str, password: str) -> bool:
+    """Whether it is the password, or a login with it, in base64."""
+    try:
+        return password.encode() in base64.b64decode(text, validate=True)
+    except (binascii.Error, ValueError):
+        return False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,3 +115,56 @@ def own_name(dialled: socket.socket) -> str:
         return name
     own = ipaddress.ip_address(str(dialled.getsockname()[0]).partition("%")[0])
     return f"[IPv6:{own}]" if own.version == 6 else f"[{own}]"
+
+
+@contextmanager
+def as_trouble(account: Account, when: str) -> Iterator[None]:
+    """Turn every failure of a connection into a Trouble with a sentence."""
+    is_dialling = not when
+    try:
+        yield
+    except Trouble:
+        raise
+    except aiosmtplib.SMTPResponseException as answer:
+        reply = f"{answer.code} {clean(answer.message, account.password)}"
+        raise Trouble(
+            f"{account.shown} replied{'' if is_dialling else f' {when}'}: {reply}",
+            is_permanent=answer.code >= 500,
+            is_of_account=is_dialling,
+        ) from None
+    except (aiosmtplib.SMTPException, OSError, TimeoutError) as error:
+        trusted = _of_trust(error)
+        if trusted is not None:
+            raise Trouble(
+                f"{account.shown} cannot be verified: {trusted}.", is_permanent=True, is_of_account=True
+            ) from None
+        raise Trouble(
+            f"{account.shown} {_how(error)}{'' if is_dialling else f' {when}'}.", is_of_account=is_dialling
+        ) from None
+
+
+def _of_trust(error: BaseException) -> str | None:
+    """Why the certificate is not trusted; None if the failure had another cause."""
+    one: BaseException | None = error
+    while one is not None:
+        if isinstance(one, ssl.SSLCertVerificationError):
+            return clean(one.verify_message or "its certificate is not trusted", "")
+        one = one.__cause__ or one.__context__
+    return None
+
+
+def _how(error: BaseException) -> str:
+    one: BaseException | None = error
+    while one is not None:
+        if isinstance(one, ConnectionRefusedError):
+            return "refuses the connection"
+        if isinstance(one, ssl.SSLError):
+            return "does not speak TLS correctly"
+        one = one.__cause__ or one.__context__
+    if isinstance(error, TimeoutError):
+        return "did not answer in time"
+    if isinstance(error, (ConnectionError, aiosmtplib.SMTPServerDisconnected)):
+        return "closed the connection"
+    if isinstance(error, OSError) and error.strerror:
+        return f"cannot be reached ({error.strerror.lower()})"
+    return "does not answer like a mail server"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from server.recording.export.worker import Made
+from server.recording.export import Made, make_export
 
 
 class Source(Protocol):
@@ -26,3 +26,22 @@ class Source(Protocol):
         What cannot be read with `required`, one of the paths, is left out and named in the notes.
         Raises OSError, ValueError or RuntimeError with a sentence.
         """
+
+
+class Recorded:
+    """The mailer's source in a running server."""
+
+    def __init__(self, path_of: Callable[[str], Path | None], drive_of: Callable[[str], Sequence[str]]) -> None:
+        self._path_of = path_of
+        self._drive_of = drive_of
+
+    def path_of(self, recording: str) -> Path | None:
+        return self._path_of(recording)
+
+    def drive_of(self, recording: str) -> Sequence[str]:
+        return self._drive_of(recording)
+
+    async def export(
+        self, paths: Sequence[Path], format: str, into: Path, progress: Callable[[float], None], *, required: Path
+    ) -> Made:
+        return await make_export(paths, format, into, progress, required=required)

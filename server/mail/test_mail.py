@@ -11,10 +11,9 @@ from pathlib import Path
 
 from server.mail import address, compose
 from server.mail.address import MailAddress
-from server.mail.replies import Trouble
 from server.mail.settings import MailSettings
 from server.mail.smtp_connection import Envelope, connected
-from server.mail.smtp_dial import Account
+from server.mail.smtp_dial import Account, Trouble
 
 WITHIN_S = 45.0
 

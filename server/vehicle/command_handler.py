@@ -21,8 +21,7 @@ from server.protocol.state import LiveState
 from server.rosbridge.address import BadAddress
 from server.storage.storage_thread import StorageThread
 from server.vehicle import departure_seen, phone, queries
-from server.vehicle.late_commands import log_late, order_of
-from server.vehicle.outcomes import Outcomes
+from server.vehicle.outcomes import Outcomes, log_late, order_of
 from server.vehicle.queries import check_answer
 from server.vehicle.session_parts import SessionActions, SessionParts
 from server.vehicle.settings_change import SettingsChange

@@ -1,4 +1,4 @@
-"""What became of the commands of late, for pages whose answer was lost on its way."""
+"""What became of recent commands, for pages whose answer was lost on its way; and the log of those that came late."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from server.bus.bus import Handler
+from server.control import display_name
+from server.protocol import commands
+from server.protocol.alarm_state import Note
 from server.protocol.messages import Answer, HandedOver
+from server.protocol.rate_limit import Allowance, Rate
 
 log = logging.getLogger("catgraph.session")
 
@@ -16,6 +20,7 @@ LONGEST_WAY_S = 3.0  # of a question; `ago_s` was counted when it left the page
 KEPT_S = 120.0
 MOST = 1000
 GIVEN_UP = "Its page had given it up before it came."
+OF_NODES = Rate(per_s=1.0, at_once=30)  # a web node proves nothing of a command that it passes on late
 
 Became = Literal["done", "refused", "never", "under_way", "not_known"]
 
@@ -113,3 +118,38 @@ class Outcomes:
 def _key(message: Mapping[str, Any]) -> tuple[str, str] | None:
     page, id = message.get("page"), message.get("id")
     return (page, id) if isinstance(page, str) and isinstance(id, str) and message.get("kind") != "position" else None
+
+
+def log_late(note: Note, kind: str, why: str, *, by: str | None) -> None:
+    """`why` is a sentence."""
+    if kind == "slow_down":
+        note("slow_down", f"Slow-down refused: {why}", by=by, step="refused")
+    else:
+        note("late", f"“{kind}” was not carried out: {why}", by=by)
+
+
+def order_of(message: Mapping[str, Any]) -> str | None:
+    """The kind of an order; None: a query, what a page sends again by itself, or no command at all."""
+    kind = message.get("kind")
+    command = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
+    return None if command is None or command.signature != "required" else str(kind)
+
+
+class LateCommands:
+    """Of one agent. `find(vehicle)`: what writes into the log of a car; None: it is not monitored."""
+
+    def __init__(self, find: Callable[[str], Note | None], *, now: Callable[[], float]) -> None:
+        self._find = find
+        self._now = now
+        self._allowances: dict[tuple[str, bool], Allowance] = {}
+
+    def note(self, vehicle: str, command: Mapping[str, Any], why: str) -> None:
+        """Log an order that a web node passed on, in the name that the node states; what floods the log is left out."""
+        now_s, kind = self._now(), order_of(command)
+        if kind is None or (note := self._find(vehicle)) is None:
+            return
+        # A flood of others leaves room for a slow-down that was refused.
+        allowance = self._allowances.setdefault((vehicle, kind == "slow_down"), Allowance(OF_NODES, now_s))
+        if allowance.takes(now_s):
+            by = display_name.clean(command.get("by"))
+            log_late(note, kind, why, by=display_name.not_signed(by) if by else None)

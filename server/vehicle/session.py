@@ -24,6 +24,7 @@ from server.system import log_context
 from server.system.supervision import Supervisor
 from server.vehicle import facts
 from server.vehicle.command_handler import CommandHandler
+from server.vehicle.facts import Vitals
 from server.vehicle.judgement import Judgement
 from server.vehicle.marks import NO_PLACE, MarksPlace
 from server.vehicle.open_source import open_source
@@ -33,7 +34,6 @@ from server.vehicle.state_frame import state_frame
 from server.vehicle.tick import Tick
 from server.vehicle.tick_parts import TickParts
 from server.vehicle.vehicle import Vehicle
-from server.vehicle.vitals import Vitals
 
 
 class Session:

@@ -23,11 +23,10 @@ from server.rosbridge.live_source import LiveSource, OpenSource
 from server.slowdown.controller import SlowDownController
 from server.system.supervision import Supervisor
 from server.vehicle.car_attention import CarAttention
-from server.vehicle.car_departure import CarDeparture
+from server.vehicle.car_departure import LIST_SUFFIX, CarDeparture, DepartureFile
 from server.vehicle.car_driving import CarDriving
 from server.vehicle.car_handover import CarHandover
 from server.vehicle.connection import Connection, ConnectionObserver
-from server.vehicle.departure_file import LIST_SUFFIX, DepartureFile
 from server.vehicle.event_log import EventLog
 from server.vehicle.judgement import Judgement
 from server.vehicle.marks import Marks, MarksPlace

@@ -19,12 +19,12 @@ from server.bus.bus import ALL, PageBus
 from server.control import display_name
 from server.protocol import commands, messages
 from server.protocol.messages import Hello
-from server.protocol.rate_limit import Allowance, Limits
+from server.protocol.rate_limit import Limits
 from server.web import page_inbox
 from server.web.cars_board import FLEET, CarsBoard
 from server.web.fair_wakeup import FairWakeup
 from server.web.fleet_log import FleetLog
-from server.web.page_commands import LEAVES, NO_HELLO, NOT_A_VIEWERS, TOO_MANY, Announcements, passed_on
+from server.web.page_commands import NO_HELLO, NOT_A_VIEWERS, TOO_MANY, CommandsOfPage, passed_on
 from server.web.page_inbox import PageInbox
 from server.web.page_sender import PageSender
 from server.web.page_writer import MAX_REPLIES
@@ -34,50 +34,13 @@ UNNAMED = "Name the car that is meant."
 PAGE_ONLY = {"announces", "id", "kind"}  # of a status: not for the cars
 
 
-class FleetCommands:
-    """Has each command of one page carried out by the session of the car that it names.
-
-    `send` queues a reply; `complain` counts a message that is invalid, and answers why.
-    """
-
-    def __init__(
-        self,
-        bus: PageBus,
-        principal: Principal,
-        limits: Limits,
-        *,
-        now: Callable[[], float],
-        send: Callable[[messages.ToPage], None],
-        complain: Callable[[str], None],
-        people: People = NOBODY,
-    ) -> None:
-        self._bus = bus
-        self._now = now
-        self._send = send
-        self._complain = complain
-        self._sender = PageSender(principal, people, signs=bus.grows)
-        self._orders = Allowance(limits.commands, now())
-        self._announcements = Announcements(bus)
-
-    @property
-    def sender(self) -> PageSender:
-        return self._sender
-
-    def begin(self, message: Mapping[str, Any]) -> None:
-        """The page's hello."""
-        self._sender.begin(message)
-        self.send_duty()
-
-    def send_duty(self) -> None:
-        """Send the page who is on duty, after its hello."""
-        if self._sender.has_begun:
-            self._send(self._sender.duty)
+class FleetCommands(CommandsOfPage):
+    """Has each command of one page carried out by the session of the car that it names."""
 
     async def command(self, message: dict[str, Any]) -> None:
-        """Has the session of the car carry out a command, and answers."""
-        id = message.get("id")
-        if not isinstance(id, str) or len(id) > 80:
-            self._complain("A command needs an id of at most 80 characters.")
+        """Have the session of the car carry out a command, and reply."""
+        id = self._id_of(message)
+        if id is None:
             return
         vehicle = message.get("vehicle")
         reason = self._refusal(message.get("kind"), vehicle)
@@ -119,15 +82,6 @@ class FleetCommands:
             return
         status = command.model_dump(exclude=PAGE_ONLY)
         self._announcements.forward(status, self._sender.as_json(), () if status["leaves"] else self._bus.vehicles)
-
-    async def leave(self) -> None:
-        """The page is closed: it is not counted on to announce alarms any more."""
-        await self._announcements.forwarded()
-        await self.present(LEAVES)
-        await self._announcements.forwarded()
-
-    async def close(self) -> None:
-        await self._announcements.close()
 
 
 class FleetWriter:

@@ -41,35 +41,30 @@ async def passed_on(
         return answer
 
 
-class PageCommands:
-    """Of one page. `send` queues a reply; `complain` counts a message that is invalid, and answers why."""
+class CommandsOfPage:
+    """What a page of one car and a page of all cars have in common: who sends its commands, and how it leaves.
+
+    `send` queues a reply; `complain` counts a message that is invalid, and answers why.
+    """
 
     def __init__(
         self,
         bus: PageBus,
-        vehicle: str,
-        view: ViewSource,
         principal: Principal,
         limits: Limits,
         *,
         now: Callable[[], float],
-        wall_ms: Callable[[], int],
         send: Callable[[messages.ToPage], None],
         complain: Callable[[str], None],
         people: People = NOBODY,
     ) -> None:
         self._bus = bus
-        self._vehicle = vehicle
-        self._view = view
-        self._sender = PageSender(principal, people, signs=bus.grows)
         self._now = now
-        self._wall_ms = wall_ms
         self._send = send
         self._complain = complain
+        self._sender = PageSender(principal, people, signs=bus.grows)
         self._orders = Allowance(limits.commands, now())
-        self._slow_downs = Allowance(limits.slow_down, now())
-        self._opening: asyncio.Task[None] | None = None
-        self._announcements = Announcements(bus)  # to other cars
+        self._announcements = Announcements(bus)
 
     @property
     def sender(self) -> PageSender:
@@ -85,8 +80,54 @@ class PageCommands:
         if self._sender.has_begun:
             self._send(self._sender.duty)
 
+    async def present(self, message: Mapping[str, Any]) -> None:
+        """Pass on the page's status, once a second: without a reply."""
+        raise NotImplementedError
+
+    async def leave(self) -> None:
+        """The page is closed: it is not counted on to announce alarms any more."""
+        await self._announcements.forwarded()
+        await self.present(LEAVES)
+        await self._announcements.forwarded()
+
+    async def close(self) -> None:
+        """End what is being forwarded to other cars."""
+        await self._announcements.close()
+
+    def _id_of(self, message: Mapping[str, Any]) -> str | None:
+        id = message.get("id")
+        if isinstance(id, str) and len(id) <= 80:
+            return id
+        self._complain("A command needs an id of at most 80 characters.")
+        return None
+
+
+class PageCommands(CommandsOfPage):
+    """Of a page of one car."""
+
+    def __init__(
+        self,
+        bus: PageBus,
+        vehicle: str,
+        view: ViewSource,
+        principal: Principal,
+        limits: Limits,
+        *,
+        now: Callable[[], float],
+        wall_ms: Callable[[], int],
+        send: Callable[[messages.ToPage], None],
+        complain: Callable[[str], None],
+        people: People = NOBODY,
+    ) -> None:
+        super().__init__(bus, principal, limits, now=now, send=send, complain=complain, people=people)
+        self._vehicle = vehicle
+        self._view = view
+        self._wall_ms = wall_ms
+        self._slow_downs = Allowance(limits.slow_down, now())
+        self._opening: asyncio.Task[None] | None = None
+
     async def command(self, message: dict[str, Any]) -> None:
-        """Has the session carry out a command, and messages."""
+        """Have the session carry out a command, and reply."""
         id = self._id_of(message)
         if id is None:
             return
@@ -137,14 +178,8 @@ class PageCommands:
         cars = set(self._bus.vehicles).intersection(named) - {self._vehicle}
         self._announcements.forward(message, self._who, cars)
 
-    async def leave(self) -> None:
-        """The page is closed: it is not counted on to show alarms any more."""
-        await self._announcements.forwarded()
-        await self.present(LEAVES)
-        await self._announcements.forwarded()
-
     async def replay(self, message: Mapping[str, Any]) -> None:
-        """Has the page's own replay carry out an order, and messages."""
+        """Have the page's own replay carry out an order, and reply."""
         id = self._id_of(message)
         if id is None:
             return
@@ -193,22 +228,15 @@ class PageCommands:
             self._send(messages.replay_ended(str(why)) if id is None else messages.refusal(id, str(why)))
 
     async def close(self) -> None:
-        """Ends what is being opened, or forwarded to other cars."""
+        """End what is being opened, or forwarded to other cars."""
         if self._opening is not None:
             self._opening.cancel()
             await asyncio.gather(self._opening, return_exceptions=True)
-        await self._announcements.close()
+        await super().close()
 
     @property
     def _who(self) -> dict[str, Any]:
         return self._sender.as_json(is_replaying=self._view.is_replaying)
-
-    def _id_of(self, message: Mapping[str, Any]) -> str | None:
-        id = message.get("id")
-        if isinstance(id, str) and len(id) <= 80:
-            return id
-        self._complain("A command needs an id of at most 80 characters.")
-        return None
 
 
 LEAVES = {"kind": "present", "visible": False, "sound": "asks", "awake": "asks", "leaves": True}

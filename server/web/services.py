@@ -23,9 +23,9 @@ from server.recording.marks.pending import PendingMedia
 from server.replay.manager import ReplayManager
 from server.storage.data_folder import DataFolder
 from server.storage.storage_thread import StorageThread
+from server.vehicle.facts import problems
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle, is_name
-from server.vehicle.vitals import problems
 from server.web.hub import Hub
 from server.web.known_vehicles import OffVehicles
 from server.web.maps.layers import MapLayers

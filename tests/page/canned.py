@@ -24,8 +24,7 @@ from server.judge.settings import SettingsFile
 from server.judge.topics import candidates
 from server.recording.catalog.sketch import sketch
 from server.system.page_files import static_dir, templates_dir
-from server.vehicle.car_departure import CarDeparture
-from server.vehicle.departure_file import DepartureFile
+from server.vehicle.car_departure import CarDeparture, DepartureFile
 from server.web.assets.bundle import find
 from server.web.assets.static_files import StaticText
 from server.web.middleware.http_protocol import PageSocket

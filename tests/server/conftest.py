@@ -61,6 +61,22 @@ async def bridge() -> AsyncIterator[RosBridge]:
 
 
 @pytest.fixture
+async def other() -> AsyncIterator[RosBridge]:
+    """A second car."""
+    one = RosBridge(ros_version=1)
+    one.address = f"ws://127.0.0.1:{await one.start('127.0.0.1', 0)}"  # type: ignore[attr-defined]
+    one.advertise("/catvehicle/vel", "geometry_msgs/Twist")
+    yield one
+    await one.stop()
+
+
+def two(bridge: RosBridge, other: RosBridge) -> Config:
+    """The configuration of a server of both cars."""
+    pairs = (("ocelot", bridge), ("serval", other))
+    return Config(vehicles=tuple(Vehicle(name=name, address=one.address) for name, one in pairs))  # type: ignore[attr-defined]
+
+
+@pytest.fixture
 async def server(bridge: RosBridge) -> AsyncIterator[str]:
     """A server that watches the bridge; its http address."""
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]

@@ -17,10 +17,9 @@ from server.rosbridge.subscription import Subscription
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES, BridgeProtocol
 from server.system.clean_text import short_text
 from server.vehicle.foxglove import protocol
-from server.vehicle.foxglove.channels import MAX_OFFERED
 from server.vehicle.foxglove.delay import Delay
 from server.vehicle.foxglove.readers import ReaderTable
-from server.vehicle.foxglove.server_state import Answers, ServerState, Subscribed
+from server.vehicle.foxglove.server_state import MAX_OFFERED, Answers, ServerState, Subscribed
 
 FLUSH_S = 0.2
 

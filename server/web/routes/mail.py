@@ -11,7 +11,7 @@ from fastapi import Path as InPath
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from server.control import display_name
-from server.mail import address, header_text
+from server.mail import address, compose
 from server.mail.mail_folder import MailRefused
 from server.mail.mailer import Mailer
 from server.mail.order import Format, Letter, Order, State, TooLarge, Way
@@ -178,7 +178,7 @@ async def order(request: Request, body: Annotated[MailOrder, Body()]) -> MailOut
         to = address.parse_all(body.to)
     except address.BadAddress as why:
         raise Problem(422, str(why), field="to") from None
-    if not header_text.is_one_line(body.subject):
+    if not compose.is_one_line(body.subject):
         raise Problem(422, "A subject is one line of printable characters.", field="subject")
     if any((ord(letter) < 32 and letter not in "\t\r\n") or letter == "\x7f" for letter in body.text):
         raise Problem(422, "The message holds signs that are no text.", field="text")

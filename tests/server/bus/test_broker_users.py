@@ -22,8 +22,7 @@ from server.bus.broker_users import FleetRefused
 from server.bus.bus import NotServed
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus
-from server.bus.nats_link import BrokerLink
-from server.bus.nats_sync import processed
+from server.bus.nats_link import BrokerLink, processed
 from tests.server.bus.broker import PINNED, Broker, check_pinned, nats_server, running_broker
 from tests.server.bus.buses import local_buses, until
 from tests.server.mail.post import certificates

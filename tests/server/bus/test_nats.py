@@ -16,7 +16,7 @@ from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.bus.log_runs import Resumed
 from server.bus.nats_agent import NatsAgent
-from server.bus.nats_sync import processed
+from server.bus.nats_link import processed
 from server.web.cars_board import CarsBoard
 from server.web.fleet_log import FleetLog
 from tests.page.radio import Radio

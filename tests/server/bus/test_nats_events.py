@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from server.bus import nats_wire as wire
-from server.bus.nats_events import EventCache
+from server.bus.nats_logs import EventCache
 
 
 def events(*numbers: int) -> list[dict[str, Any]]:

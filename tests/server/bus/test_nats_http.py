@@ -16,7 +16,7 @@ from server.bus import nats_wire as wire
 from server.bus.bus import NotServed
 from server.bus.nats_http_agent import MOST_TASKS, App, HttpAgent
 from server.bus.nats_http_node import BrokeOff, HttpNode, new_id
-from server.bus.nats_sync import processed
+from server.bus.nats_link import processed
 from tests.server.bus.broker import connected, running_broker
 from tests.server.bus.buses import until
 

@@ -12,9 +12,8 @@ from nats.aio.msg import Msg
 from server.bus import nats_wire as wire
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus
-from server.bus.nats_liveness import GONE_AFTER_S
 from server.bus.nats_pulls import MOST, Pulls
-from server.bus.nats_questions import Questions
+from server.bus.nats_questions import GONE_AFTER_S, Questions
 from tests.server.bus.buses import Clock, local_buses, until
 
 

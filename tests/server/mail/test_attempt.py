@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from server.mail import retry_backoff
-from server.mail.attempt import answered, troubled
+from server.mail import sender
 from server.mail.order import Mail, Recipient
-from server.mail.replies import Trouble, clean
+from server.mail.sender import answered, troubled
 from server.mail.smtp_connection import Reply
+from server.mail.smtp_dial import Trouble, clean
 from tests.server.mail.mailing import START_MS as T
 
 OK, LATER, NEVER = (
@@ -91,7 +91,7 @@ CASES: dict[str, tuple[tuple[Recipient, ...], dict[str, Reply], Reply | None, st
 @pytest.mark.parametrize("name", CASES)
 def test_what_the_answers_come_to(name: str) -> None:
     recipients, answers, of_mail, state, detail, states = CASES[name]
-    outcome = answered(mail(*recipients), answers, of_mail, T, retry_backoff.pause_s)
+    outcome = answered(mail(*recipients), answers, of_mail, T, sender.pause_s)
     assert (outcome.state, outcome.detail) == (state, detail)
     assert " ".join(one.state for one in outcome.recipients) == states
     assert (outcome.next_ms == T + 10_000) is (state == "queued")
@@ -107,27 +107,23 @@ def test_what_the_answers_come_to(name: str) -> None:
     ],
 )
 def test_the_outcome_of_a_failure(facts: dict[str, Any], is_doubtful: bool, state: str, detail: str) -> None:
-    outcome = troubled(
-        mail(ANN), Trouble("gone", **facts), is_doubtful=is_doubtful, now_ms=T, pause_s=retry_backoff.pause_s
-    )
+    outcome = troubled(mail(ANN), Trouble("gone", **facts), is_doubtful=is_doubtful, now_ms=T, pause_s=sender.pause_s)
     assert (outcome.state, outcome.detail) == (state, detail)
     assert outcome.of_account is bool(facts.get("is_of_account"))
     assert outcome.recipients == (ANN,)
 
 
 def test_pauses_grow_to_an_hour_and_end_after_three_days() -> None:
-    all_s = [retry_backoff.pause_s(attempt) for attempt in range(1, retry_backoff.MAX_ATTEMPTS)]
+    all_s = [sender.pause_s(attempt) for attempt in range(1, sender.MAX_ATTEMPTS)]
     assert all_s == sorted(all_s)
     assert all_s[0] == 10
-    assert max(all_s) == retry_backoff.LONGEST_S == 3600
+    assert max(all_s) == sender.LONGEST_S == 3600
     assert 3.0 <= sum(all_s) / 86_400 <= 3.2
 
 
-@pytest.mark.parametrize(
-    ("attempts", "state"), [(retry_backoff.MAX_ATTEMPTS - 1, "queued"), (retry_backoff.MAX_ATTEMPTS, "failed")]
-)
+@pytest.mark.parametrize(("attempts", "state"), [(sender.MAX_ATTEMPTS - 1, "queued"), (sender.MAX_ATTEMPTS, "failed")])
 def test_a_mail_fails_after_the_last_attempt_with_a_reason(attempts: int, state: str) -> None:
-    outcome = answered(mail(ANN, attempts=attempts), {"ann@x": LATER}, None, T, retry_backoff.pause_s)
+    outcome = answered(mail(ANN, attempts=attempts), {"ann@x": LATER}, None, T, sender.pause_s)
     assert outcome.state == state
     assert outcome.detail == (
         "450 greylisted" if state == "queued" else f"Given up after {attempts} attempts: 450 greylisted"

@@ -17,13 +17,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.mail import address, compose, header_text
+from server.mail import address, compose
 from server.mail.compose import Attachment, Draft, Stopped
 from tests.server.mail.mailing import START_MS
 from tests.server.mail.post import read
 
 ANN, JORG = address.parse("ann@example.org"), address.parse("jörg@bücher.example")
-LINE = st.text(st.characters(exclude_categories=("Cc", "Cs", "Zl", "Zp")), max_size=120).filter(header_text.is_one_line)
+LINE = st.text(st.characters(exclude_categories=("Cc", "Cs", "Zl", "Zp")), max_size=120).filter(compose.is_one_line)
 
 HEADERS = ["Date", "From", "To", "Message-ID", "Subject", "Content-Type", "Content-Transfer-Encoding", "MIME-Version"]
 
@@ -125,7 +125,7 @@ def test_encoded_words_and_blanks_between_them_are_kept(text: str) -> None:
 )
 @pytest.mark.parametrize("field", ["subject", "sender_name", "message_id"])
 def test_no_line_break_gets_into_a_head(tmp_path: Path, text: str, field: str) -> None:
-    assert not header_text.is_one_line(text)
+    assert not compose.is_one_line(text)
     with pytest.raises(ValueError, match="line"):
         written(tmp_path, **{field: text})
 
@@ -135,7 +135,7 @@ def test_no_line_break_gets_into_a_head(tmp_path: Path, text: str, field: str) -
 )
 def test_no_name_of_a_file_breaks_out(name: str) -> None:
     with pytest.raises(ValueError, match="no name"):
-        header_text.file_name(name)
+        compose.file_name(name)
 
 
 @settings(deadline=None)  # beside other work a machine stops for longer than any limit

@@ -14,10 +14,9 @@ from pathlib import Path
 import psutil
 import pytest
 
-from server.mail import retry_backoff
+from server.mail import sender
 from server.mail.mail_folder import MailRefused
-from server.mail.retry_backoff import pause_s
-from server.mail.sender import Sender
+from server.mail.sender import Sender, pause_s
 from server.mail.settings import BadMailSetting, MailSettingsFile
 from server.recording.export import Made
 from server.recording.mcap.chain import read_head
@@ -557,7 +556,7 @@ async def test_one_server_sends_from_a_folder(tmp_path: Path, shelf: Shelf) -> N
 async def test_a_disk_that_takes_nothing_is_told_and_what_was_sent_is_not_sent_again(
     tmp_path: Path, shelf: Shelf, post: Post, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(retry_backoff, "AGAIN_S", 0.05)
+    monkeypatch.setattr(sender, "AGAIN_S", 0.05)
     async with mailing(tmp_path / "mail", shelf) as mailer:
         await mailer.change(settings(post.port))
         outbox = mailer._folder._outbox
@@ -587,7 +586,7 @@ async def test_a_disk_that_takes_nothing_is_told_and_what_was_sent_is_not_sent_a
 async def test_a_task_that_fails_is_begun_again(
     tmp_path: Path, shelf: Shelf, post: Post, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(retry_backoff, "AGAIN_S", 0.01)
+    monkeypatch.setattr(sender, "AGAIN_S", 0.01)
     failures = iter([RuntimeError("a fault"), RuntimeError("another")])
     whole = Sender._send
 
@@ -606,7 +605,7 @@ async def test_a_task_that_fails_is_begun_again(
 async def test_a_mail_whose_sending_broke_in_the_midst_is_sent_all_the_same(
     tmp_path: Path, shelf: Shelf, post: Post, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(retry_backoff, "AGAIN_S", 0.01)
+    monkeypatch.setattr(sender, "AGAIN_S", 0.01)
     faults = iter([RuntimeError("a fault")])
     whole = Sender._finish
 

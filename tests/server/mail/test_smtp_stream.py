@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from server.mail.smtp_stream import opened
+from server.mail.smtp_connection import opened
 
 
 async def test_a_file_that_is_being_opened_when_its_mail_is_cancelled_is_closed(tmp_path: Path) -> None:

@@ -16,9 +16,9 @@ from server.app.app import create_app
 from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.system.supervision import Supervisor
+from server.vehicle.facts import Vitals, problems
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
-from server.vehicle.vitals import Vitals, problems
 from tests.http import http_client
 from tests.server.cars import driving
 from tests.server.conftest import serving_app

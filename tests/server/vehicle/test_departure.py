@@ -19,8 +19,7 @@ from server.protocol.drive_commands import SetDepartureList
 from server.recording.standing import EarlyEntries
 from server.storage.storage_thread import StorageThread
 from server.vehicle import restore
-from server.vehicle.car_departure import WITHOUT, CarDeparture
-from server.vehicle.departure_file import DepartureFile
+from server.vehicle.car_departure import WITHOUT, CarDeparture, DepartureFile
 from tests.server.vehicle.attended import ANN, BEN, Attended
 
 AK = {"person": {"name": "A. K.", "role": "safety_driver", "device": "dev-a"}}

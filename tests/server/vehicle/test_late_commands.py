@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from server.vehicle.late_commands import OF_NODES, LateCommands
+from server.vehicle.outcomes import OF_NODES, LateCommands
 
 WHY = "it came through a web node 1.2 s after its deadline."
 Event = tuple[str, str, str | None]

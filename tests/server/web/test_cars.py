@@ -14,33 +14,16 @@ import pytest
 import websockets
 
 from server.app.app import create_app
-from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.system.log_context import with_context
 from server.vehicle.command_handler import CommandHandler
-from server.vehicle.vehicle import Vehicle
 from tests.http import http_client
 from tests.server.cars import driving, twist
-from tests.server.conftest import serving, serving_app
+from tests.server.conftest import serving, serving_app, two
 from tests.server.slowdown.conftest import simulated, watching
 from tests.server.viewer import Viewer, viewer
 
 pytestmark = pytest.mark.virtual_time
-
-
-@pytest.fixture
-async def other() -> AsyncIterator[RosBridge]:
-    """A second car."""
-    one = RosBridge(ros_version=1)
-    one.address = f"ws://127.0.0.1:{await one.start('127.0.0.1', 0)}"  # type: ignore[attr-defined]
-    one.advertise("/catvehicle/vel", "geometry_msgs/Twist")
-    yield one
-    await one.stop()
-
-
-def two(bridge: RosBridge, other: RosBridge) -> Config:
-    pairs = (("ocelot", bridge), ("serval", other))
-    return Config(vehicles=tuple(Vehicle(name=name, address=one.address) for name, one in pairs))  # type: ignore[attr-defined]
 
 
 def cars(one: Viewer) -> list[dict[str, Any]]:

@@ -13,14 +13,12 @@ import pytest
 import websockets
 
 from server.app.app import create_app
-from server.app.config import Config
 from server.protocol.commands import BY_KIND
 from server.rosbridge_server.server import RosBridge
-from server.vehicle.vehicle import Vehicle
 from tests.http import http_client
 from tests.server.access.pairs import OPERATOR_KEY, VIEWER_KEY, keyed, paired_server
 from tests.server.cars import driving
-from tests.server.conftest import serving, serving_app
+from tests.server.conftest import serving, serving_app, two
 from tests.server.viewer import Viewer, viewer
 from tests.server.web.test_cars import cars, named, speeding
 
@@ -29,21 +27,6 @@ pytestmark = pytest.mark.virtual_time
 SEEN = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready"}
 ITEM = ("take_item", "release_item", "offer_item", "answer_item", "withdraw_item")
 MORE: dict[str, dict[str, Any]] = {"offer_item": {"to": "page-ben"}, "answer_item": {"accept": True}}
-
-
-@pytest.fixture
-async def other() -> AsyncIterator[RosBridge]:
-    """A second car."""
-    one = RosBridge(ros_version=1)
-    one.address = f"ws://127.0.0.1:{await one.start('127.0.0.1', 0)}"  # type: ignore[attr-defined]
-    one.advertise("/catvehicle/vel", "geometry_msgs/Twist")
-    yield one
-    await one.stop()
-
-
-def two(bridge: RosBridge, other: RosBridge) -> Config:
-    pairs = (("ocelot", bridge), ("serval", other))
-    return Config(vehicles=tuple(Vehicle(name=name, address=one.address) for name, one in pairs))  # type: ignore[attr-defined]
 
 
 @contextlib.asynccontextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -21,6 +21,22 @@ from server.web.page_commands import PageCommands
 pytestmark = pytest.mark.virtual_time
 
 
+def page_of(
+    bus: LocalBus,
+    *,
+    is_fleet: bool = False,
+    send: Callable[[Any], None] = lambda _: None,
+    complain: Callable[[str], None] = print,
+) -> PageCommands | FleetCommands:
+    """The commands of a page of the car ocelot, or of a page of all cars."""
+    if is_fleet:
+        return FleetCommands(bus, LOCAL, Limits(), now=lambda: 0.0, send=send, complain=complain)
+    view = cast(ViewSource, SimpleNamespace(is_replaying=False))
+    return PageCommands(
+        bus, "ocelot", view, LOCAL, Limits(), now=lambda: 0.0, wall_ms=lambda: 0, send=send, complain=complain
+    )
+
+
 async def test_another_car_that_is_lost_does_not_hold_up_the_page() -> None:
     requested = asyncio.Event()
 
@@ -35,10 +51,7 @@ async def test_another_car_that_is_lost_does_not_hold_up_the_page() -> None:
     bus = LocalBus(Journal(None), now=lambda: 0.0)
     bus.serve("ocelot", own)
     bus.serve("serval", lost)
-    view = cast(ViewSource, SimpleNamespace(is_replaying=False))
-    page = PageCommands(
-        bus, "ocelot", view, LOCAL, Limits(), now=lambda: 0.0, wall_ms=lambda: 0, send=lambda _: None, complain=print
-    )
+    page = page_of(bus)
     page.begin({"kind": "hello"})
     async with asyncio.timeout(0.5):
         for _ in range(3):
@@ -59,18 +72,7 @@ async def test_other_cars_are_announced_while_the_own_one_is_not_served() -> Non
     bus = LocalBus(Journal(None), now=lambda: 0.0)
     bus.serve("serval", serval)
     complaints: list[str] = []
-    view = cast(ViewSource, SimpleNamespace(is_replaying=False))
-    page = PageCommands(
-        bus,
-        "ocelot",
-        view,
-        LOCAL,
-        Limits(),
-        now=lambda: 0.0,
-        wall_ms=lambda: 0,
-        send=lambda _: None,
-        complain=complaints.append,
-    )
+    page = page_of(bus, complain=complaints.append)
     page.begin({"kind": "hello"})
     await page.present(
         {"kind": "present", "visible": True, "sound": "ready", "awake": "ready", "announces": ["serval"]}
@@ -89,7 +91,7 @@ async def test_a_page_of_all_cars_is_not_counted_on_before_its_hello() -> None:
 
     bus = LocalBus(Journal(None), now=lambda: 0.0)
     bus.serve("ocelot", car)
-    page = FleetCommands(bus, LOCAL, Limits(), now=lambda: 0.0, send=lambda _: None, complain=print)
+    page = page_of(bus, is_fleet=True)
     present = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready"}
     await page.present(present)
     page.begin({"kind": "hello", "page": "page-ann"})
@@ -118,17 +120,6 @@ async def test_before_its_hello_no_command_of_a_page_is_carried_out_and_no_outco
     bus.serve("ocelot", car)
     replies: list[dict[str, Any]] = []
 
-    def page() -> PageCommands | FleetCommands:
-        def send(message: object) -> None:
-            replies.append(cast(dict[str, Any], message))
-
-        if is_fleet:
-            return FleetCommands(bus, LOCAL, Limits(), now=lambda: 0.0, send=send, complain=print)
-        view = cast(ViewSource, SimpleNamespace(is_replaying=False))
-        return PageCommands(
-            bus, "ocelot", view, LOCAL, Limits(), now=lambda: 0.0, wall_ms=lambda: 0, send=send, complain=print
-        )
-
     hello = {"kind": "hello", "page": "page-ann"}
     acknowledge = {"kind": "acknowledge", "vehicle": "ocelot", "alarm": "speed_limit", "occurrence": 1}
     query = {"kind": "outcome", "id": "a-1?", "of": "a-1", "ago_s": 1.0, "vehicle": "ocelot"}
@@ -137,7 +128,7 @@ async def test_before_its_hello_no_command_of_a_page_is_carried_out_and_no_outco
         await to.command(message)
         return next(one for one in reversed(replies) if one.get("id") == message["id"])
 
-    before, after = page(), page()
+    before, after = (page_of(bus, is_fleet=is_fleet, send=replies.append) for _ in range(2))
     before.begin(hello)
     assert (await answer(before, {**acknowledge, "id": "a-1"}))["ok"] is True
     reply = await answer(after, query)
@@ -147,3 +138,24 @@ async def test_before_its_hello_no_command_of_a_page_is_carried_out_and_no_outco
     assert (await answer(after, query))["became"] == "done"
     assert (await answer(after, {**acknowledge, "id": "a-3"}))["ok"] is True
     assert done == ["a-1", "a-3"]
+
+
+@pytest.mark.parametrize("is_fleet", [False, True])
+async def test_a_command_needs_an_id_that_fits_into_its_reply(is_fleet: bool) -> None:
+    reached: list[object] = []
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        reached.append(command["id"])
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=lambda: 0.0)
+    bus.serve("ocelot", car)
+    complaints: list[str] = []
+    page = page_of(bus, is_fleet=is_fleet, complain=complaints.append)
+    page.begin({"kind": "hello"})
+    for id in (None, 7, "x" * 81, "x" * 80):
+        await page.command(
+            {"kind": "acknowledge", "vehicle": "ocelot", "alarm": "speed_limit", "occurrence": 1, "id": id}
+        )
+    assert reached == ["x" * 80]
+    assert complaints == ["A command needs an id of at most 80 characters."] * 3

@@ -12,7 +12,7 @@ from typing import Any, cast
 import pytest
 
 from monitor.values import Twist
-from server.analysis.drive.report_view import report_json
+from server.analysis.drive.drive_report import report_json
 from server.analysis.drive.sheet import _blind, _blind_head
 from server.analysis.drive.tables import report_rows
 from server.recording.catalog import annotations

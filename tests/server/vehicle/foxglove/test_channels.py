@@ -10,10 +10,9 @@ import pytest
 
 from server.rosbridge.live_source import CallFailed
 from server.vehicle import discovery
-from server.vehicle.foxglove import channels
-from server.vehicle.foxglove.channels import UNKNOWN_NODE, Offered
+from server.vehicle.foxglove import server_state
 from server.vehicle.foxglove.protocol import Channel, GraphUpdate
-from server.vehicle.foxglove.server_state import Subscribed
+from server.vehicle.foxglove.server_state import UNKNOWN_NODE, Offered, Subscribed
 
 ODOM = Channel(id=1, topic="/odom", encoding="cdr", type="nav_msgs/msg/Odometry", schema="…", schema_encoding="ros2msg")
 TEXT = Channel(
@@ -82,7 +81,7 @@ def test_a_command_topic_that_only_we_made_has_no_known_publisher() -> None:
 
 
 def test_a_table_that_is_full_takes_changes_and_shows_that_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(channels, "MAX_OFFERED", 2)
+    monkeypatch.setattr(server_state, "MAX_OFFERED", 2)
     found = offered(ODOM, TEXT)
     assert not found.is_full
     newer = replace(ODOM, type="nav_msgs/Odometry", encoding="ros1")

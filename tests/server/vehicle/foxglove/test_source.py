@@ -14,7 +14,7 @@ from websockets.asyncio.server import ServerConnection, serve
 
 from server.rosbridge.link_listener import NOTE
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES
-from server.vehicle.foxglove import channels, protocol
+from server.vehicle.foxglove import protocol, server_state
 from tests.server.link_listener import LinkListener, until
 from tests.server.vehicle.foxglove.test_server import linked
 
@@ -147,7 +147,7 @@ async def test_of_a_topic_with_two_types_only_the_newest_one_is_given() -> None:
     assert server.all("subscribe")[2]["subscriptions"] == [{"id": 3, "channelId": 1}]
 
 
-@pytest.mark.parametrize("limit", [(channels, "MAX_OFFERED"), (protocol, "MAX_CHANNELS")])
+@pytest.mark.parametrize("limit", [(server_state, "MAX_OFFERED"), (protocol, "MAX_CHANNELS")])
 async def test_channels_beyond_the_limit_are_reported(monkeypatch: pytest.MonkeyPatch, limit: tuple[Any, str]) -> None:
     monkeypatch.setattr(*limit, 2)
     listener = LinkListener()
