@@ -234,6 +234,7 @@ async def test_a_sheet_leaves_a_docked_alarm_free_though_the_look_of_drawers_fai
     menu = page.locator("#sheet-menu")
     for _ in range(2):
         before = len(requests)
+        await expect(page.locator("link[href$='drawers.css']")).to_have_count(0)  # none is under way
         await click(page, SHEETS["sheet-menu"])
         await expect(menu).to_be_visible()
         box, pane = await menu.bounding_box(), await page.locator(".alarms-pane").bounding_box()
