@@ -113,6 +113,15 @@ async def test_nor_beside_a_critical_alarm(phone: Phone, canned: Canned, tab: st
     await nothing_lies_over_another(phone, canned, SIZES[1::3], tab, is_critical=True)
 
 
+async def test_no_edge_of_the_slide_looks_out_beside_a_critical_alarm(phone: Phone, canned: Canned) -> None:
+    page = await opened(phone, canned)
+    canned.state["alarms"] = [critical()]
+    await expect(page.locator("#sheet-alarm")).to_be_visible()
+    await page.set_viewport_size({"width": 412, "height": 360})
+    await expect(page.locator("#monitor > .rail > .slide")).to_be_hidden()
+    await expect(page.locator("#sheet-alarm .slide")).to_be_visible()
+
+
 async def click(page: Page, selector: str) -> None:
     await page.evaluate("selector => document.querySelector(selector).click()", selector)
 
