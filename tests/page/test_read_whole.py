@@ -306,6 +306,7 @@ async def test_texts_of_pedals_without_a_value_stand_apart(phone: Phone, canned:
     canned.state = idle("monitoring")
     await phone.open(f"{canned.address}/#home")
     await expect(phone.page.locator(".pedals .v").first).to_have_text("not published")
+    await phone.page.evaluate("document.documentElement.style.setProperty('--words', 'Roboto, \"Liberation Sans\"')")
     for width, height in ((320, 640), (360, 740), (412, 915), (820, 1180), (1440, 900), (1920, 1080)):
         await phone.page.set_viewport_size({"width": width, "height": height})
         await phone.page.evaluate(DRAWN)
