@@ -273,7 +273,7 @@ test('the number of a ring stands in the first place without a return and withou
 });
 
 test('the number of a ring stands inside of the plot and beneath the caption at its top', () => {
-  assert.deepEqual([[150, 100], [150, 30], [8, 100], [292, 100]].map((place) => isInView(place, 300)), [true, false, false, false]);
+  assert.deepEqual([[150, 100], [150, 25], [8, 100], [292, 100]].map((place) => isInView(place, 300)), [true, false, false, false]);
 });
 
 test('the distance beside the ring of the nearest object stands whole on the plot, above or below the ring where neither side has room', () => {

@@ -113,7 +113,7 @@ async def test_nor_beside_a_critical_alarm(phone: Phone, canned: Canned, tab: st
     await nothing_lies_over_another(phone, canned, SIZES[1::3], tab, is_critical=True)
 
 
-async def test_no_edge_of_the_slide_looks_out_beside_a_critical_alarm(phone: Phone, canned: Canned) -> None:
+async def test_no_edge_of_the_slide_is_left_beside_a_critical_alarm(phone: Phone, canned: Canned) -> None:
     page = await opened(phone, canned)
     canned.state["alarms"] = [critical()]
     await expect(page.locator("#sheet-alarm")).to_be_visible()

@@ -9,8 +9,8 @@ const NAMED_RAD = (6 * Math.PI) / 180;
 export const REACH_M = { least: 4, most: 120, first: 20 };
 /** One press of + or −. */
 const ZOOM_STEP = Math.SQRT2;
-/** Height of the caption "Steering unknown" and half of a number beneath it. */
-const CAPTION_PX = 36;
+/** A number whose middle is higher is covered by the caption "Steering unknown" of a wide screen. */
+const CAPTION_PX = 28;
 /** Farther behind the nose than this a return is below the plot [m]. */
 const BEHIND_M = 0.5;
 /** Above this many beams, a return whose square of 5 px would cover its neighbour's but for this is not drawn again [px]. */
