@@ -190,6 +190,7 @@ class Recording(TypedDict):
     weather: Annotated[str, doc('for the report of the drive; "": nobody entered it')]
     tags: list[str]
     marks: Annotated[int, doc("how many; a search covers their texts")]
+    matched: NotRequired[Annotated[DriveMark, doc("of a search by text: the first mark whose text or category has it")]]
     late: NotRequired[
         Annotated[str, doc("another value: other marks or descriptions came after it was complete; left out: none did")]
     ]

@@ -380,11 +380,16 @@ class Canned:
             return {"number": 1, "points": [row for row in track() if row[0] > after]}
 
         @self.app.get("/api/recordings")
-        async def recordings() -> Json:
+        async def recordings(text: str = "") -> Json:
             kept = {"count": 27, "bytes": 1_900_000_000}
             more = {"trash": {"count": 2, "bytes": 81_000_000}, "free_bytes": 41_000_000_000, "waiting": 0}
             names = {"vehicles": ["car"], "tags": ["wet"], "formats": listed_formats()}
-            return {"recordings": drives(), "next": None, "found": kept, "all": kept} | more | names
+            rows = drives()
+            if text:  # each is found by a mark of it
+                words = "Steering hunts at the stop line, twice in a row, and the car then creeps."
+                mark = {"mark": "m1", "marked_ms": 0, "at_s": 246.2, "category": text, "words": words}
+                rows = [row | {"matched": mark} for row in rows]
+            return {"recordings": rows, "next": None, "found": kept, "all": kept} | more | names
 
         @self.app.get("/api/recordings/{name}")
         async def recording(name: str) -> Json:

@@ -162,5 +162,6 @@ test('the tag of the cursor stands beside it where it would cover the mark of an
   assert.equal(tagAt(200, [120], sizes), 158, 'a mark far away');
   assert.equal(tagAt(200, [200], sizes), 212, 'at the right of the mark beneath the cursor');
   assert.equal(tagAt(200, [200, 240], sizes), 104, 'else at its left');
+  assert.equal(tagAt(200, [147, 208], sizes), 220, 'and where both are taken, behind the mark that is nearer');
   assert.equal(tagAt(400, [400], sizes), 304, 'inside of the chart');
 });

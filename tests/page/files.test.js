@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import {
-  alarmWords, byUrgency, choiceOf, countsOf, distanceWords, factWords, lengthWords, liveOf, nameOf, originWords, pointsOf, queryOf, sizeWords, storedWords, tagsOf, warningWords, whenWords, whyNotAsItIs,
+  alarmWords, byUrgency, choiceOf, countsOf, distanceWords, factWords, lengthWords, liveOf, matchWords, nameOf, originWords, pointsOf, queryOf, sizeWords, storedWords, tagsOf, warningWords, whenWords, whyNotAsItIs,
 } from '../../static/js/files/files-layout.js';
 import { listingOf, storedQueryOf } from '../../static/js/files/stored-list.js';
 
@@ -33,6 +33,13 @@ test('sizes have three figures at most and a unit that fits', () => {
   for (const [bytes, text] of cases) assert.equal(sizeWords(bytes), text);
 });
 
+test('a row that a search found by a mark names the mark', () => {
+  const mark = { mark: 'm1', marked_ms: NOW - 3_300_000, category: 'control', words: 'twice', voice: false, photo: false, source: 'page', by: null };
+  assert.equal(matchWords(row({ matched: { ...mark, at_s: 246.2 } })), 'Mark at 04:06: control · twice');
+  assert.equal(matchWords(row({ matched: { ...mark, category: null } })), 'Mark at 05:00: twice', 'one that came later has the time of its moment');
+  assert.equal(matchWords(row()), '');
+});
+
 test('lengths and distances', () => {
   assert.equal(lengthWords(252), '04:12 min');
   assert.equal(lengthWords(3725), '1:02:05 h');
@@ -54,7 +61,7 @@ test('what a recording is called, and what stands beneath', () => {
   assert.equal(nameOf(row(), NOW), 'Today 14:00');
   assert.equal(originWords(row(), NOW), 'car');
   assert.equal(nameOf(row({ title: 'Wet lot' }), NOW), 'Wet lot');
-  assert.equal(originWords(row({ title: 'Wet lot', part: 2, ended: 'recovered', is_clip: true }), NOW), 'Today 14:00 · car · clip · part 2 · recovered');
+  assert.equal(originWords(row({ title: 'Wet lot', part: 2, ended: 'recovered', is_clip: true }), NOW), 'car · clip · part 2 · recovered');
   assert.equal(originWords(row({ format: 'bag', vehicle: '', damage: ['x'] }), NOW), 'ROS 1 bag · damaged');
   assert.equal(originWords(row({ unread: ['x'] }), NOW), 'car', 'what cannot be decoded is not damaged');
   assert.equal(originWords(row({ trashed_ms: NOW - 60_000 }), NOW), 'car · deleted Today 14:59');

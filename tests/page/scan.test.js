@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { INVALID, NO_RETURN, NOTHING_IN_RANGE, TOO_CLOSE, readScan } from '../../static/js/scan/scan-frame.js';
-import { NOT_IN_VIEW, beamWords, behind, clearOf, clearPlace, coversAny, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringWords, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
+import { NOT_IN_VIEW, beamWords, behind, clearOf, clearPlace, coversAny, isInView, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringWords, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
 import { edgesOf, endOf } from '../../static/js/scan/scan-corridor.js';
 import { beside, follow, nearestShown, nearestTo } from '../../static/js/scan/scan-pick.js';
 import { ScanMark } from '../../static/js/scan/scan-mark.js';
@@ -270,6 +270,10 @@ test('the number of a ring stands in the first place without a return and withou
   assert.deepEqual(clearPlace([first, second], [], [10, 9], scale), { index: 1, box: second }); // a return at 110, 200
   assert.deepEqual(clearPlace([first, second], [second], [10, 9], scale), { index: 1, box: { ...second, top: 170 } });
   assert.deepEqual(clearPlace([first], [], [10, 9], scale), { index: -1, box: null });
+});
+
+test('the number of a ring stands inside of the plot and beneath the caption at its top', () => {
+  assert.deepEqual([[150, 100], [150, 25], [8, 100], [292, 100]].map((place) => isInView(place, 300)), [true, false, false, false]);
 });
 
 test('the distance beside the ring of the nearest object stands whole on the plot, above or below the ring where neither side has room', () => {

@@ -30,7 +30,7 @@ PHONE: dict[str, Any] = {
     "is_mobile": True,
     "reduced_motion": "reduce",  # so that nothing stands half-way
 }
-SIZES = ((320, 640), (915, 412), (1180, 820))
+SIZES = ((320, 640), (360, 740), (412, 915), (915, 412), (820, 1180), (1180, 820), (1440, 900), (1920, 1080))
 # The pictures of the drawing: which scene, in a window of which size, in which theme.
 WATCH: dict[str, tuple[str, int, int, str]] = {
     "watch-desk": ("home", 1440, 900, "dark"),
@@ -107,6 +107,14 @@ def at(clock: str) -> int:
     return int(
         datetime.now().astimezone().replace(hour=hour, minute=minute, second=second, microsecond=0).timestamp() * 1000
     )
+
+
+async def front(page: Page, tab: str) -> None:
+    """Brings a tab to the front; on a wide screen the map and the scan are panes, which are in sight already."""
+    key = page.locator(f"#monitor [data-tab={tab}]")
+    await key.wait_for(state="attached")
+    if await key.is_visible():
+        await key.tap()
 
 
 @scene("home")
@@ -382,8 +390,7 @@ async def planned_stop_no_data(server: Canned, page: Page) -> None:
 @scene("scan")
 async def scan(server: Canned, page: Page) -> None:
     server.state = live()
-    await page.wait_for_selector("[data-tab=scan]:visible")
-    await page.tap("[data-tab=scan]")
+    await front(page, "scan")
 
 
 @scene("question")
@@ -420,7 +427,7 @@ async def signals(server: Canned, page: Page) -> None:
     state["alarms"] = [alarm("signal_stale", "Diagnostics stale", state="ACKED")]
     server.state = state
     await page.tap("#monitor [data-f=menu]")
-    await page.tap("[data-screen=signals]")
+    await page.tap("#sheet-menu [data-screen=signals]")
 
 
 @scene("alarm-log")
@@ -446,7 +453,7 @@ async def alarm_log(server: Canned, page: Page) -> None:
         for i, (clock, change, priority, title, text, by) in enumerate(rows)
     ]  # fmt: skip
     await page.tap("#monitor [data-f=menu]")
-    await page.tap("[data-screen=log]")
+    await page.tap("#sheet-menu [data-screen=log]")
     await page.tap("text=Older")
     await page.evaluate("document.querySelector('.screen').scrollTo(0, 9999)")
 
@@ -757,7 +764,7 @@ async def stop(server: Canned, page: Page) -> None:
 @scene("map")
 async def map_(server: Canned, page: Page) -> None:
     server.state = live()
-    await page.tap("[data-tab=map]")
+    await front(page, "map")
     await page.wait_for_timeout(1500)  # the track is requested once a second
 
 
@@ -814,7 +821,7 @@ async def map_none(server: Canned, page: Page) -> None:
     state["phone"], state["session"]["track"] = None, {"number": 1, "last": 0}
     state["checks"][5] |= {"verdict": "unknown", "brief": "not checked: no phone"}
     server.state = state
-    await page.tap("[data-tab=map]")
+    await front(page, "map")
 
 
 @scene("files")

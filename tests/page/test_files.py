@@ -385,6 +385,23 @@ async def test_the_sheet_of_a_file_is_within_every_screen(phone: Phone, canned: 
         assert round(item["height"], 2) >= 56, (width, height)
 
 
+async def test_a_row_found_by_a_mark_names_the_mark(phone: Phone, canned: Canned) -> None:
+    await phone.open(f"{canned.address}/#files")
+    await phone.live()
+    await expect(phone.page.locator("#panel-files .matched")).to_have_count(0)
+    await phone.page.get_by_label("Search recordings").fill("control")
+    found = row(phone, "car_0").locator(".matched")
+    await expect(found).to_have_text(re.compile("^Mark at 04:06: control · Steering hunts"))
+    for width, height in ((360, 740), (1440, 900)):
+        await phone.page.set_viewport_size({"width": width, "height": height})
+        await phone.page.evaluate(DRAWN)
+        box, item = await found.bounding_box(), await row(phone, "car_0").bounding_box()
+        assert box is not None
+        assert item is not None
+        assert box["width"] > 0.5 * item["width"], width
+        assert item["y"] <= box["y"] <= item["y"] + item["height"] - box["height"], width
+
+
 async def test_saved_data_is_there_without_a_car(phone: Phone, tmp_path: Path) -> None:
     record(tmp_path / "recordings" / "car" / f"{name_of(0)}.mcap", seconds=8.0)
     async with running(*server(tmp_path)) as idle:

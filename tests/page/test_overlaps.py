@@ -113,6 +113,15 @@ async def test_nor_beside_a_critical_alarm(phone: Phone, canned: Canned, tab: st
     await nothing_lies_over_another(phone, canned, SIZES[1::3], tab, is_critical=True)
 
 
+async def test_no_edge_of_the_slide_is_left_beside_a_critical_alarm(phone: Phone, canned: Canned) -> None:
+    page = await opened(phone, canned)
+    canned.state["alarms"] = [critical()]
+    await expect(page.locator("#sheet-alarm")).to_be_visible()
+    await page.set_viewport_size({"width": 412, "height": 360})
+    await expect(page.locator("#monitor > .rail > .slide")).to_be_hidden()
+    await expect(page.locator("#sheet-alarm .slide")).to_be_visible()
+
+
 async def click(page: Page, selector: str) -> None:
     await page.evaluate("selector => document.querySelector(selector).click()", selector)
 
@@ -234,6 +243,7 @@ async def test_a_sheet_leaves_a_docked_alarm_free_though_the_look_of_drawers_fai
     menu = page.locator("#sheet-menu")
     for _ in range(2):
         before = len(requests)
+        await expect(page.locator("link[href$='drawers.css']")).to_have_count(0)  # none is under way
         await click(page, SHEETS["sheet-menu"])
         await expect(menu).to_be_visible()
         box, pane = await menu.bounding_box(), await page.locator(".alarms-pane").bounding_box()

@@ -8,7 +8,7 @@ import pytest
 from playwright.async_api import expect
 
 from monitor.catalog import CHECKS
-from tests.page.canned import Canned, Json, alarm, live
+from tests.page.canned import Canned, Json, alarm, idle, live
 from tests.page.conftest import Phone
 from tests.page.screenshots import several, silent_car
 
@@ -288,6 +288,39 @@ async def test_stale_is_read_whole_on_a_small_phone(phone: Phone, canned: Canned
         top, foot = await page.evaluate(PLATE)
         assert top <= 0, (width, height)
         assert foot <= 1 or height < 600, (width, height)
+
+
+#: How far the texts of the pedals and of the steering stand from each other [px].
+APART = """() => {
+  const boxes = [...document.querySelectorAll('.pedals .v')].map((one) => {
+    const range = document.createRange();
+    range.selectNodeContents(one);
+    return range.getBoundingClientRect();
+  });
+  return boxes.slice(1).map(({ left }, i) => left - boxes[i].right);
+}"""
+
+
+@pytest.mark.gate
+async def test_texts_of_pedals_without_a_value_stand_apart(phone: Phone, canned: Canned) -> None:
+    canned.state = idle("monitoring")
+    await phone.open(f"{canned.address}/#home")
+    await expect(phone.page.locator(".pedals .v").first).to_have_text("not published")
+    await phone.page.evaluate("document.documentElement.style.setProperty('--words', 'Roboto, \"Liberation Sans\"')")
+    for width, height in ((320, 640), (360, 740), (412, 915), (820, 1180), (1440, 900), (1920, 1080)):
+        await phone.page.set_viewport_size({"width": width, "height": height})
+        await phone.page.evaluate(DRAWN)
+        assert min(await phone.page.evaluate(APART)) > 7, width
+
+
+async def test_without_a_scan_no_key_lies_over_the_reason(phone: Phone, canned: Canned) -> None:
+    canned.state = idle("monitoring")
+    await phone.page.set_viewport_size({"width": 820, "height": 1180})
+    await phone.open(f"{canned.address}/#home")
+    await expect(phone.page.locator("#panel-scan .scan-none")).to_contain_text("not published")
+    await expect(phone.page.locator("#panel-scan .zoom")).to_be_hidden()
+    canned.state = live()
+    await expect(phone.page.locator("#panel-scan .zoom")).to_be_visible()
 
 
 #: Keys and fields that reach out of the window, or that show less than all of their text.

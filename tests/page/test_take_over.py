@@ -14,8 +14,10 @@ from playwright.async_api import Browser, expect
 from playwright.async_api import TimeoutError as PlaywrightTimeout
 
 from tests.page.barriers import fits_all, no_barrier
+from tests.page.canned import Canned
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
+from tests.page.work_scenes import take_over
 
 HOSTILE = "<img src=x onerror=alert(1)> the car did not see the box"
 SLOW = "[limits.link_late]\nlate_s = 10.0\ncritical_s = 20.0\n"  # this machine is shared: that is not tested here
@@ -79,6 +81,24 @@ async def do(phone: Phone, act: Callable[[], Awaitable[None]]) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("width", "height"), [(360, 740), (820, 1180)])
+async def test_the_reasons_are_in_sight_at_once(phone: Phone, canned: Canned, width: int, height: int) -> None:
+    """One tap is enough: nothing need be scrolled before it."""
+    page = phone.page
+    await page.set_viewport_size({"width": width, "height": height})
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    await take_over(canned, page)
+    body = await page.locator("#sheet-take-over .mark-body").bounding_box()
+    keys = page.locator("#sheet-take-over [data-category]")
+    assert body is not None
+    assert await keys.count() == 6
+    for key in await keys.all():
+        box = await key.bounding_box()
+        assert box is not None
+        assert box["y"] + box["height"] <= body["y"] + body["height"]
+
+
 async def test_a_take_over_is_seen_and_described_with_one_tap(browser: Browser, tmp_path: Path) -> None:
     """The key appears by itself and the form never does; a draft outlives "Later"; hostile text stays text."""
     async with watching(browser, tmp_path) as watch:

@@ -54,6 +54,11 @@ async def test_no_window_has_a_blank_a_sliced_or_a_covered_part(phone: Phone, ca
     assert "banner" not in str(await walk(phone.page, [(915, 412)]))
     await phone.page.set_viewport_size({"width": 1920, "height": 1080})
     await expect(phone.page.locator("#monitor [data-pane=signals] li").first).to_contain_text("20.0 Hz")
+    rows = phone.page.locator("#monitor [data-pane=signals] li")
+    published = sum(one["freshness"] != "not_published" for one in canned.state["signals"].values())
+    more = published - await rows.count()
+    assert more > 0
+    await expect(phone.page.locator("#monitor [data-pane=signals] .end")).to_have_text(f"{more} more · rate, age")
     await expect(phone.f("driven")).to_have_text("76.1")
     await expect(phone.f("head-people")).to_have_text("unknown")  # who is there is unknown
     await show(canned, phone.page, "home")
@@ -335,6 +340,22 @@ async def test_files_of_a_desktop_show_the_chosen_recording_beside_the_list(phon
     await expect(page.locator(".file-sheet[open]")).to_contain_text("1.8 km")
 
 
+async def test_a_named_recording_takes_no_more_room_in_the_table_than_others(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    await phone.open(f"{canned.address}/#files")
+    named, other = (page.locator(f"#panel-files .list [data-id=car_{n}]") for n in (3, 4))
+    await expect(named.locator(".t")).to_have_text("Rehearsal lot")
+    await expect(named.locator(".when")).to_be_visible()
+    await expect(named.locator(".when + span")).to_have_text("CATVehicle")
+    boxes = [await one.bounding_box() for one in (named, other, named.locator(".when"), named.locator(".t"))]
+    assert all(boxes)
+    row, plain, when, name = (box for box in boxes if box)
+    assert row["height"] <= plain["height"] + 20, "its tag"
+    assert abs(when["x"] - name["x"]) < 1
+    assert when["y"] >= name["y"] + name["height"] - 1
+
+
 @pytest.mark.gate
 async def test_files_of_a_tablet_give_the_car_the_wider_column_and_leave_no_gap_among_the_keys(
     phone: Phone, canned: Canned
@@ -349,8 +370,10 @@ async def test_files_of_a_tablet_give_the_car_the_wider_column_and_leave_no_gap_
     assert name
     assert car
     assert car["width"] > 1.2 * name["width"]
-    tops = [round(top) for top in await keys.evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().top)")]
-    assert len({tops.count(top) for top in tops}) == 1, "each row has as many"
+    for width, height in ((820, 1180), (1440, 900), (1920, 1080)):
+        await page.set_viewport_size({"width": width, "height": height})
+        tops = [round(one) for one in await keys.evaluate_all("(all) => all.map((one) => one.offsetTop)")]
+        assert len({tops.count(top) for top in tops}) == 1, f"each row has as many at {width} px"
 
 
 async def test_advisories_are_in_no_column_of_warnings(phone: Phone, canned: Canned) -> None:

@@ -212,8 +212,13 @@ def _late(annotations: Annotations) -> str:
 def _words(e: Entry) -> str:
     """The searchable text; each tag is on its own line, so that a search can match whole tags."""
     tags = "".join(f"\n#{tag}\n" for tag in e.annotations.tags)
-    marks = "".join(f"\n{mark['category'] or ''}\n{mark['words']}" for mark in e.marks)
-    return f"{e.annotations.title}\n{e.annotations.note}\n{e.vehicle}\n{e.id}{tags}{marks}".casefold()
+    marks = "\n".join(mark_text(mark) for mark in e.marks)
+    return f"{e.annotations.title}\n{e.annotations.note}\n{e.vehicle}\n{e.id}{tags}\n{marks}".casefold()
+
+
+def mark_text(mark: DriveMark) -> str:
+    """The searchable text of a mark: category and text, a line each."""
+    return f"{mark['category'] or ''}\n{mark['words']}".casefold()
 
 
 def condition(which: Which) -> tuple[str, list[Any]]:

@@ -48,9 +48,18 @@ def page_of(entries: Entries, which: Which, verifications: Verifications, *, cur
     last = page[-1] if page else None
     at_ms = (last.trashed_ms if which.is_trashed else last.started_ms) if last else None
     return Page(
-        rows=[row_of(entry, verifications.of(entry)) for entry in page],
+        rows=[_found(row_of(entry, verifications.of(entry)), entry, which.text) for entry in page],
         next=f"{at_ms}.{last.id}" if more and last else None,
     )
+
+
+def _found(row: Recording, entry: Entry, text: str | None) -> Recording:
+    """The row with the first mark in which the text of a search is."""
+    if text:
+        for mark in entry.marks:
+            if text.casefold() in catalog_db.mark_text(mark):
+                return {**row, "matched": mark}
+    return row
 
 
 def _format(name: str) -> str:

@@ -1813,6 +1813,8 @@ export interface Recording {
   tags: Array<string>;
   /** how many; a search covers their texts */
   marks: number;
+  /** of a search by text: the first mark whose text or category has it */
+  matched?: DriveMark;
   /** another value: other marks or descriptions came after it was complete; left out: none did */
   late?: string;
   /** of one recording: those that came after it was complete, at most 200 */

@@ -75,9 +75,9 @@ class TakeOver {
     return /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet mark-sheet take-over', id: 'sheet-take-over', 'aria-labelledby': 'take-over-title' },
       html('div', { class: 'mark-head' }, this.title, this.count, close),
       html('div', { class: 'mark-body', tabindex: '0', role: 'group', 'aria-label': 'The intervention' }, this.unread,
-        html('div', { class: 'take-facts' }, ...this.facts.map(({ element }) => element)), this.#plot.element,
+        html('div', { class: 'take-facts' }, ...this.facts.map(({ element }) => element)),
         html('p', { class: 'lab2' }, html('span', {}, 'What was the reason?'), html('span', {}, 'one tap is enough')),
-        html('div', { class: 'chip-rows', role: 'group', 'aria-label': 'Category' }, ...this.chips), this.words,
+        html('div', { class: 'chip-rows', role: 'group', 'aria-label': 'Category' }, ...this.chips), this.words, this.#plot.element, // one tap is enough: on a low phone the plot is what scrolls
         html('p', { class: 'lab2' }, html('span', {}, 'Started by'), html('span', {}, 'from the data; press to correct')),
         html('div', { class: 'seg', role: 'group', 'aria-label': 'Started by' }, ...this.starters), this.bad),
       html('div', { class: 'mark-keys' }, this.later, this.keep)));

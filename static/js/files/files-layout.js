@@ -67,7 +67,6 @@ export function distanceWords(metres) {
 /** What is beneath the name of a recording: whose it is, and what is to be known of it. @param {Recording} row @param {number} now_ms */
 export function originWords(row, now_ms) {
   return [
-    row.title ? whenWords(row.started_ms, now_ms) : '',
     row.vehicle,
     row.is_clip ? 'clip' : '',
     (row.part ?? 1) > 1 ? `part ${row.part}` : '',
@@ -122,6 +121,13 @@ export function storedWords(stored) {
   if (state === 'stored') return `stored (checked ${checked_ms === null ? NOTHING : clockOf(checked_ms)})${sentence ? `. Failed since: ${sentence}` : ''}`;
   if (state === 'failed') return `not stored, failed: ${sentence}`;
   return state === 'waiting' ? 'not stored, waits for its upload' : 'not stored';
+}
+
+/** The mark in which a search found its text: "Mark at 04:06: control · twice"; empty: it was found elsewhere. @param {Recording} row */
+export function matchWords({ matched, started_ms }) {
+  if (!matched) return '';
+  const at_s = matched.at_s ?? Math.max(0, (matched.marked_ms - started_ms) / 1000);
+  return `Mark at ${duration(at_s, true)}: ${[matched.category, matched.words].filter(Boolean).join(' · ')}`;
 }
 
 /** "14:03" by this phone's clock. @param {number} at_ms */

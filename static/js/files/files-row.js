@@ -1,6 +1,6 @@
 // One recording in the list: its track, its name, whose it is, length, size and alarms; pressed anywhere it offers what can be done.
 
-import { alarmWords, countsOf, lengthWords, nameOf, originWords, pointsOf, sizeWords, storedWords } from './files-layout.js';
+import { alarmWords, countsOf, lengthWords, matchWords, nameOf, originWords, pointsOf, sizeWords, storedWords, whenWords } from './files-layout.js';
 import { html, icon, listen, svg, textNodes } from '../core/dom.js';
 import { NOTHING } from '../core/format.js';
 
@@ -58,8 +58,11 @@ export function drawRow(row, now_ms, onPress) {
   const last = row.state === 'read' ? html('span', { class: 'counts' }, ...counts(row)) : html('span', { class: 'why' }, ...textNodes(row.state === 'waiting' ? 'being read' : row.problem ?? 'not readable'));
   const tags = row.tags.length ? [html('div', { class: 'm tags' }, ...row.tags.map((tag) => html('bdi', { class: 'file-tag' }, tag)))] : [];
   const stored = row.stored ? [html('div', { class: 'm stored', 'data-state': row.stored.state }, ...textNodes(storedWords(row.stored)))] : [];
+  const when = row.title ? [html('span', { class: 'when' }, whenWords(row.started_ms, now_ms))] : [];
+  const matched = matchWords(row);
+  const found = matched ? [html('bdi', { class: 'm matched' }, ...textNodes(matched))] : [];
   const item = html('li', { class: 'file', 'data-id': row.id, 'data-state': row.state }, thumbnail(row),
-    html('div', { class: 'tx' }, html('div', { class: 't', dir: 'auto' }, name), html('div', { class: 'm' }, originWords(row, now_ms)), html('div', { class: 'm facts-line' }, length, html('span', {}, ...textNodes(sizeWords(row.size_bytes))), last), ...stored, ...tags),
+    html('div', { class: 'tx' }, html('div', { class: 't', dir: 'auto' }, name), html('div', { class: 'm origin' }, ...when, html('span', {}, originWords(row, now_ms))), html('div', { class: 'm facts-line' }, length, html('span', {}, ...textNodes(sizeWords(row.size_bytes))), last), ...stored, ...tags, ...found),
     more);
   pressed(item, () => onPress(row, more));
   return item;

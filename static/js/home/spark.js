@@ -96,7 +96,7 @@ export function colours(root) {
   root.append(probe);
   const found = /** @type {any} */ ({});
   for (const name of COLOURS) {
-    probe.className = `probe ${name}`;
+    probe.style.color = `var(--${name})`;
     found[name] = getComputedStyle(probe).color;
   }
   probe.remove();

@@ -26,20 +26,21 @@ export function mount(root, store, say) {
   /** @type {Map<string, ReturnType<typeof buildRow>>} */
   const rows = new Map();
   /** @type {import('./spark.js').Palette} */
-  let palette = colours(root);
+  let palette;
   let isSeen = false;
   let isOver = false;
   let turn = 0;
 
   const watcher = new IntersectionObserver(([entry]) => {
     isSeen = entry?.isIntersecting ?? false;
-    if (isSeen) redraw();
+    redraw();
   });
   watcher.observe(list);
   const redraw = () => {
+    if (!isSeen) return; // to read the colours costs a style of the page
     palette = colours(root);
     draw();
-    for (const row of isSeen ? rows.values() : []) drawSketch(row, trends, store, palette);
+    for (const row of rows.values()) drawSketch(row, trends, store, palette);
   };
   const stops = [
     store.on('draw', () => store.painter.inTurn(draw)),
@@ -73,7 +74,6 @@ export function mount(root, store, say) {
     });
   }
 
-  redraw();
   return () => {
     isOver = true;
     watcher.disconnect();

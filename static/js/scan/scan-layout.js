@@ -9,6 +9,8 @@ const NAMED_RAD = (6 * Math.PI) / 180;
 export const REACH_M = { least: 4, most: 120, first: 20 };
 /** One press of + or −. */
 const ZOOM_STEP = Math.SQRT2;
+/** A number whose middle is higher is covered by the caption "Steering unknown" of a wide screen. */
+const CAPTION_PX = 28;
 /** Farther behind the nose than this a return is below the plot [m]. */
 const BEHIND_M = 0.5;
 /** Above this many beams, a return whose square of 5 px would cover its neighbour's but for this is not drawn again [px]. */
@@ -260,6 +262,11 @@ export function clearOf(taken, box) {
     box.left < one.left + one.width && one.left < box.left + box.width && top < one.top + one.height && one.top < top + box.height);
   const by = [0, -0.5, 0.5, -1, 1].find((share) => !covers(box.top + share * box.height));
   return by === undefined ? null : { ...box, top: box.top + by * box.height };
+}
+
+/** Whether a number of the plot is seen there whole: inside of its sides, and beneath the caption at its top. @param {number[]} place @param {number} width */
+export function isInView([x = 0, y = 0], width) {
+  return Math.abs(x - width / 2) < width / 2 - 12 && y > CAPTION_PX;
 }
 
 /**

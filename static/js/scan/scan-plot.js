@@ -2,7 +2,7 @@
 
 import { edgesOf, endOf } from './scan-corridor.js';
 import { bearingOf, rangeOf } from './scan-frame.js';
-import { clearOf, clearPlace, codeWords, namedSectors, plotScale, pointsOf, ringWords, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
+import { clearOf, clearPlace, codeWords, isInView, namedSectors, plotScale, pointsOf, ringWords, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
 import { Hatching, ScanGrid, fit, penOf } from './scan-grid.js';
 import { fixed } from '../core/format.js';
 
@@ -167,10 +167,10 @@ export class ScanPlot {
   #rings(g, { at }, reach_m) {
     for (const r of ringsOf(reach_m)) {
       const place = (/** @type {number} */ turn) => at(r * Math.cos(turn), r * Math.sin(turn));
-      const turns = [this.#turns.get(r) ?? RING_TURN, RING_TURN, ...OTHER_TURNS].filter((turn) => Math.abs(place(turn)[0] - this.#width / 2) < this.#width / 2 - 12);
+      const turns = [this.#turns.get(r) ?? RING_TURN, RING_TURN, ...OTHER_TURNS].filter((turn) => isInView(place(turn), this.#width));
       const index = this.#clear(g, String(r), turns.map((turn) => [...place(turn), 'center', 14, 400]), this.#colour.ink2);
       if (index >= 0) this.#turns.set(r, turns[index] ?? RING_TURN);
-      else this.#label(g, String(r), ...place(RING_TURN), this.#colour.ink2, 'center');
+      else if (isInView(place(RING_TURN), this.#width)) this.#label(g, String(r), ...place(RING_TURN), this.#colour.ink2, 'center');
     }
   }
 

@@ -15,7 +15,7 @@ export function themeAt(beside) {
   const probe = document.createElement('i');
   beside.after(probe);
   for (const name of COLOURS) {
-    probe.className = `probe ${name}`;
+    probe.style.color = `var(--${name})`;
     colour[name] = getComputedStyle(probe).color;
   }
   probe.remove();

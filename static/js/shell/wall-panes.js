@@ -61,10 +61,11 @@ export class Lines {
     this.observer.observe(list);
   }
 
-  /** @param {() => Line[]} lines requested only where there is room */
+  /** @param {() => Line[]} lines requested only where there is room @returns {number} those that there is no room for */
   draw(lines) {
-    if (!this.#lines) return;
-    const shown = lines().slice(0, this.#lines);
+    if (!this.#lines) return 0;
+    const all = lines();
+    const shown = all.slice(0, this.#lines);
     const old = this.#drawn;
     this.#drawn = new Map(shown.map(({ key, cells }) => [key, old.get(key) ?? html('li', {}, ...cells.map(() => html('span')))]));
     const elements = [...this.#drawn.values()];
@@ -76,6 +77,7 @@ export class Lines {
       setAttribute(line, 'data-age-of', of ?? null);
       cells.forEach((text, n) => setSentence(/** @type {HTMLElement} */ (line.children[n]), text));
     });
+    return all.length - shown.length;
   }
 
   stop() {

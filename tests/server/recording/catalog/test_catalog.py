@@ -17,6 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from server.protocol.marks import DriveMark
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog import catalog_db
 from server.recording.catalog.annotations import Annotations
@@ -284,6 +285,24 @@ async def test_filters(tmp_path: Path, which: Which, expected: int) -> None:
     rows = one.rows(which).rows
     assert len(rows) == expected
     assert one.totals(which)["count"] == expected
+    await one.stop()
+
+
+async def test_a_search_names_the_mark_that_it_found(tmp_path: Path) -> None:
+    names = ("twice", "Steering hunts", "hunts again")
+    marks = tuple(
+        DriveMark(mark=f"m{n}", marked_ms=BEGAN_MS + n, category="comfort" if n == 2 else None, words=words,
+                  voice=False, photo=False, source="page", by=None)
+        for n, words in enumerate(names)
+    )  # fmt: skip
+    folder = some(tmp_path)
+    annotation_store.write_marks(folder / "blue" / "blue_20260921T141320Z.mcap", marks, [])
+    one = made(tmp_path)
+    one.walk()
+    for text, mark in (("HUNTS", "m1"), ("comfort", "m2"), ("wet lot", None)):
+        (row,) = one.rows(Which(text=text)).rows
+        assert row.get("matched", {}).get("mark") == mark, text
+    assert all("matched" not in row for row in one.rows().rows)
     await one.stop()
 
 
