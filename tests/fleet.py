@@ -2,7 +2,8 @@
 
     python -m tests.fleet [--ports 8001 8002] [--typed]
 
-With --typed no fault begins by itself: each line that is typed begins one, as `lynx speeding 20`.
+With --typed no fault begins by itself: each line that is typed begins one, as `lynx speeding 20`, and late or rare
+messages of a busy machine are none.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 
 from server.bus import broker_users
-from tests.page.processes import Process, running, simulate
+from tests.page.processes import UNHURRIED, Process, running, simulate
 from tests.server.bus.broker import running_broker
 
 # Each car, and what goes wrong with it, over and over: it is typed on its simulator's terminal.
@@ -58,6 +59,11 @@ async def main(ports: tuple[int, int], *, is_typed: bool) -> None:
             async def all_of(*commands: tuple[str, ...]) -> list[Process]:
                 return await asyncio.gather(*(up.enter_async_context(running(*command)) for command in commands))
 
+            if is_typed:  # a busy machine begins none either
+                for name in CARS:
+                    settings = folder / name / "settings"
+                    settings.mkdir(parents=True)
+                    (settings / f"{name}.toml").write_text(UNHURRIED)
             cars = dict(zip(CARS, await all_of(*(simulate() for _ in CARS)), strict=True))
             agents = await all_of(
                 *(("agent", *options(name, 0), "--vehicle", f"{name}={cars[name].address}") for name in CARS)

@@ -199,9 +199,18 @@ def _context(broker: Broker) -> ssl.SSLContext | None:
     if not broker.address.startswith("tls://"):
         return None
     try:
-        return ssl.create_default_context(cafile=broker.authority)
+        context = ssl.create_default_context(cafile=broker.authority)
     except OSError as why:
         raise BrokerRefused(f"The certificate {broker.authority} cannot be used: {why}.") from None
+    context.sslobject_class = _EndsAtOnce
+    return context
+
+
+class _EndsAtOnce(ssl.SSLObject):
+    """TLS that ends without the broker's reply: behind a gap none comes, asyncio waits 30 s for it, and nats-py dials
+    only after that. Messages of NATS have lengths, so that nothing depends on how TLS ends."""
+
+    def unwrap(self) -> None: ...
 
 
 async def processed(client: Client, *, within_s: int = 10) -> None:

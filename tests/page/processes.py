@@ -42,9 +42,15 @@ class Process:
     """One `python -m server …`, of the project in `folder` where one is given; `address` is what it printed."""
 
     def __init__(
-        self, *arguments: str, module: str = "server", folder: Path | None = None, within: tuple[str, ...] = ()
+        self,
+        *arguments: str,
+        module: str = "server",
+        folder: Path | None = None,
+        within: tuple[str, ...] = (),
+        log: Path | None = None,
     ) -> None:
-        """`within`: a command that runs another one, as in a network of its own."""
+        """`within`: a command that runs another one, as in a network of its own; `log`: gets what it logs."""
+        self._log = log
         self._given = module
         self._within = within
         self._arguments = arguments
@@ -60,14 +66,15 @@ class Process:
 
     async def start(self) -> Process:
         """Starts it and waits until it prints its address."""
-        self._process = await asyncio.create_subprocess_exec(
-            *(*self._within, sys.executable, "-m", self._module, *self._arguments),
-            stdin=asyncio.subprocess.PIPE,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.DEVNULL,
-            cwd=self._folder,
-            env={key: value for key, value in os.environ.items() if key != "PYTHONASYNCIODEBUG"},
-        )
+        with contextlib.ExitStack() as files:
+            self._process = await asyncio.create_subprocess_exec(
+                *(*self._within, sys.executable, "-m", self._module, *self._arguments),
+                stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=files.enter_context(self._log.open("ab")) if self._log else asyncio.subprocess.DEVNULL,
+                cwd=self._folder,
+                env={key: value for key, value in os.environ.items() if key != "PYTHONASYNCIODEBUG"},
+            )
         out = self._process.stdout
         assert out is not None
         async with asyncio.timeout(STARTS_WITHIN_S):
@@ -134,10 +141,14 @@ class Process:
 
 @contextlib.asynccontextmanager
 async def running(
-    *arguments: str, module: str = "server", folder: Path | None = None, within: tuple[str, ...] = ()
+    *arguments: str,
+    module: str = "server",
+    folder: Path | None = None,
+    within: tuple[str, ...] = (),
+    log: Path | None = None,
 ) -> AsyncIterator[Process]:
     """A process for the length of the block."""
-    process = Process(*arguments, module=module, folder=folder, within=within)
+    process = Process(*arguments, module=module, folder=folder, within=within, log=log)
     try:
         yield await process.start()
     finally:

@@ -410,11 +410,15 @@ async def armed_by_hand(phone: Phone, address: str, topic: str = "/catvehicle/cm
     await phone.page.locator("#monitor .top .rec").tap()
     slide = phone.page.locator(RAIL)
     await expect(slide).to_contain_text("press to arm", timeout=15_000)
-    await slide.tap()
     sheet = phone.page.locator("#sheet-slow")
-    await expect(sheet).to_contain_text(topic)
-    await sheet.get_by_role("button", name="Arm").tap()
-    await expect(slide).to_have_attribute("data-kind", "armed")
+    for is_last in (False, False, True):  # as `slow_the_car`
+        if not await sheet.is_visible():
+            await slide.tap()
+        await expect(sheet).to_contain_text(topic)
+        await sheet.get_by_role("button", name="Arm").tap()
+        with contextlib.nullcontext() if is_last else contextlib.suppress(AssertionError):
+            await expect(slide).to_have_attribute("data-kind", "armed", timeout=6000)
+            break
     async with asyncio.timeout(30):
         while not re.fullmatch(r"[3-9]\.\d|1\d\.\d", await phone.speed()):
             await asyncio.sleep(0.1)

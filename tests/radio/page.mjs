@@ -4,6 +4,7 @@
 //                                whether it is cut, and the alarms that are active
 //   d TIME                       it dials
 //   s TIME COVERED SHOWN TRUE    twenty times a second: the age that is shown and the true one [ms]
+//   f TIME AGE                   then, where values are drawn as fresh: the true age of the oldest of them [ms]; without those of slow topics, which may be older
 import path from 'node:path';
 import { WebSocket } from 'ws';
 import { storeAlone } from '../page/alone.mjs';
@@ -13,18 +14,29 @@ console.error = () => {}; // nothing is drawn here
 const Store = await storeAlone(path.resolve(tree, 'static/js'));
 const store = new Store(() => {
   console.log(`d ${Date.now()}`);
-  return new WebSocket(address, { headers: { Authorization: `Bearer ${key}` } }).on('error', () => {}); // one that is given up ends the program without
+  return new WebSocket(address, key ? { headers: { Authorization: `Bearer ${key}` } } : {}).on('error', () => {}); // one that is given up ends the program without
 });
 store.painter.picture = store.painter.look = () => {};
-const age_ms = () => Date.now() - store.frame.server.time_ms; // server and page run on one machine
+// Server and page run on one machine. What an agent's device signs is a moment of the monotonic clock; a web node replaces the time of day by its own estimate.
+const age_ms = () => {
+  const { challenge, time_ms } = store.frame.server;
+  return challenge ? Number(process.hrtime.bigint() / 1_000_000n) - Number.parseInt(challenge, 16) : Date.now() - time_ms;
+};
+const oldestFresh_ms = () => {
+  const fresh = Object.entries(store.frame.signals).filter(([name, { age_s, horizon_s }]) => age_s !== null && (horizon_s ?? 1) <= 1 && store.ink(name).ink === 'fresh');
+  return fresh.length ? Math.max(...fresh.map(([, { age_s }]) => 1000 * age_s)) + age_ms() : null;
+};
 store.on('beat', () => {
   const { alarms, link } = store.frame;
   console.log(`b ${Date.now()} ${age_ms()} ${link.late_s ?? 'NaN'} ${Number(link.cut !== null)} ${alarms.filter(({ active }) => active).map(({ id }) => id).join(',') || '-'}`);
 });
-store.vehicle = 'car';
+store.vehicle = new URL(address).searchParams.get('vehicle') ?? 'car';
 console.log(`begins ${Date.now()}`);
 store.start();
 store.sync.greet();
 setInterval(() => {
-  console.log(`s ${Date.now()} ${Number(store.isSilent || !store.frame)} ${store.frame ? `${store.lag_s * 1000} ${age_ms()}` : '0 0'}`);
+  const isCovered = store.isSilent || !store.frame;
+  console.log(`s ${Date.now()} ${Number(isCovered)} ${store.frame ? `${store.lag_s * 1000} ${age_ms()}` : '0 0'}`);
+  const oldest_ms = isCovered ? null : oldestFresh_ms();
+  if (oldest_ms !== null) console.log(`f ${Date.now()} ${oldest_ms}`);
 }, 50);

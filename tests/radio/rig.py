@@ -1,4 +1,5 @@
-"""A car and a server at one end of a radio, the page's own modules at the other; all of it on this machine."""
+"""A car and a server at one end of a radio, the page's own modules at the other; or a car and its agent at one end, a
+broker and a web node at the other. All of it on this machine."""
 
 from __future__ import annotations
 
@@ -12,8 +13,11 @@ import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
+from server.bus import broker_users
+from tests.fleet import TODAY
 from tests.page.processes import running, simulate
 from tests.radio.seen import Seen
+from tests.server.bus.broker import nats_server
 
 ROOT = Path(__file__).parents[2]
 IS_POSSIBLE = os.geteuid() == 0 and shutil.which("ip") is not None and Path("/dev/net/tun").exists()
@@ -77,12 +81,54 @@ async def serving(air: Air, data: Path, *, tree: Path = ROOT, car_end: int = 0) 
 
 
 @contextlib.asynccontextmanager
-async def page(air: Air, host: str, key: str, *, tree: Path = ROOT, end: int = 1) -> AsyncIterator[Seen]:
-    """A page for the length of the block, and what it sees."""
+async def brokered(air: Air, data: Path) -> AsyncIterator[str]:
+    """The radio between an agent with its car and the broker with a web node; yields the node's host and port, for a
+    page beside it. The agent logs each command into `data`/agent.log."""
+    users: tuple[tuple[str, broker_users.Kind], ...] = (("ocelot", "agent"), ("room", "web"))
+    for name, kind in users:
+        (data / f"{name}.key").write_text(broker_users.add(data, name, kind, today=TODAY)[1])
+    address = f"{air.net}.1:4222"
+    (data / "broker.conf").write_text(f"listen: {address}\ninclude ./{broker_users.CONF}\n")
+
+    def options(name: str) -> tuple[str, ...]:
+        at_broker = ("--broker", f"nats://{address}", "--key", str(data / f"{name}.key"))
+        return (*at_broker, "--port", "0", "--data", str(data / name), "--log-level", "info", "--log-format", "json")
+
+    async with nats_at(air, data / "broker.conf"), running(*simulate(), within=air.within(1)) as car:
+        agent = ("agent", *options("ocelot"), "--vehicle", f"ocelot={car.address}")
+        node = ("web", *options("room"), "--expect", "ocelot")
+        async with (
+            running(*agent, within=air.within(1), log=data / "agent.log"),
+            running(*node, within=air.within(0), log=data / "node.log") as at_room,
+        ):
+            await asyncio.sleep(SETTLES_S)
+            yield at_room.shown
+
+
+@contextlib.asynccontextmanager
+async def nats_at(air: Air, conf: Path) -> AsyncIterator[None]:
+    """A broker at the first end, once it is ready."""
+    command = (*air.within(0), nats_server(), "-c", str(conf))
+    with conf.with_suffix(".log").open("wb") as log:
+        process = await asyncio.create_subprocess_exec(*command, stderr=log)
+    try:
+        async with asyncio.timeout(30):
+            while b"Server is ready" not in conf.with_suffix(".log").read_bytes():
+                await asyncio.sleep(0.05)
+        yield
+    finally:
+        process.kill()
+        await process.wait()
+
+
+@contextlib.asynccontextmanager
+async def page(air: Air, host: str, key: str, *, tree: Path = ROOT, end: int = 1, of: str = "") -> AsyncIterator[Seen]:
+    """A page for the length of the block, and what it sees; `of`: the car, where it is to be named."""
     seen = Seen()
     node = shutil.which("node") or "node"
+    script, address = Path(__file__).with_name("page.mjs"), f"ws://{host}/ws{of and f'?vehicle={of}'}"
     process = await asyncio.create_subprocess_exec(
-        *(*air.within(end), node, str(Path(__file__).with_name("page.mjs")), str(tree), f"ws://{host}/ws", key),
+        *(*air.within(end), node, str(script), str(tree), address, key),
         stdout=asyncio.subprocess.PIPE,
         cwd=ROOT,
     )

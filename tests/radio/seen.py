@@ -20,6 +20,7 @@ class Seen:
     cars: list[tuple[float, float, bool, str]] = field(default_factory=list)  # time, how late, cut, alarms
     samples: list[tuple[float, bool, float, float]] = field(default_factory=list)  # time, covered, shown, true age
     dials: list[float] = field(default_factory=list)  # times
+    fresh: list[tuple[float, float]] = field(default_factory=list)  # time, true age of the oldest value drawn as fresh
 
     def read(self, line: str) -> None:
         match line.split():
@@ -30,6 +31,8 @@ class Seen:
                 self.cars.append((float(time), float(late), cut == "1", alarms))
             case ["d", time]:
                 self.dials.append(float(time))
+            case ["f", time, age]:
+                self.fresh.append((float(time), float(age) / 1000))
             case ["s", time, covered, shown, true]:
                 self.samples.append((float(time), covered == "1", float(shown) / 1000, float(true) / 1000))
 
@@ -40,6 +43,7 @@ class Seen:
             [one for one in self.cars if from_ms <= one[0] < to_ms],
             [one for one in self.samples if from_ms <= one[0] < to_ms],
             [one for one in self.dials if from_ms <= one < to_ms],
+            [one for one in self.fresh if from_ms <= one[0] < to_ms],
         )
 
     @property
@@ -64,6 +68,11 @@ class Seen:
     def youngest_s(self) -> float:
         """By how much the most an age was shown that was too small; negative: too small."""
         return min((shown - true for _, covered, shown, true in self.samples if not covered), default=0.0)
+
+    @property
+    def oldest_fresh_s(self) -> float:
+        """The most that was the true age of a value that was drawn as fresh."""
+        return max((age for _, age in self.fresh), default=0.0)
 
     def first_s(self, from_ms: float) -> float:
         """From then to the first fresh frame."""
