@@ -2,8 +2,8 @@
 
     python -m tests.fleet [--ports 8001 8002] [--typed]
 
-With --typed no fault begins by itself: each line that is typed begins one, as `lynx speeding 20`, and late or rare
-messages of a busy machine are none.
+With --typed no fault begins by itself: each line that is typed begins one, as `lynx speeding 20`, and messages that a
+busy machine sends late or rarely are no fault.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ async def main(ports: tuple[int, int], *, is_typed: bool) -> None:
             async def all_of(*commands: tuple[str, ...]) -> list[Process]:
                 return await asyncio.gather(*(up.enter_async_context(running(*command)) for command in commands))
 
-            if is_typed:  # a busy machine begins none either
+            if is_typed:  # nor is a busy machine one
                 for name in CARS:
                     settings = folder / name / "settings"
                     settings.mkdir(parents=True)

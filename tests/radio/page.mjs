@@ -14,13 +14,14 @@ console.error = () => {}; // nothing is drawn here
 const Store = await storeAlone(path.resolve(tree, 'static/js'));
 const store = new Store(() => {
   console.log(`d ${Date.now()}`);
-  return new WebSocket(address, key ? { headers: { Authorization: `Bearer ${key}` } } : {}).on('error', () => {}); // one that is given up ends the program without
+  return new WebSocket(address, key ? { headers: { Authorization: `Bearer ${key}` } } : {}).on('error', () => {}); // without it, a connection that is given up ends the program
 });
 store.painter.picture = store.painter.look = () => {};
 // Server and page run on one machine. What an agent's device signs is a moment of the monotonic clock; a web node replaces the time of day by its own estimate.
+const isOfNode = new URL(address).searchParams.has('vehicle');
 const age_ms = () => {
   const { challenge, time_ms } = store.frame.server;
-  return challenge ? Number(process.hrtime.bigint() / 1_000_000n) - Number.parseInt(challenge, 16) : Date.now() - time_ms;
+  return challenge ? Number(process.hrtime.bigint() / 1_000_000n) - Number.parseInt(challenge, 16) : isOfNode ? NaN : Date.now() - time_ms;
 };
 const oldestFresh_ms = () => {
   const fresh = Object.entries(store.frame.signals).filter(([name, { age_s, horizon_s }]) => age_s !== null && (horizon_s ?? 1) <= 1 && store.ink(name).ink === 'fresh');
