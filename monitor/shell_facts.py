@@ -37,7 +37,8 @@ class LinkFacts:
     compared: Mapping[str, tuple[str, ...]] | None = None  # signal → further topics of it; None: not known
     undecided: Mapping[str, str] = field(default_factory=dict)  # signals that no topic carries yet, and why, in short
     log_trouble: str | None = None  # why the alarm log is not kept on the disk, as a sentence; None: it is
-    late_s: float | None = None  # how late the messages are that come now; None: not known
+    late_s: float | None = None  # how late the messages are that come now, estimated; None: not known
+    most_late_s: float | None = None  # how late they are at most
     throttled: frozenset[str] = frozenset()  # the signals that are throttled because the link is too slow
     reduced: str | None = None  # the throttling, as a sentence; None: none
     wall_zero_s: float | None = None  # the time of day [s since 1970] when `received_s` was 0; None: not known

@@ -67,7 +67,7 @@ class _Clock:
         return max(min(self._now_s, self._before_s) - ahead_s, bound_s - TRIM_S, 0.0)
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Topic:
     """What is kept of one subscription."""
 
@@ -301,9 +301,9 @@ class TransportDelay:
     def late_s(self, now_s: float) -> float:
         """How late is what comes now, estimated: the bound takes both ways of a round trip for the delay, which is in
         the middle where these are alike."""
-        return max(0.0, self._most_s(now_s) - min(self._least_trip_s / 2.0, MIDDLE_AT_MOST_S))
+        return max(0.0, self.most_late_s(now_s) - min(self._least_trip_s / 2.0, MIDDLE_AT_MOST_S))
 
-    def _most_s(self, now_s: float) -> float:
+    def most_late_s(self, now_s: float) -> float:
         """How late is what comes now at most: the most of the topics that come often, by those that came last."""
         recent = [topic for topic in self._topics.values() if topic.at_s is not None and now_s - topic.at_s <= RECENT_S]
         fast = [topic for topic in recent if topic.period_s is not None and topic.period_s <= FAST_S]
@@ -322,7 +322,7 @@ class TransportDelay:
 
     def queued_s(self, now_s: float) -> float:
         """How much of that is queueing: more is requested than the link carries."""
-        return max(0.0, self._most_s(now_s) - min(self._usual_trip_s, self._usual_before_s, USUAL_AT_MOST_S))
+        return max(0.0, self.most_late_s(now_s) - min(self._usual_trip_s, self._usual_before_s, USUAL_AT_MOST_S))
 
     @property
     def trip_s(self) -> float:

@@ -106,6 +106,7 @@ class LinkState(TypedDict):
     late_s: Annotated[
         float | None, doc("how old messages are when they come, estimated, at most 0.2 s too little; null: not known")
     ]
+    most_late_s: Annotated[float | None, doc("how old messages are when they come, at most; null: not known")]
     reduced: Annotated[str | None, doc("what is not requested in full because the link is slow, as a sentence")]
     unreadable_frames: Annotated[int, doc("what came and was no rosbridge operation")]
     unreadable_why: str | None

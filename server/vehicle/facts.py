@@ -54,6 +54,7 @@ def link_facts(parts: SessionParts, now_s: float, *, wall_ms: int, log_trouble: 
         undecided=topics.signals.undecided,
         log_trouble=log_trouble,
         late_s=judgement.transport.late_s(now_s) if connection.phase == "monitoring" else None,
+        most_late_s=judgement.transport.most_late_s(now_s) if connection.phase == "monitoring" else None,
         throttled=topics.table.load.throttled(now_s),
         reduced=f"{topics.table.load.level.text}." if topics.table.load.step else None,
         wall_zero_s=wall_ms / 1000 - now_s,

@@ -199,6 +199,7 @@ def _link(facts: Facts, snapshot: Snapshot) -> LinkState:
         "topics_subscribed": facts.topics_judged,
         "topics_heard": facts.topics_heard,
         "late_s": serialize.plain(snapshot.link.late_s, 2),
+        "most_late_s": serialize.plain(snapshot.link.most_late_s, 2),
         "reduced": snapshot.link.reduced,
         "unreadable_frames": facts.reception.frames.rejected,
         "unreadable_why": facts.reception.frames.last_reason,

@@ -73,7 +73,8 @@ def live() -> Json:
         },
         "link": {
             "cut": None, "since_ms": None, "bridge_age_s": 0.05, "car_age_s": 0.05, "problem": None, "attempts": 0,
-            "trying_for_s": 0.0, "topics_subscribed": 14, "topics_heard": 12, "late_s": None, "reduced": None,
+            "trying_for_s": 0.0, "topics_subscribed": 14, "topics_heard": 12, "late_s": None,
+            "most_late_s": None, "reduced": None,
             "unreadable_frames": 0, "unreadable_why": None,
         },
         "signals": {

@@ -59,7 +59,7 @@ test('a car that stood may drive too', () => {
 function glass(more = {}) {
   const limits = { 'unseen.acceleration_mps2': 3, 'unseen.proposes_speed': 1 };
   return /** @type {any} */ ({
-    frame: { link: { late_s: 0.25 } }, isSilent: false, silence_s: 0.1, lag_s: 0.1, chain: { cut: null },
+    frame: { link: { late_s: 0.15, most_late_s: 0.25 } }, isSilent: false, silence_s: 0.1, lag_s: 0.1, chain: { cut: null },
     limit: (/** @type {keyof typeof limits} */ name) => limits[name] ?? null,
     signal: () => ({ value: { speed_mps: 4 } }), ink: () => ({ ink: 'stale', age_s: 2 }), ...more,
   });
@@ -75,7 +75,7 @@ test('the bound at the glass is that of the last speed', () => {
 test('a speed is proposed above 200 ms, from the car to the glass, and never rounded up', () => {
   assert.deepEqual(proposalOf(glass()), ['≤ 11.1 m/s', 'for 2.78 m']);
   assert.deepEqual(proposalOf(glass({ frame: { link: { late_s: 0.2 } } })), []);
-  assert.deepEqual(proposalOf(glass({ frame: { link: { late_s: 0.1 } }, lag_s: 0.5 })), ['≤ 5.5 m/s', 'for 2.78 m']); // 0.4 s of it from the server here
+  assert.deepEqual(proposalOf(glass({ frame: { link: { late_s: 0.0, most_late_s: 0.1 } }, lag_s: 0.5 })), ['≤ 5.5 m/s', 'for 2.78 m']); // 0.4 s of it from the server here
   assert.deepEqual(proposalOf(glass({ frame: { link: { late_s: 1.5 } } })), ['≤ 1.8 m/s', 'for 2.78 m']);
   chooseSpeedUnit('km/h');
   assert.deepEqual(proposalOf(glass()), ['≤ 40.0 km/h', 'for 2.78 m']);
@@ -88,7 +88,7 @@ test('no speed is proposed unless the setting requires it, nor while nothing com
   assert.deepEqual(proposalOf(glass({ isSilent: true })), []);
   assert.deepEqual(proposalOf(glass({ chain: { cut: 2 } })), []);
   assert.deepEqual(proposalOf(glass({ frame: null })), []);
-  assert.deepEqual(proposalOf(glass({ frame: { link: { late_s: null } } })), ['delay', 'not known']);
+  assert.deepEqual(proposalOf(glass({ frame: { link: { late_s: null, most_late_s: null } } })), ['delay', 'not known']);
 });
 
 test('a blind time has its metres once the first values after it came', () => {

@@ -308,6 +308,13 @@ def test_a_link_that_becomes_a_fair_radio_is_no_alarm(seed: int, jitter_s: float
     assert seen.longest_late_s() < MOMENT_S
 
 
+@pytest.mark.parametrize(("down_s", "up_s"), [(0.29, 0.01), (0.01, 0.29), (0.8, 0.05), (0.15, 0.15)])
+def test_the_middle_of_a_round_trip_is_little_below_the_truth_where_its_ways_differ(down_s: float, up_s: float) -> None:
+    link = Link(rate_Bps=lambda _: 250_000.0, down_s=lambda _: down_s, up_s=lambda _: up_s)
+    seen = Watched(link, 20.0, 1, queued_car)
+    assert min(late_s - true_s for late_s, true_s in seen.between(2.0, 20.0)) >= -UNDER_S
+
+
 @pytest.mark.parametrize("seed", range(1, 4))
 def test_a_weak_radio_is_as_late_as_stated(seed: int) -> None:
     rng = random.Random(seed)

@@ -50,7 +50,7 @@ def link_along(facts: DriveFacts) -> list[LinkStretch]:
                 from_m=0.0 if number == 0 else ends[number - 1],
                 to_m=to_m,
                 delay_s=sum(late_s * within for late_s, within in delays) / whole_s if whole_s else None,
-                most_s=max((late_s for late_s, _ in delays), default=None),
+                most_s=max((_most_late_s(late_s) for late_s, _ in delays), default=None),
                 blind_s=sum(_overlap(one, span) for one in blind),
             )
         )
@@ -67,7 +67,7 @@ class UnseenTime:
 
     from_s: float
     to_s: float
-    late_s: float | None = None  # the most that messages were late, estimated; None: none came, or it is not known
+    late_s: float | None = None  # the most that messages were late; None: none came, or their delay is not known
     metres: float | None  # the most that the car can have driven since a value that was shown; None: not known
 
 
@@ -86,7 +86,8 @@ def blind_times(facts: DriveFacts) -> list[UnseenTime]:
 def late_times(facts: DriveFacts) -> list[UnseenTime]:
     """Each time in which messages came so late that the page covers their values, with the longest way there."""
     spans: list[tuple[float, float, float]] = []
-    for from_s, to_s, late_s in facts.held_delays():
+    for from_s, to_s, estimated_s in facts.held_delays():
+        late_s = _most_late_s(estimated_s)
         if late_s <= AGEING_FLOOR_S:
             continue
         if spans and spans[-1][1] == from_s:
@@ -103,16 +104,13 @@ def _farthest_m(facts: DriveFacts, from_s: float, to_s: float, late_s: float) ->
     before = facts.last_speed(from_s)
     shown = ([] if before is None else [before]) + facts.motion.speed.between(from_s, to_s)
     limit = _most(facts.accelerations, from_s, to_s)
-    ways = (
-        unseen_m(v, next_s - at_s + _most_late_s(late_s), limit)
-        for (at_s, v), (next_s, _) in pairwise([*shown, (to_s, 0.0)])
-    )
+    ways = (unseen_m(v, next_s - at_s + late_s, limit) for (at_s, v), (next_s, _) in pairwise([*shown, (to_s, 0.0)]))
     return max((way for way in ways if way is not None), default=None)
 
 
 def _most_late_s(late_s: float | None) -> float:
     """The recorded delay is an estimate: how late messages may have been."""
-    return 0.0 if late_s is None else late_s + MIDDLE_AT_MOST_S
+    return 0.0 if late_s is None else round(late_s + MIDDLE_AT_MOST_S, 3)
 
 
 def _in_force(steps: Sequence[tuple[float, float]], at_s: float) -> float | None:

@@ -986,6 +986,8 @@ export interface LinkState {
   topics_heard: number;
   /** how old messages are when they come, estimated, at most 0.2 s too little; null: not known */
   late_s: number | null;
+  /** how old messages are when they come, at most; null: not known */
+  most_late_s: number | null;
   /** what is not requested in full because the link is slow, as a sentence */
   reduced: string | null;
   /** what came and was no rosbridge operation */

@@ -59,7 +59,7 @@ export function unseenOf(store) {
 export function proposalOf(store) {
   const { frame } = store;
   if (!frame || !store.limit('unseen.proposes_speed') || store.isSilent || store.chain.cut !== null) return [];
-  const { late_s } = frame.link;
+  const late_s = frame.link.most_late_s ?? frame.link.late_s; // an agent of an older version has one of them
   if (late_s === null) return ['delay', 'not known'];
   const kept_mps = keptSpeed(Math.round(1000 * (late_s + store.lag_s - Math.max(0, store.silence_s))) / 1000);
   return kept_mps === null ? [] : [`≤ ${fixed(Math.floor(speedIn(kept_mps) * 10) / 10)} ${speedUnit()}`, `for ${KEPT_M} m`];
