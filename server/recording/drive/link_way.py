@@ -50,7 +50,7 @@ def link_along(facts: DriveFacts) -> list[LinkStretch]:
                 from_m=0.0 if number == 0 else ends[number - 1],
                 to_m=to_m,
                 delay_s=sum(late_s * within for late_s, within in delays) / whole_s if whole_s else None,
-                most_s=max((_most_late_s(late_s) for late_s, _ in delays), default=None),
+                most_s=max((late_s for late_s, _ in delays), default=None),
                 blind_s=sum(_overlap(one, span) for one in blind),
             )
         )
@@ -87,9 +87,9 @@ def late_times(facts: DriveFacts) -> list[UnseenTime]:
     """Each time in which messages came so late that the page covers their values, with the longest way there."""
     spans: list[tuple[float, float, float]] = []
     for from_s, to_s, estimated_s in facts.held_delays():
-        late_s = _most_late_s(estimated_s)
-        if late_s <= AGEING_FLOOR_S:
+        if estimated_s <= AGEING_FLOOR_S:
             continue
+        late_s = _most_late_s(estimated_s)
         if spans and spans[-1][1] == from_s:
             spans[-1] = (spans[-1][0], to_s, max(spans[-1][2], late_s))
         elif len(spans) < MOST_TIMES:
