@@ -23,7 +23,7 @@ import { Router } from './shell/router.js';
 import { Phone } from './phone/phone.js';
 import { Presence } from './control/presence.js';
 import { Screens } from './shell/screens.js';
-import { isFloor } from './shell/layout.js';
+import { floorQuery } from './shell/layout.js';
 import { Cars, mountChip } from './shell/cars.js';
 import { CarsAlarms } from './shell/cars-alarms.js';
 import { closeSheet, mountSheets } from './shell/sheet.js';
@@ -122,7 +122,9 @@ async function begin() {
   void unfold(page);
   release();
   // What outlasts this visit, and what nobody presses at once, is loaded when the page is complete.
-  setTimeout(() => mountDesk(page), isFloor() ? 0 : 2000); // elsewhere there are no panes
+  const wide = new Promise((resolve) => { floorQuery().addEventListener('change', resolve, { once: true }); });
+  const due = new Promise((resolve) => { setTimeout(resolve, matchMedia('(width >= 43.75em)').matches ? 0 : 2000); });
+  void Promise.race([wide, due]).then(() => mountDesk(page)); // elsewhere there are no panes
   setTimeout(() => import('./drive/ledge.js').then(({ mount }) => mount(page.monitor, page.store, page.say)).catch(() => page.say('The Mark key could not be loaded from the server. Reload the page.', 'Not complete')), 3000);
   setTimeout(() => import('./boot/service-worker.js').then(({ Shell }) => new Shell(page.store, page.say)).catch(() => {}), 2000);
   setTimeout(() => import('./shell/sheet-head.js').then(({ mount }) => mount(page.monitor, page.store)).catch(() => {}), 2000);

@@ -164,4 +164,7 @@ test('the tag of the cursor stands beside it where it would cover the mark of an
   assert.equal(tagAt(200, [200, 240], sizes), 104, 'else at its left');
   assert.equal(tagAt(200, [147, 208], sizes), 220, 'and where both are taken, behind the mark that is nearer');
   assert.equal(tagAt(400, [400], sizes), 304, 'inside of the chart');
+  const everywhere = Array.from({ length: 32 }, (_, i) => 22 + 24 * i); // but for the right end
+  const at = tagAt(200, everywhere, { ...sizes, right: 1010 });
+  assert.ok(Math.max(at - 200, 200 - at - 84) <= 24, `among many marks it stays at its cursor, not at ${at}`);
 });

@@ -38,6 +38,12 @@ test('a row that a search found by a mark names the mark', () => {
   assert.equal(matchWords(row({ matched: { ...mark, at_s: 246.2 } })), 'Mark at 04:06: control · twice');
   assert.equal(matchWords(row({ matched: { ...mark, category: null } })), 'Mark at 05:00: twice', 'one that came later has the time of its moment');
   assert.equal(matchWords(row()), '');
+  const words = 'Box behind the corner, then the car creeps over the stop line and waits';
+  const of = (/** @type {string} */ text, more = {}) => matchWords(row({ matched: { ...mark, words, at_s: 246.2, ...more } }), text);
+  assert.equal(of(' STOP line'), 'Mark at 04:06: control · …over the stop line and waits', 'a late match is seen on a narrow phone');
+  assert.equal(of('corner'), `Mark at 04:06: control · ${words}`);
+  assert.equal(of('control'), `Mark at 04:06: control · ${words}`, 'found in the category');
+  assert.equal(of('stop', { words: `${'x'.repeat(50)}stop` }), `Mark at 04:06: control · …${'x'.repeat(20)}stop`, 'without a space before it');
 });
 
 test('lengths and distances', () => {

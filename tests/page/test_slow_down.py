@@ -202,6 +202,9 @@ async def test_under_the_left_thumb_it_is_slid_to_the_left(thumb: Thumb, car: Ca
     await thumb.phone.page.evaluate("document.documentElement.dataset.hand = 'left'")
     box = await thumb.slide().bounding_box()
     assert box is not None
+    keys = await thumb.phone.page.locator("#monitor > .rail > .pair").bounding_box()
+    assert keys is not None
+    assert box["x"] + box["width"] <= keys["x"]
     y = box["y"] + box["height"] / 2
     for begin, end in ((box["x"] + 34, box["x"] + box["width"] - 34), (box["x"] + box["width"] - 34, box["x"] + 34)):
         assert received(car, "slow_down") == []

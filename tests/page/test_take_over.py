@@ -80,7 +80,6 @@ async def do(phone: Phone, act: Callable[[], Awaitable[None]]) -> None:
         await act()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("width", "height"), [(360, 740), (820, 1180)])
 async def test_the_reasons_are_in_sight_at_once(phone: Phone, canned: Canned, width: int, height: int) -> None:
     """One tap is enough: nothing need be scrolled before it."""
@@ -99,6 +98,26 @@ async def test_the_reasons_are_in_sight_at_once(phone: Phone, canned: Canned, wi
         assert box["y"] + box["height"] <= body["y"] + body["height"]
 
 
+async def test_why_it_was_refused_is_in_sight_above_the_keys(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 360, "height": 740})
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    await take_over(canned, page)
+    canned.refuses["describe_intervention"] = "No room for descriptions on this disk."
+    sheet = page.locator("#sheet-take-over")
+    await sheet.locator('[data-category="object_late"]').tap()
+    await sheet.locator('[data-f="keep"]').tap()
+    why = sheet.get_by_text("No room for descriptions on this disk.")
+    await expect(why).to_be_in_viewport(ratio=1)
+    box, keys = await why.bounding_box(), await sheet.locator(".mark-keys").bounding_box()
+    assert box is not None
+    assert keys is not None
+    assert box["y"] + box["height"] <= keys["y"] + 1
+    assert keys["y"] + keys["height"] <= 740
+
+
+@pytest.mark.slow
 async def test_a_take_over_is_seen_and_described_with_one_tap(browser: Browser, tmp_path: Path) -> None:
     """The key appears by itself and the form never does; a draft outlives "Later"; hostile text stays text."""
     async with watching(browser, tmp_path) as watch:

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { peopleLines, signalLines } from '../../static/js/shell/wall-panes.js';
+import { Lines, peopleLines, signalLines } from '../../static/js/shell/wall-panes.js';
 
 const signal = (/** @type {string} */ label, /** @type {string} */ freshness, more = {}) => ({ label, freshness, rate_hz: 20, age_s: 0.04, ...more });
 const person = (/** @type {string} */ page, /** @type {string} */ name, more = {}) => ({ page, name, can: true, why_text: null, heard_s: 0.1, ...more });
@@ -22,4 +22,23 @@ test('who is in control stands first, then this page; why one cannot hear an ala
   assert.equal(head, '3 pages, alarms audible on 2');
   assert.deepEqual(lines.map(({ cells }) => cells.slice(0, 3)), [['Desk 1', 'in control', 'alarms audible'], ['Desk 2, you', 'watching', 'alarms audible'], ['Field 2', 'watching', 'sound is off']]);
   assert.deepEqual(peopleLines(null, null, 'a'), { head: 'unknown', lines: [] });
+});
+
+test('a displayed list without room for a line counts all of them; one that is not displayed counts none', (t) => {
+  /** @type {(entries: any[]) => void} */
+  let resized = () => {};
+  class ResizeObserver {
+    constructor(/** @type {typeof resized} */ done) { resized = done; }
+    observe() {}
+  }
+  const browser = { ResizeObserver, document: {}, getComputedStyle: () => ({ fontSize: '16px' }) };
+  Object.assign(globalThis, browser);
+  t.after(() => Object.keys(browser).forEach((name) => Reflect.deleteProperty(globalThis, name)));
+  const lines = new Lines(/** @type {any} */ ({ children: [], replaceChildren() {} }));
+  const all = () => [{ key: 'a', cells: ['A'] }, { key: 'b', cells: ['B'] }];
+  assert.equal(lines.draw(all), 0);
+  resized([{ contentRect: { width: 0, height: 0 } }, { contentRect: { width: 300, height: 8 } }]);
+  assert.equal(lines.draw(all), 2);
+  resized([{ contentRect: { width: 0, height: 0 } }]);
+  assert.equal(lines.draw(all), 0);
 });

@@ -79,7 +79,8 @@ class TakeOver {
         html('p', { class: 'lab2' }, html('span', {}, 'What was the reason?'), html('span', {}, 'one tap is enough')),
         html('div', { class: 'chip-rows', role: 'group', 'aria-label': 'Category' }, ...this.chips), this.words, this.#plot.element, // one tap is enough: on a low phone the plot is what scrolls
         html('p', { class: 'lab2' }, html('span', {}, 'Started by'), html('span', {}, 'from the data; press to correct')),
-        html('div', { class: 'seg', role: 'group', 'aria-label': 'Started by' }, ...this.starters), this.bad),
+        html('div', { class: 'seg', role: 'group', 'aria-label': 'Started by' }, ...this.starters)),
+      this.bad, // not in the body, which scrolls
       html('div', { class: 'mark-keys' }, this.later, this.keep)));
   }
 

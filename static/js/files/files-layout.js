@@ -123,11 +123,25 @@ export function storedWords(stored) {
   return state === 'waiting' ? 'not stored, waits for its upload' : 'not stored';
 }
 
-/** The mark in which a search found its text: "Mark at 04:06: control · twice"; empty: it was found elsewhere. @param {Recording} row */
-export function matchWords({ matched, started_ms }) {
+/** A match that is farther from the beginning of the words is not seen on a narrow phone [letters]. */
+const FAR = 20;
+
+/** The words of a mark from shortly before the text that was searched for. @param {string} words @param {string} text */
+function excerptOf(words, text) {
+  const at = words.toLowerCase().indexOf(text.trim().toLowerCase());
+  if (at <= FAR) return words;
+  return `…${words.slice(Math.max(words.lastIndexOf(' ', at - FAR / 2) + 1, at - FAR))}`;
+}
+
+/**
+ * The mark in which a search found its text: "Mark at 04:06: control · twice"; empty: it was found elsewhere.
+ * @param {Recording} row
+ * @param {string} [text] that was searched for
+ */
+export function matchWords({ matched, started_ms }, text = '') {
   if (!matched) return '';
   const at_s = matched.at_s ?? Math.max(0, (matched.marked_ms - started_ms) / 1000);
-  return `Mark at ${duration(at_s, true)}: ${[matched.category, matched.words].filter(Boolean).join(' · ')}`;
+  return `Mark at ${duration(at_s, true)}: ${[matched.category, excerptOf(matched.words, text)].filter(Boolean).join(' · ')}`;
 }
 
 /** "14:03" by this phone's clock. @param {number} at_ms */

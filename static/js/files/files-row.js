@@ -48,10 +48,11 @@ function counts(row) {
 /**
  * @param {Recording} row
  * @param {number} now_ms
+ * @param {string} text that was searched for
  * @param {(row: Recording, from: HTMLElement) => void} onPress
  * @returns {HTMLElement}
  */
-export function drawRow(row, now_ms, onPress) {
+export function drawRow(row, now_ms, text, onPress) {
   const name = nameOf(row, now_ms);
   const more = html('button', { type: 'button', class: 'btn', 'aria-label': `Actions for ${name}`, 'aria-haspopup': 'dialog' }, icon('menu', 'dots'));
   const length = row.state === 'read' ? html('span', {}, ...textNodes(lengthWords(row.length_s))) : html('span', { class: 'dash', 'aria-hidden': 'true' }, NOTHING);
@@ -59,7 +60,7 @@ export function drawRow(row, now_ms, onPress) {
   const tags = row.tags.length ? [html('div', { class: 'm tags' }, ...row.tags.map((tag) => html('bdi', { class: 'file-tag' }, tag)))] : [];
   const stored = row.stored ? [html('div', { class: 'm stored', 'data-state': row.stored.state }, ...textNodes(storedWords(row.stored)))] : [];
   const when = row.title ? [html('span', { class: 'when' }, whenWords(row.started_ms, now_ms))] : [];
-  const matched = matchWords(row);
+  const matched = matchWords(row, text);
   const found = matched ? [html('bdi', { class: 'm matched' }, ...textNodes(matched))] : [];
   const item = html('li', { class: 'file', 'data-id': row.id, 'data-state': row.state }, thumbnail(row),
     html('div', { class: 'tx' }, html('div', { class: 't', dir: 'auto' }, name), html('div', { class: 'm origin' }, ...when, html('span', {}, originWords(row, now_ms))), html('div', { class: 'm facts-line' }, length, html('span', {}, ...textNodes(sizeWords(row.size_bytes))), last), ...stored, ...tags, ...found),

@@ -171,9 +171,9 @@ class FilesTab {
     const now_ms = Date.now();
     const today = new Date(now_ms).toDateString();
     const next = new Map(this.model.rows.map((row) => {
-      const key = JSON.stringify([row, today]);
+      const key = JSON.stringify([row, today, row.matched && this.model.text]);
       const old = this.#drawn.get(row.id);
-      return [row.id, old && old.key === key ? old : { key, element: drawRow(row, now_ms, (one, from) => {
+      return [row.id, old && old.key === key ? old : { key, element: drawRow(row, now_ms, this.model.text, (one, from) => {
         from.focus({ preventScroll: true }); // the sheet returns the focus to it
         this.#chosen = one.id;
         this.sheet.open(one);

@@ -211,7 +211,7 @@ class DriveChart {
       const at = tagAt(x, middles, { left, right: left + box.width, width: TAG_PX, mark: 24 });
       tag.push(svg('rect', { class: 'tag-box', x: at.toFixed(1), y: 1, width: TAG_PX, height: 26 }), svg('text', { class: 'n tag-text', x: (at + TAG_PX / 2).toFixed(1), y: 20 }, timeOfDay(this.#clock(cursor_s))));
     }
-    head.replaceChildren(...marks, ...tag);
+    head.replaceChildren(...tag, ...marks); // no mark is under the tag
   }
 
   /** The value at the cursor beside each pane; without a cursor, or beyond what is known, that of now. */

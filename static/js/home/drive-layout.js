@@ -156,8 +156,11 @@ export function placedMarks(marks, [from_s, to_s], width) {
   return found;
 }
 
+/** The tag of the cursor stands no farther beside it [px]. */
+const BESIDE_PX = 24;
+
 /**
- * Where the tag of the cursor begins: above the cursor, or the nearest place where it covers no mark of an alarm.
+ * Where the tag of the cursor begins: above the cursor, or the nearest place beside it where it covers fewer marks of alarms.
  * @param {number} x of the cursor
  * @param {number[]} marks their middles
  * @param {{left: number, right: number, width: number, mark: number}} sizes the ends of the chart, widths of tag and mark
@@ -167,7 +170,7 @@ export function tagAt(x, marks, { left, right, width, mark }) {
   const covers = (/** @type {number} */ at) => marks.filter((one) => one + mark / 2 > at && one - mark / 2 < at + width).length;
   const far = (/** @type {number} */ at) => Math.abs(at + width / 2 - x);
   const places = [x - width / 2, ...[x, ...marks].flatMap((one) => [one + mark / 2, one - mark / 2 - width])].map(inside);
-  return places.reduce((best, at) => (covers(at) - covers(best) || far(at) - far(best)) < 0 ? at : best);
+  return places.filter((at) => Math.max(at - x, x - at - width) <= BESIDE_PX).reduce((best, at) => (covers(at) - covers(best) || far(at) - far(best)) < 0 ? at : best);
 }
 
 /** A tick of the clock axis: with seconds where ticks are less than a minute apart. @param {number} at_s since 1970 @param {number} apart_s */

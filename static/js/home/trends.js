@@ -31,8 +31,8 @@ export function mount(root, store, say) {
   let isOver = false;
   let turn = 0;
 
-  const watcher = new IntersectionObserver(([entry]) => {
-    isSeen = entry?.isIntersecting ?? false;
+  const watcher = new IntersectionObserver((entries) => {
+    isSeen = entries.at(-1)?.isIntersecting ?? false; // the newest
     redraw();
   });
   watcher.observe(list);

@@ -49,21 +49,24 @@ export function peopleLines(reach, control, page) {
 /** A list of lines, as many as are seen whole. */
 export class Lines {
   #lines = 0;
+  #isDisplayed = false;
   /** @type {Map<string, HTMLElement>} */
   #drawn = new Map();
 
   /** @param {HTMLElement} list */
   constructor(list) {
     this.list = list;
-    this.observer = new ResizeObserver(([entry]) => {
-      this.#lines = Math.floor((entry?.contentRect.height ?? 0) / (LINE_PX * scale()));
+    this.observer = new ResizeObserver((entries) => {
+      const { width, height } = entries.at(-1)?.contentRect ?? { width: 0, height: 0 };
+      this.#isDisplayed = width > 0;
+      this.#lines = Math.floor(height / (LINE_PX * scale()));
     });
     this.observer.observe(list);
   }
 
-  /** @param {() => Line[]} lines requested only where there is room @returns {number} those that there is no room for */
+  /** @param {() => Line[]} lines requested only where the list is displayed @returns {number} those that there is no room for */
   draw(lines) {
-    if (!this.#lines) return 0;
+    if (!this.#isDisplayed) return 0;
     const all = lines();
     const shown = all.slice(0, this.#lines);
     const old = this.#drawn;
