@@ -207,8 +207,7 @@ def _link(facts: Facts, snapshot: Snapshot) -> LinkState:
 
 
 def where_cut(facts: Facts, snapshot: Snapshot) -> tuple[Cut | None, Problem | None, float | None]:
-    """The broken connection of the chain, its cause, and the last contact beyond it. If a part behind the bridge fails
-    while messages still arrive, no connection is broken, but the problem is still reported."""
+    """The broken connection of the chain, its cause, and the last contact beyond it. None with a problem: messages come."""
     if facts.phase == "idle":
         return None, None, None
     heard_s = facts.link.heard_s if facts.link is not None else None
