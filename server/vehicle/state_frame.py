@@ -207,7 +207,7 @@ def _link(facts: Facts, snapshot: Snapshot) -> LinkState:
 
 
 def where_cut(facts: Facts, snapshot: Snapshot) -> tuple[Cut | None, Problem | None, float | None]:
-    """The broken connection of the chain, its cause, and the last contact beyond it. None with a problem: messages come."""
+    """The broken connection of the chain, its cause, the last contact beyond it; a cause alone: messages still come."""
     if facts.phase == "idle":
         return None, None, None
     heard_s = facts.link.heard_s if facts.link is not None else None
