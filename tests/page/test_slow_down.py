@@ -198,6 +198,19 @@ async def test_from_the_keyboard_enter_is_held_for_a_second(thumb: Thumb, car: C
 
 
 @pytest.mark.gate
+@pytest.mark.parametrize("hand", ["left", "right"])
+async def test_in_a_low_window_the_sheet_of_an_alarm_has_both_keys_whole(thumb: Thumb, car: Canned, hand: str) -> None:
+    page = thumb.phone.page
+    await page.set_viewport_size({"width": 412, "height": 360})
+    await page.evaluate(f"document.documentElement.dataset.hand = '{hand}'")
+    car.state["alarms"] = [SPEEDING]
+    keys = page.locator("#sheet-alarm .rail > :is(.key, .slide):visible")
+    await expect(keys).to_have_count(2)
+    for key in await keys.all():
+        await expect(key).to_be_in_viewport(ratio=1)
+
+
+@pytest.mark.gate
 async def test_under_the_left_thumb_it_is_slid_to_the_left(thumb: Thumb, car: Canned) -> None:
     await thumb.phone.page.evaluate("document.documentElement.dataset.hand = 'left'")
     box = await thumb.slide().bounding_box()
