@@ -128,6 +128,11 @@ class Phone:
         """What must be granted beside a limit: the time of looking, and thrice what this machine lets anyone wait."""
         return 0.4 + 3 * self.stutter_s
 
+    @property
+    def faults(self) -> list[str]:
+        """The lines of its console but for the lost connections a test made."""
+        return [line for line in self.complaints if not LOST.search(line)]
+
     async def watch_machine(self) -> None:
         """Notes the longest time by which a short sleep was late, for as long as it runs."""
         while True:
@@ -313,10 +318,10 @@ async def phone(browser: Browser, kept_phones: list[Phone], request: pytest.Fixt
     machine.cancel()
     if request.node.stash.get(FAILED, False):
         await picture(phone, request.node.name)
-    complaints = [line for line in phone.complaints if not LOST.search(line)]
-    if is_own or complaints:
+    faults = phone.faults
+    if is_own or faults:
         await phone.page.context.close()
     else:
         await phone.clear()
         kept_phones.append(phone)
-    assert complaints == []
+    assert faults == []

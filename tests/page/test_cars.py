@@ -155,7 +155,7 @@ async def test_a_car_that_speeds_is_named_within_a_second_on_a_phone_that_shows_
                     await phone.f("who").tap()
         await shows(phone, "Serval")
         await expect(page.locator("#sheet-alarm")).to_contain_text("Speed above limit")
-        assert phone.complaints == []
+        assert phone.faults == []
     fleet.roamers["Serval"].speed_mps = 3.0
 
 

@@ -136,6 +136,8 @@ async def test_case_14_exit_from_a_lost_connection_leads_to_the_connect_screen(p
         await phone.open(watch.address)
         await phone.live()
         await car.kill()
+        await expect(phone.page.locator("#sheet-lost")).to_be_visible()
+        await expect(phone.page.locator("#sheet-lost")).not_to_have_attribute("data-moved", "")
         await phone.page.locator("#sheet-lost [data-f=exit]").tap()
         await expect(phone.page.locator("#connect")).to_be_visible()
         await expect(phone.page.locator("dialog[open]")).to_have_count(0)

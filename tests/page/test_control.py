@@ -12,7 +12,7 @@ from typing import Any
 import httpx
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser, BrowserContext, CDPSession, expect
+from playwright.async_api import Browser, BrowserContext, CDPSession, Locator, expect
 
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
@@ -58,8 +58,13 @@ class Crew:
         return sheet
 
     async def press(self, name: str, key: str) -> None:
-        sheet = await self.sheet(name)
-        await sheet.get_by_role("button", name=key).tap()
+        await tap(await self.sheet(name), key)
+
+
+async def tap(part: Locator, key: str) -> None:
+    """Presses a key of a sheet or snackbar, once it takes a press."""
+    await expect(part).not_to_have_attribute("data-moved", "")
+    await part.get_by_role("button", name=key, exact=True).tap()
 
 
 class Sleep:
@@ -119,7 +124,7 @@ async def crew(browser: Browser, data: Path, car: Process) -> AsyncIterator[Crew
         finally:
             for context in contexts:
                 await context.close()
-    assert [line for phone in phones.values() for line in phone.complaints] == []
+    assert [line for phone in phones.values() for line in phone.faults] == []
 
 
 async def holds(one: Crew, name: str) -> None:
@@ -143,10 +148,10 @@ async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(
         refused = one["Ben"].page.locator(".snack.note")
         await expect(refused).to_contain_text("Not resumed")
         await expect(refused).to_contain_text("Ann is in control.")
-        await refused.get_by_role("button", name="Request control").tap()
+        await tap(refused, "Request control")
         prompt = one["Ann"].page.locator(".snack.prompt")
         await expect(prompt).to_contain_text(re.compile(r"Ben gets it in (\d+) s unless you keep it\."))
-        await prompt.get_by_role("button", name="Keep").tap()
+        await tap(prompt, "Keep")
         await expect(one["Ben"].page.locator(".snack.note")).to_contain_text(
             "Ann keeps control; the request of Ben was declined."
         )
@@ -154,7 +159,7 @@ async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(
 
         await one.press("Cem", "Request control")
         await expect(one["Cem"].page.locator("#sheet-control")).to_contain_text("It is granted in")
-        await prompt.get_by_role("button", name="Hand over").tap()
+        await tap(prompt, "Hand over")
         await holds(one, "Cem")
         await one["Cem"].page.locator("#sheet-control").get_by_role("button", name="Close").tap()
 
@@ -163,10 +168,10 @@ async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(
         await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("Cem handed control over to Ben.")
 
         sheet = await one.sheet("Ann")
-        await sheet.get_by_role("button", name="Take over …").tap()
+        await tap(sheet, "Take over …")
         await expect(sheet).to_contain_text("Take over from Ben?")
         await expect(one.chip("Ann")).to_have_text("Ben")  # not before it is confirmed
-        await sheet.get_by_role("button", name="Take over", exact=True).tap()
+        await tap(sheet, "Take over")
         await holds(one, "Ann")
         await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("You lost control")
         await expect(one["Cem"].page.locator(".snack.note")).to_contain_text("Ann took control over from Ben.")
@@ -196,7 +201,7 @@ async def test_lost_by_sleep_back_again_and_lost_for_good(browser: Browser, car:
 
         await hide(one["Ann"], True)
         await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("Nobody is in control", timeout=10_000)
-        await one["Ben"].page.locator(".snack.note").get_by_role("button", name="Take control").tap()
+        await tap(one["Ben"].page.locator(".snack.note"), "Take control")
         await expect(one.chip("Ben")).to_have_text("You")
         await hide(one["Ann"], False)
         await holds(one, "Ben")

@@ -62,7 +62,7 @@ async def grown(large: Browser) -> AsyncIterator[Phone]:
     phone = await new_phone(large)
     yield phone
     await phone.page.context.close()
-    assert phone.complaints == []
+    assert phone.faults == []
 
 
 async def all_is_in_reach(phone: Phone, canned: Canned, sizes: list[tuple[float, float]], tab: str) -> None:

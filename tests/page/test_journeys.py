@@ -35,7 +35,7 @@ async def test_an_acknowledgement_reaches_a_second_phone(phone: Phone, browser: 
             await second.f("strip").tap()
             row = second.page.locator("[data-f=alarms] li", has_text="Speed above limit")
             await expect(row).to_contain_text("acknowledged by")
-            assert second.complaints == []
+            assert second.faults == []
         finally:
             await context.close()
 

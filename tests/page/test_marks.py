@@ -133,7 +133,7 @@ async def test_a_tap_stores_a_mark_and_undo_takes_it_back(browser: Browser, car:
         await one.phone.page.reload()
         await one.phone.live()
         await one.stored(1)
-        assert one.phone.complaints == []
+        assert one.phone.faults == []
 
 
 async def test_a_mark_with_voice_photo_and_words(hearing: Browser, car: Process, tmp_path: Path) -> None:
@@ -185,7 +185,7 @@ async def test_a_mark_with_voice_photo_and_words(hearing: Browser, car: Process,
         await expect(rows.first).to_contain_text(HOSTILE)
         await no_barrier(page, "the list of marks", "#sheet-marks")
         await fits_all(page, "the list of marks", "#sheet-marks")
-        assert one.phone.complaints == []
+        assert one.phone.faults == []
 
 
 STALLS = """() => addEventListener('pointerdown', (event) => {

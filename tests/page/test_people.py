@@ -77,7 +77,7 @@ async def shift(browser: Browser, data: Path, car: Process) -> AsyncIterator[Shi
             await phone.live()
             phones.append(phone)
         yield Shift(phones[0], phones[1], client, console)
-    assert [line for phone in phones for line in phone.complaints] == []
+    assert [line for phone in phones for line in phone.faults] == []
 
 
 @pytest.mark.gate

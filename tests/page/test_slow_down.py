@@ -384,7 +384,7 @@ async def test_a_viewer_sees_all_of_it_and_orders_nothing(browser: Browser, car:
         assert not any(received(car, kind) for kind in ("slow_down", "release", "veto", "arm"))
     finally:
         await context.close()
-    assert phone.complaints == []
+    assert phone.faults == []
 
 
 @pytest.mark.gate
