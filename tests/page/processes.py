@@ -12,9 +12,9 @@ import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-import httpx
 import psutil
 
+from tests.http import http_client
 from tests.through_broker import NODE
 
 IS_PARTED = bool(os.environ.get("CATGRAPH_THROUGH_BROKER"))  # a server is an agent, a broker and a web node
@@ -185,7 +185,7 @@ async def driving(data: Path) -> AsyncIterator[Drive]:
 
 async def watching(watch: Process, address: str) -> Process:
     """The server, newly connected to a car: nothing is acknowledged."""
-    async with httpx.AsyncClient(base_url=watch.address) as client:
+    async with http_client(base_url=watch.address) as client:
         await client.post("/api/disconnect")
         await client.post("/api/connect", json={"address": address})
     return watch

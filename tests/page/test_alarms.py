@@ -6,11 +6,11 @@ import re
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import expect
 
+from tests.http import http_client
 from tests.page.conftest import Phone
 from tests.page.drives import diagnostics, number, steady, twist, write
 from tests.page.processes import Process, replay, running, server, watching
@@ -90,7 +90,7 @@ async def test_above_the_limit_the_gauge_and_the_tile_say_fault(phone: Phone, sp
     await expect(tile).to_contain_text("Speed")
     await expect(tile).to_contain_text(re.compile(r"FAULT 12\.6 m/s"))
     assert await phone.speed() == "12.6"
-    async with httpx.AsyncClient() as client:  # another page acknowledges: the dialog goes here too
+    async with http_client() as client:  # another page acknowledges: the dialog goes here too
         alarm = (await client.get(f"{speeding.address}/api/alarms")).json()["alarms"][0]
         await client.post(
             f"{speeding.address}/api/alarms/{alarm['id']}/acknowledge", json={"occurrence": alarm["occurrence"]}
@@ -174,7 +174,7 @@ async def test_who_acknowledged_stands_in_the_alarm_log_on_every_phone(phone: Ph
     await phone.open(f"{speeding.address}/#home")
     await phone.f("acknowledge", "#sheet-alarm").tap()
     await expect(phone.page.locator("#sheet-alarm")).to_be_hidden()
-    async with httpx.AsyncClient() as client:
+    async with http_client() as client:
         alarms = (await client.get(f"{speeding.address}/api/alarms")).json()["alarms"]
     assert next(alarm for alarm in alarms if alarm["id"] == "speed_limit")["acknowledged_by"] == "Pixel 7 · a3f2"
     await expect(phone.f("strip")).to_contain_text("Speed above limit")

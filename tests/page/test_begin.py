@@ -7,11 +7,11 @@ import json
 import re
 from collections.abc import AsyncIterator
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import expect
 
+from tests.http import http_client
 from tests.page.conftest import LIVE, Phone
 from tests.page.processes import Process, running, server, simulate
 
@@ -68,7 +68,7 @@ async def alarmed(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Pro
     async with (
         running(*simulate("--scenario", "speeding@0")) as car,
         running(*server(tmp_path_factory.mktemp("data"), car.address)) as process,
-        httpx.AsyncClient(base_url=process.address) as client,
+        http_client(base_url=process.address) as client,
         asyncio.timeout(30),
     ):
         while not [one for one in (await client.get("/api/state")).json()["alarms"] if one["priority"] == "critical"]:

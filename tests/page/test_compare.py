@@ -8,11 +8,11 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
+from tests.http import http_client
 from tests.page import drives
 from tests.page.barriers import no_barrier
 from tests.page.conftest import phone_in
@@ -33,7 +33,7 @@ async def address(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[str
     _write(data / "recordings" / "car" / "first.bag", 8.0, 2.0, 20.0)
     _write(data / "recordings" / "Ocelot" / "second.bag", 5.0, 5.0, 14.0)
     async with running(*simulate()) as car, running(*server(data, car.address)) as process:
-        async with httpx.AsyncClient() as client, asyncio.timeout(60):
+        async with http_client() as client, asyncio.timeout(60):
             while True:
                 listing = (await client.get(f"{process.address}/api/recordings")).json()
                 if sum(row["state"] == "read" for row in listing["recordings"]) >= 2:
@@ -52,7 +52,7 @@ def _write(path: Path, speed_mps: float, from_s: float, seconds: float) -> None:
 
 async def row_of(page: Page, address: str, name: str) -> str:
     """Selector of a recording among the files, and of nothing else."""
-    async with httpx.AsyncClient() as client:
+    async with http_client() as client:
         rows = (await client.get(f"{address}/api/recordings")).json()["recordings"]
     return next(row["id"] for row in rows if row["id"].startswith(name))
 

@@ -8,12 +8,12 @@ import re
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import expect
 
 from server.rosbridge.address import parse
+from tests.http import http_client
 from tests.page.canned import Canned
 from tests.page.canned import idle as no_car
 from tests.page.conftest import Phone
@@ -35,7 +35,7 @@ async def idle(serving: Process) -> Process:
 
 
 async def disconnect(serving: Process) -> None:
-    async with httpx.AsyncClient() as client:
+    async with http_client() as client:
         (await client.post(f"{serving.console}/api/disconnect")).raise_for_status()
 
 

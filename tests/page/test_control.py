@@ -9,11 +9,11 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, BrowserContext, CDPSession, Locator, expect
 
+from tests.http import http_client
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
 
@@ -34,7 +34,7 @@ class Crew:
         return self[name].f("who-name")
 
     async def state(self) -> dict[str, Any]:
-        async with httpx.AsyncClient() as client:
+        async with http_client() as client:
             found: dict[str, Any] = (await client.get(f"{self.watch.address}/api/state")).json()
             return found
 
@@ -45,7 +45,7 @@ class Crew:
         return state
 
     async def events(self) -> list[dict[str, Any]]:
-        async with httpx.AsyncClient() as client:
+        async with http_client() as client:
             answer = await client.get(f"{self.watch.address}/api/events", params={"limit": 1000})
         return [event for event in answer.json()["events"] if event["change"] == "control"]
 
@@ -266,7 +266,7 @@ async def test_nobody_who_hears_while_the_car_moves_is_a_warning_on_every_page(
         context, phone = await opened(browser, "Ann", watch.address)
         try:
             await expect(phone.page.locator(".strip")).to_contain_text("Nobody can hear alarms", timeout=40_000)
-            async with httpx.AsyncClient() as client:
+            async with http_client() as client:
                 standing = (await client.get(f"{watch.address}/api/alarms")).json()["alarms"]
             assert [
                 "nobody can hear alarms: none of 1 (sound off)" in one["text"]
@@ -278,7 +278,7 @@ async def test_nobody_who_hears_while_the_car_moves_is_a_warning_on_every_page(
             await expect(sheet).to_be_visible()
             await sheet.locator('[data-f="arm"]').tap()
             await expect(sheet).to_contain_text("This device sounds alarms while this page is in the foreground.")
-            async with httpx.AsyncClient() as client:
+            async with http_client() as client:
                 async with asyncio.timeout(10):
                     while True:
                         alarms = (await client.get(f"{watch.address}/api/alarms")).json()["alarms"]

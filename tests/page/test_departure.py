@@ -15,6 +15,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Locator, expect
 
+from tests.http import http_client
 from tests.page.barriers import no_barrier
 from tests.page.conftest import LIVE, PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
@@ -128,7 +129,7 @@ async def test_ten_items_are_walked_fixed_and_signed_within_15_taps(
     phone = await phone_in(context)
     walk = Walk(phone)
     async with running(*server(prepared(tmp_path), car.address, port)) as watch:
-        async with httpx.AsyncClient(base_url=watch.address) as client:
+        async with http_client(base_url=watch.address) as client:
             await phone.open(watch.address)
             await phone.live()
             await walk.tap(phone.f("menu"))
@@ -187,7 +188,7 @@ async def test_ten_items_are_walked_fixed_and_signed_within_15_taps(
         await expect(phone.f("link-state")).not_to_have_text(LIVE, timeout=12_000)
     async with (
         running(*server(tmp_path, car.address, port)) as watch,
-        httpx.AsyncClient(base_url=watch.address) as client,
+        http_client(base_url=watch.address) as client,
     ):
         again = await check_of(client)
         assert again["signature"] == signature, "what was signed is kept letter by letter"
@@ -208,7 +209,7 @@ async def test_the_list_is_edited_in_settings(browser: Browser, car: Process, tm
     phone = await phone_in(context)
     async with (
         running(*server(prepared(tmp_path), car.address)) as watch,
-        httpx.AsyncClient(base_url=watch.address) as client,
+        http_client(base_url=watch.address) as client,
     ):
         await phone.open(f"{watch.address}/#settings")
         await phone.live()

@@ -8,12 +8,12 @@ import re
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, expect
 
 from server.recording.catalog.annotations import media_beside
+from tests.http import http_client
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.conftest import Phone
 from tests.page.drives import steady
@@ -201,7 +201,7 @@ async def test_an_alarm_over_the_logbook_of_a_car_that_drives_is_acknowledged(
         assert rail
         assert between["y"] >= strip["y"] + strip["height"] - 1
         assert between["y"] + between["height"] <= rail["y"] + 1
-        async with httpx.AsyncClient(base_url=watch.address) as client:
+        async with http_client(base_url=watch.address) as client:
             await client.patch("/api/settings", json={"values": {"speed_limit.max_mps": 2.0}})
         sheet = page.locator("#sheet-alarm")
         await expect(sheet).to_contain_text("Speed above limit", timeout=15_000)

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import httpx
 from playwright.async_api import expect
 
 from server.access.order_signer import OrderSigner
 from server.bus import broker_users
+from tests.http import http_client
 from tests.page.conftest import Phone
 from tests.page.processes import Process, running, simulate
 from tests.server.bus.broker import Broker, running_broker
@@ -58,7 +58,7 @@ async def until(found: Callable[[], Awaitable[Any]]) -> Any:
 
 
 async def test_a_node_answers_for_the_cars_of_agents(tmp_path: Path) -> None:
-    async with fleet(tmp_path) as one, httpx.AsyncClient(base_url=one.node.address) as room:
+    async with fleet(tmp_path) as one, http_client(base_url=one.node.address) as room:
 
         async def phase() -> bool:
             listed = (await room.get("/api/vehicles")).json()["vehicles"]
@@ -86,7 +86,7 @@ async def test_a_node_answers_for_the_cars_of_agents(tmp_path: Path) -> None:
         assert (await room.post("/api/pause", headers=signed, params={"vehicle": "ocelot"})).status_code == 200
         events = (await room.get("/api/log", params={"vehicle": "ocelot"})).json()["events"]
         assert any(event["by"] == "Ann" for event in events)
-        async with httpx.AsyncClient(base_url=one.agent.address) as car:
+        async with http_client(base_url=one.agent.address) as car:
             assert (await car.get("/api/log")).json()["events"] == events
             assert (await car.get("/api/health")).json()["problems"] == []
             counted = (await room.get("/metrics")).text
@@ -117,7 +117,7 @@ async def test_a_node_answers_for_the_cars_of_agents(tmp_path: Path) -> None:
         await one.agent.kill()
         await one.node.kill()
         node = ("web", *credentials(tmp_path, one.broker, "room"), "--data", str(tmp_path / "node"))
-        async with running(*node) as again, httpx.AsyncClient(base_url=again.address) as room:
+        async with running(*node) as again, http_client(base_url=again.address) as room:
             rows = (await room.get("/api/vehicles")).json()["vehicles"]
             assert [(row["name"], row["phase"]) for row in rows] == [("ocelot", "lost")]
 
@@ -131,7 +131,7 @@ async def test_the_page_of_a_node_names_what_is_lost(phone: Phone, tmp_path: Pat
         await one.car.type("speeding 30")
         await expect(page.locator("#sheet-alarm[open]")).to_contain_text("Speed above limit", timeout=SOON_S * 1000)
         shown_s = time.time()
-        async with httpx.AsyncClient() as car:
+        async with http_client() as car:
             events = (await car.get(f"{one.agent.address}/api/log")).json()["events"]
         raised_ms = next(event["at_ms"] for event in events if event["title"] == "Speed above limit")
         assert shown_s - raised_ms / 1000 <= 1.0 + phone.slack_s
@@ -168,7 +168,7 @@ async def test_a_person_says_that_silent_cars_are_off_and_one_that_is_heard_is_n
     phone: Phone, tmp_path: Path
 ) -> None:
     page = phone.page
-    async with fleet(tmp_path) as one, httpx.AsyncClient(base_url=one.node.address) as room:
+    async with fleet(tmp_path) as one, http_client(base_url=one.node.address) as room:
         await phone.open(f"{one.node.address}/fleet")
         row = page.locator('[data-car="ocelot"]')
         lost = page.locator('#fleet [data-f="lost"]')

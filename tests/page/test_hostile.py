@@ -7,7 +7,6 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 from playwright.async_api import expect
 
@@ -16,6 +15,7 @@ from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.annotations import Annotations
 from server.rosbridge_server.graph import SOURCE, Topic
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.page.conftest import Phone
 from tests.page.roamer import Roamer, roaming
 from tests.page.test_policy import NOTE_VIOLATIONS, violations
@@ -114,7 +114,7 @@ async def test_a_recording_that_means_harm_is_only_listed(phone: Phone, tmp_path
         car = await stack.enter_async_context(roaming())
         config = Config(vehicles=(Vehicle(name="car", address=car.address),), data=tmp_path / "data")
         address = await stack.enter_async_context(serving(config))
-        client = await stack.enter_async_context(httpx.AsyncClient(base_url=address))
+        client = await stack.enter_async_context(http_client(base_url=address))
         settings = {"host": "127.0.0.1", "port": 9, "security": "none", "sender": "car@test.example"}
         assert (await client.put("/api/mail/settings", json=settings)).status_code == 200
         async with asyncio.timeout(20):

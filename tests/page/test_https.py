@@ -15,13 +15,13 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import BrowserContext, Error, async_playwright, expect
 
 from server.tls.names import label_of
 from tests.chromium import FLAGS
+from tests.http import http_client
 from tests.page import house
 from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE
@@ -66,7 +66,7 @@ async def served(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Fiel
     port, setup_port = free_port(), free_port()
     ports = ("--port", str(port), "--setup-port", str(setup_port))
     async with running("serve", "--host", "0.0.0.0", *ports, "--data", str(folder / "data"), folder=project):
-        async with httpx.AsyncClient() as client:
+        async with http_client() as client:
             (folder / "ca.crt").write_bytes((await client.get(f"http://127.0.0.1:{setup_port}/ca.crt")).content)
         yield Field(port=port, setup_port=setup_port, ca=folder / "ca.crt")
 

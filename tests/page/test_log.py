@@ -7,12 +7,12 @@ import re
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import expect
 
 from server.bus.journal import Journal
+from tests.http import http_client
 from tests.page.barriers import no_barrier
 from tests.page.conftest import Phone
 from tests.page.drives import steady
@@ -40,7 +40,7 @@ async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Proce
     folder = tmp_path_factory.mktemp("log")
     fast = steady(folder / "fast.bag", 12.6)
     async with running(*server(folder / "data")) as first:
-        async with httpx.AsyncClient(base_url=first.address) as client:
+        async with http_client(base_url=first.address) as client:
             await client.get("/api/log")
     found = list((folder / "data").rglob("events.sqlite"))
     assert len(found) == 1, found

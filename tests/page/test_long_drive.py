@@ -8,11 +8,11 @@ import re
 from collections.abc import AsyncIterator, Callable
 from typing import Any
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import Request, expect
 
+from tests.http import http_client
 from tests.page import drives
 from tests.page.conftest import Phone
 from tests.page.processes import running, server, simulate
@@ -37,7 +37,7 @@ async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[tuple
         seconds=HOURS * 3600,
     )
     async with running(*simulate()) as car, running(*server(data, car.address)) as process:
-        async with httpx.AsyncClient() as client, asyncio.timeout(READ_S):
+        async with http_client() as client, asyncio.timeout(READ_S):
             while True:
                 rows: list[dict[str, Any]] = (await client.get(f"{process.address}/api/recordings")).json()[
                     "recordings"

@@ -13,6 +13,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Locator, expect
 
+from tests.http import http_client
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.conftest import Phone
 from tests.page.drives import steady
@@ -43,7 +44,7 @@ async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Proce
 @pytest_asyncio.fixture(loop_scope="session")
 async def api(watch: Process, post: Post) -> AsyncIterator[httpx.AsyncClient]:
     """The server's own answers, with mail set up."""
-    async with httpx.AsyncClient(base_url=watch.address) as client:
+    async with http_client(base_url=watch.address) as client:
         (await client.put("/api/mail/settings", json=settings(post))).raise_for_status()
         yield client
 

@@ -17,6 +17,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, Locator, async_playwright, expect
 
 from tests.chromium import FLAGS
+from tests.http import http_client
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
@@ -56,7 +57,7 @@ class Drive:
         await self.phone.acknowledge_meanwhile()
 
     async def get(self, path: str) -> httpx.Response:
-        async with httpx.AsyncClient(base_url=self.watch.address) as client:
+        async with http_client(base_url=self.watch.address) as client:
             return await client.get(path)
 
     async def marks(self) -> list[dict[str, Any]]:

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import Locator, Page, WebSocket, expect
 
+from tests.http import http_client
 from tests.page import drives
 from tests.page.canned import Canned, check, live
 from tests.page.conftest import Phone
@@ -233,7 +233,7 @@ async def street(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[tupl
     warnings = [(1.0 + n / 2, "warning") for n in range(12)]
     made.record(folder / "car_20260921T142640Z.mcap", seconds=30.0, alarms=[*warnings, (20.0, "critical")])
     async with running(*simulate()) as car, running(*server(data, car.address)) as process:
-        async with httpx.AsyncClient() as client, asyncio.timeout(60):
+        async with http_client() as client, asyncio.timeout(60):
             while len(rows := (await client.get(f"{process.address}/api/recordings")).json()["recordings"]) < 2:
                 await asyncio.sleep(0.2)
         yield process.address, {Path(row["file"]).suffix: row["id"] for row in rows}

@@ -18,6 +18,7 @@ from playwright.async_api import BrowserContext, Playwright, async_playwright, e
 from playwright.async_api import Error as PlaywrightError
 
 from tests.chromium import FLAGS
+from tests.http import http_client
 from tests.page.conftest import PHONE
 from tests.page.processes import Process, running, server, simulate
 from tests.ports import free_port
@@ -168,7 +169,7 @@ async def test_what_the_page_said_is_stored_survives_its_kill(
 
 
 async def is_there(address: str) -> bool:
-    async with httpx.AsyncClient(base_url=address) as client:
+    async with http_client(base_url=address) as client:
         try:
             return (await client.get("/api/health")).status_code < 500
         except httpx.HTTPError:

@@ -14,6 +14,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, Locator, Page, Route, expect
 from playwright.async_api import TimeoutError as PlaywrightTimeout
 
+from tests.http import http_client
 from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
@@ -64,8 +65,8 @@ async def car() -> AsyncIterator[Process]:
 async def shift(browser: Browser, data: Path, car: Process) -> AsyncIterator[Shift]:
     phones = []
     async with running(*server(data, car.address)) as watch, contextlib.AsyncExitStack() as stack:
-        client = await stack.enter_async_context(httpx.AsyncClient(base_url=watch.address))
-        console = await stack.enter_async_context(httpx.AsyncClient(base_url=watch.console))
+        client = await stack.enter_async_context(http_client(base_url=watch.address))
+        console = await stack.enter_async_context(http_client(base_url=watch.console))
         for name, role in (("A. K.", "operator"), ("M. R.", "safety_driver"), (HOSTILE, "supervisor")):
             assert (await client.post("/api/people", json={"name": name, "role": role})).is_success
         for name in ("Pixel 7", "iPhone"):

@@ -8,10 +8,10 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 from playwright.async_api import expect
 
+from tests.http import http_client
 from tests.page.conftest import Phone
 from tests.page.processes import Process, running, server, simulate
 
@@ -27,7 +27,7 @@ class Ride:
         self.state: dict[str, Any] = {}
 
     async def run(self) -> None:
-        async with httpx.AsyncClient() as client:
+        async with http_client() as client:
             while True:
                 self.state = (await client.get(f"{self._address}/api/state")).json()
                 value = self.state["signals"]["position"]["value"]

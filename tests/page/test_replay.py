@@ -9,11 +9,11 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Any
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
+from tests.http import http_client
 from tests.page import drives
 from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
@@ -47,7 +47,7 @@ async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Watch
         seconds=70.0,
     )
     async with running(*simulate()) as car, running(*server(data, car.address)) as process:
-        async with httpx.AsyncClient() as client, asyncio.timeout(30):
+        async with http_client() as client, asyncio.timeout(30):
             while not (rows := (await client.get(f"{process.address}/api/recordings")).json()["recordings"]):
                 await asyncio.sleep(0.2)
         yield Watch(process.address, rows[-1]["id"], car)
@@ -178,7 +178,7 @@ async def test_the_scan_is_that_of_the_recording_and_does_not_grow_old(phone: Ph
 
 async def test_nothing_is_ordered_from_a_replay(phone: Phone, watch: Watch) -> None:
     page = await replayed(phone, watch, 3.0)
-    async with httpx.AsyncClient() as client:
+    async with http_client() as client:
         before = (await client.get(f"{watch.address}/api/settings")).json()["values"]["speed_limit.max_mps"]
     await page.evaluate("() => { location.hash = '#settings'; }")
     number = page.locator('#panel-settings input[type="text"], #panel-settings input[inputmode]').first
@@ -186,7 +186,7 @@ async def test_nothing_is_ordered_from_a_replay(phone: Phone, watch: Watch) -> N
     await number.fill("9")
     await number.press("Enter")
     await expect(page.locator("body")).to_contain_text("shows a replay", timeout=10_000)
-    async with httpx.AsyncClient() as client:
+    async with http_client() as client:
         after = (await client.get(f"{watch.address}/api/settings")).json()["values"]["speed_limit.max_mps"]
     assert before == after
 

@@ -8,9 +8,9 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
+from tests.http import http_client
 from tests.page.conftest import Phone
 from tests.page.processes import Process, running, simulate
 from tests.ports import free_port
@@ -82,7 +82,7 @@ async def balanced(*ports: int) -> AsyncIterator[tuple[Proxy, str]]:
 
 async def well(node: Process) -> None:
     """Until a load balancer would send pages there."""
-    async with httpx.AsyncClient() as client, asyncio.timeout(60):
+    async with http_client() as client, asyncio.timeout(60):
         while (await client.get(f"{node.address}/api/health")).json()["status"] != "ok":
             await asyncio.sleep(0.1)
 

@@ -9,7 +9,6 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import numpy as np
 import pytest
 import pytest_asyncio
@@ -17,6 +16,7 @@ from playwright.async_api import Worker, expect
 
 from server.app.config import Config
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.page import drives
 from tests.page.conftest import Phone
 from tests.page.processes import Drive, driving, replay, running, server
@@ -271,7 +271,7 @@ async def test_corridor_gap_and_stopping_distance_are_those_of_the_judge(phone: 
     await phone.open(f"{street}/#scan")
     await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile("of 1440"), timeout=12_000)
     await expect(phone.f("stops", "#panel-scan")).to_have_text("7.1")  # 4.2·1 + 4.2²/6
-    async with httpx.AsyncClient() as client:
+    async with http_client() as client:
         state = (await client.get(f"{street}/api/state")).json()
     (obstacle,) = [one for one in state["checks"] if one["label"] == "Obstacle"]
     gap = re.search(r"([\d.]+) m", obstacle["text"])

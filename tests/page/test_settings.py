@@ -17,6 +17,7 @@ from playwright.async_api import Browser, Locator, expect
 
 from monitor.catalog import AllLimits
 from monitor.check import Limits
+from tests.http import http_client
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.canned import Canned
 from tests.page.conftest import PHONE, Phone, phone_in
@@ -37,7 +38,7 @@ async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Proce
 @pytest_asyncio.fixture(loop_scope="session")
 async def api(watch: Process) -> AsyncIterator[httpx.AsyncClient]:
     """The server's own answers; at the end all settings are as at first, and what they raised is over."""
-    async with httpx.AsyncClient(base_url=watch.console, headers={"x-catgraph-name": "Another"}) as client:
+    async with http_client(base_url=watch.console, headers={"x-catgraph-name": "Another"}) as client:
         yield client
         (await client.put("/api/settings.toml", content=UNHURRIED)).raise_for_status()
         async with asyncio.timeout(20):

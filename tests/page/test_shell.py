@@ -11,11 +11,11 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Error, Page, expect
 
+from tests.http import http_client
 from tests.page import house
 from tests.page.barriers import no_barrier
 from tests.page.conftest import LIVE, PHONE
@@ -91,7 +91,7 @@ async def test_chromium_finds_nothing_that_stands_against_installing(browser: Br
 
 
 async def test_every_icon_is_the_picture_it_is_said_to_be(browser: Browser, served: str) -> None:
-    async with opened(browser) as page, httpx.AsyncClient(base_url=served) as client:
+    async with opened(browser) as page, http_client(base_url=served) as client:
         manifest = (await client.get("/manifest.webmanifest")).json()
         wanted = {(one["src"], one["sizes"]) for one in manifest["icons"]}
         wanted |= {(icon["src"], icon["sizes"]) for one in manifest["shortcuts"] for icon in one["icons"]}
@@ -112,7 +112,7 @@ async def test_every_icon_is_the_picture_it_is_said_to_be(browser: Browser, serv
 
 async def test_a_mask_takes_nothing_of_the_drawing_and_one_colour_is_enough(browser: Browser, served: str) -> None:
     """What is cut by a circle of 40 % is ground alone; of a monochrome icon only its opacity counts."""
-    async with opened(browser) as page, httpx.AsyncClient(base_url=served) as client:
+    async with opened(browser) as page, http_client(base_url=served) as client:
         icons = (await client.get("/manifest.webmanifest")).json()["icons"]
         of = {(one["purpose"], one["sizes"]): one["src"] for one in icons}
         await page.goto(served)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 from playwright.async_api import expect
 
+from tests.http import http_client
 from tests.page.conftest import Phone
 from tests.page.test_fleet import Fleet, fleet
 from tests.page.test_slow_down import armed_by_hand
@@ -44,7 +44,7 @@ SIGNING_MS = """async () => {
 
 async def devices(one: Fleet) -> list[str]:
     """The devices in the car's log."""
-    async with httpx.AsyncClient(base_url=one.agent.address) as car:
+    async with http_client(base_url=one.agent.address) as car:
         events: list[dict[str, Any]] = (await car.get("/api/events", params={"limit": 1000})).json()["events"]
     return [str(event["text"]) for event in events if event["change"] == "device"]
 

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, CDPSession, Locator, expect
 
+from tests.http import http_client
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.canned import Canned, alarm, live, slow, slowed
 from tests.page.conftest import PHONE, Phone, phone_in
@@ -490,7 +490,7 @@ async def test_a_rule_counts_down_on_the_page_and_whoever_lets_it_run_has_slowed
     async with running(*simulate()) as sim, running(*server(tmp_path, sim.address)) as watch:
         thumb = await armed_by_hand(phone, watch.address)
         limits = {"slow_down.on_speed": 1.0, "slow_down.on_speed_after_s": 0.5, "speed_limit.max_mps": 2.0}
-        async with httpx.AsyncClient(base_url=watch.console) as client:
+        async with http_client(base_url=watch.console) as client:
             assert (await client.patch("/api/settings", json={"values": limits})).is_success
             countdown = phone.page.locator("#sheet-countdown")
             await countdown.wait_for()
@@ -551,7 +551,7 @@ async def test_a_phone_that_is_lost_mid_press_orders_nothing_then_or_later(phone
         watch.thaw()
         await expect(thumb.slide()).to_have_attribute("data-kind", "armed", timeout=15_000)
         await phone.page.wait_for_timeout(1000)
-        async with httpx.AsyncClient(base_url=watch.address) as client:
+        async with http_client(base_url=watch.address) as client:
             assert (await client.get("/api/state")).json()["decelerate"]["order"] is None
             events = (await client.get("/api/events", params={"limit": 1000})).json()["events"]
             assert [event["step"] for event in events if event["change"] == "slow_down"] in ([], ["refused"])

@@ -13,6 +13,7 @@ import pytest
 from playwright.async_api import Browser, expect
 from playwright.async_api import TimeoutError as PlaywrightTimeout
 
+from tests.http import http_client
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.canned import Canned
 from tests.page.conftest import PHONE, Phone, phone_in
@@ -53,7 +54,7 @@ async def watching(browser: Browser, data: Path, **context_options: Any) -> Asyn
     async with contextlib.AsyncExitStack() as stack:
         car = await stack.enter_async_context(running(*simulate()))
         watch = await stack.enter_async_context(running(*server(data, car.address)))
-        client = await stack.enter_async_context(httpx.AsyncClient(base_url=watch.address))
+        client = await stack.enter_async_context(http_client(base_url=watch.address))
         context = await browser.new_context(**{**PHONE, **context_options})
         stack.push_async_callback(context.close)
         phone = await phone_in(context)

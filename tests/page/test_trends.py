@@ -6,12 +6,12 @@ import asyncio
 import re
 from collections.abc import AsyncIterator
 
-import httpx
 import numpy as np
 import pytest
 import pytest_asyncio
 from playwright.async_api import expect
 
+from tests.http import http_client
 from tests.page import drives
 from tests.page.canned import Canned
 from tests.page.conftest import Phone
@@ -71,7 +71,7 @@ async def lower(phone: Phone) -> None:
 
 async def heard_for(address: str, steps: int) -> None:
     """Waits until the server has so many steps of the speed."""
-    async with asyncio.timeout(60), httpx.AsyncClient() as client:
+    async with asyncio.timeout(60), http_client() as client:
         while True:
             trends = (await client.get(f"{address}/api/trends")).json()
             if sum(isinstance(one, float) for one in trends["lowest"]["speed"]) >= steps:
