@@ -15,6 +15,7 @@ from server.analysis.recorded_log import RecordedLog
 from server.analysis.rehearse import Rehearsed
 from server.analysis.report_text import printable
 from server.judge.active_settings import SettingsOverride
+from server.judge.pipeline import TICK_S
 from server.protocol.questions import Question
 from server.recording.read.read import Recording
 from server.recording.verification import Verification
@@ -100,9 +101,11 @@ class Report:
 
 
 def why_nothing(run: Rehearsed, recording: Recording) -> str | None:
-    """Why the run shows nothing of the car: no message of any signal could be read. None: one could."""
+    """Why the run shows nothing of the car: no message of any signal could be read, or no check ran. None: one did."""
     if any(tally.received > tally.rejected + tally.not_measured for tally in run.reception.by_signal.values()):
-        return None
+        if run.judged_s >= TICK_S:
+            return None
+        return f"Nothing could be evaluated: what was read covers {run.judged_s:.2f} s, too short for any check."
     if not recording.count:
         return "Nothing could be evaluated: the recording has no message."
     if not run.sources and run.undecided:

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Protocol
 
-from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from server.judge.message import Json, RosVersion
 from server.recording.read.decode import Layout
+from server.recording.read.definitions import types_of_msg
 from server.rosbridge_server.completion import Completion
 from server.rosbridge_server.shape import TIMES, fields
 
@@ -91,7 +92,7 @@ class MessageTypes:
             return {}
         if type not in self._parsed:
             try:
-                self._parsed[type] = dict(get_types_from_msg(self._texts[type], _long(type)))
+                self._parsed[type] = types_of_msg(self._texts[type], _long(type))
             except Exception:  # the parser raises many exception types; the standard messages may still know it
                 self._parsed[type] = {}
         return self._parsed[type]

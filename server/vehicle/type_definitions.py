@@ -15,10 +15,9 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import get_types_from_msg
 
 from server.judge.message import RosVersion
-from server.recording.read.definitions import bounded, demand_few_fields
+from server.recording.read.definitions import demand_few_fields, types_of_msg
 from server.recording.read.schemas import long_type, standard
 from server.rosbridge.live_source import CallFailed, LinkDown
 from server.rosbridge.rosapi_client import ServiceCaller
@@ -58,7 +57,7 @@ def _is_fit(type: str, text: str | None, version: RosVersion) -> bool:
     known: dict[str, Any] = dict(standard(version).fielddefs)
     if text is not None:
         try:
-            known |= get_types_from_msg(bounded(text), long_type(type))
+            known |= types_of_msg(text, long_type(type))
             demand_few_fields(long_type(type), known)
         except Exception:  # the parser raises many exception types
             return False

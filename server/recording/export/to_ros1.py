@@ -19,10 +19,11 @@ from typing import Any
 from rosbags.convert.converter import is_same_wireformat, migrate_bytes
 from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from server.recording.read.definitions import bounded, definitions_of, times
+from server.recording.read.code_writer import PRIMITIVES
+from server.recording.read.definitions import MAX_FIELDS, definitions_of, times, types_of_msg
 from server.recording.read.errors import Undecodable
 from server.recording.read.source import Channel, FileSource, why_not_decoded
 
@@ -35,6 +36,7 @@ _DEEPEST = 32
 _PLACEHOLDER = "structure_needs_at_least_one_member"  # how ROS 2 writes a message without fields
 _WITHOUT_COUNTERPART = ("wstring", "float128")
 _LITTLE = b"\x00\x01"
+_LENGTH_BYTES = 4  # of a string or a sequence; both may be empty
 
 
 def md5sum(type: str, definition: str) -> str:
@@ -150,7 +152,7 @@ def _is_from_bridge(channel: Channel) -> bool:
     if channel.type not in _noetic().fielddefs or "=" in channel.definition.replace("=" * 80, ""):
         return False
     try:
-        types = _store(dict(get_types_from_msg(bounded(channel.definition), channel.type)))
+        types = _store(types_of_msg(channel.definition, channel.type))
         return bool(is_same_wireformat(types, _noetic(), channel.type, channel.type)) and _names(
             types, channel.type
         ) == (_names(_noetic(), channel.type))
@@ -170,6 +172,7 @@ def _from_cdr(channel: Channel, source: FileSource) -> Ros1Form:
     try:
         there = _ros1_store(type, here)
         definition, sum = there.generate_msgdef(type)
+        least = _least_bytes(type, here, {}, 0)
         is_same = is_same_wireformat(here, there, type, type)
         here.get_msgdef(type), there.get_msgdef(type)  # compiles what is needed, or raises
     except Undecodable:
@@ -180,16 +183,20 @@ def _from_cdr(channel: Channel, source: FileSource) -> Ros1Form:
         type=type.replace("/msg/", "/", 1),
         definition=definition,
         md5sum=sum,
-        convert=_converter(type, here, there, is_same=is_same),
+        convert=_converter(type, here, there, is_same=is_same, least=least),
         lost=tuple(_lost(type, here, there)),
     )
 
 
-def _converter(type: str, here: Typestore, there: Typestore, *, is_same: bool) -> Callable[[bytes], bytes | memoryview]:
+def _converter(
+    type: str, here: Typestore, there: Typestore, *, is_same: bool, least: int
+) -> Callable[[bytes], bytes | memoryview]:
     cache: dict[str, object] = {}
 
     def convert(raw: bytes) -> bytes | memoryview:
         try:
+            if len(raw) < least:  # rosbags would count through a fixed array of any length
+                raise ValueError
             if is_same and raw[:2] == _LITTLE:
                 return here.cdr_to_ros1(raw, type)
             return migrate_bytes(here, there, type, type, cache, raw, src_is2=True, dst_is2=False)
@@ -197,6 +204,26 @@ def _converter(type: str, here: Typestore, there: Typestore, *, is_same: bool) -
             raise Undecodable(f"its {len(raw)} bytes do not fit its type") from None
 
     return convert
+
+
+def _least_bytes(type: str, store: Typestore, known: dict[str, int], depth: int) -> int:
+    """What a message of a type takes at least, without padding. Raises Undecodable for one that contains itself."""
+    if depth > _DEEPEST:
+        raise Undecodable(f"the definition of {type} contains itself")
+
+    def of(description: Any) -> int:
+        kind, what = description
+        if kind == Nodetype.NAME:
+            return _least_bytes(what, store, known, depth + 1)
+        if kind == Nodetype.ARRAY:
+            if what[1] > MAX_FIELDS and not (what[0][0] == Nodetype.BASE and what[0][1][0] in PRIMITIVES):
+                raise Undecodable("its definition has too many fields")  # rosbags compiles code for each of them
+            return int(what[1]) * of(what[0])
+        return PRIMITIVES[what[0]][2] if kind == Nodetype.BASE and what[0] in PRIMITIVES else _LENGTH_BYTES
+
+    if type not in known:
+        known[type] = sum(of(description) for _, description in store.fielddefs[type][1])
+    return known[type]
 
 
 def _ros1_store(type: str, here: Typestore) -> Typestore:

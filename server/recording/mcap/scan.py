@@ -136,6 +136,7 @@ def scan(file: IO[bytes], *, with_messages: bool = True) -> Index:
         elif opcode == Opcode.DATA_END:
             index.is_ended = True
         elif opcode == Opcode.FOOTER:
+            index.pieces += end + len(MAGIC) < size  # what another program put behind it, such as a second file
             break
         elif opcode in _DECLARING:
             _declared(index, opcode, file.read(length) if length <= MOST_TEXT else b"")

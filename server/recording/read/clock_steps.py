@@ -33,6 +33,7 @@ GAP_NS = 2 * S  # the stamps of longer gaps are compared
 LEAP_NS = 86_400 * S  # a longer gap in one file is a clock that was set
 FIRST_NS, LAST_NS = 946_684_800 * S, 4_102_444_800 * S  # years 2000 and 2100: of other times a clock was never set
 MOST_STEPS = 100
+LEAST_A_STEP = 10  # messages on average: of fewer between two steps, the order is no order of receipt
 MOST_COMPARED = 50  # gaps whose stamps are compared
 MOST_INTERVALS = 10_000
 WINDOW = 512  # messages before and behind a step whose interval is evaluated
@@ -118,7 +119,8 @@ Witness = Callable[[Arrivals, int, int], int | None]
 
 
 class _NotInOrder(Exception):
-    """The messages of a file are not in the order of receipt, as behind a tool that wrote topic by topic."""
+    """The messages of a file are not in the order of receipt, as behind a tool that wrote topic by topic or in the
+    order in which its workers ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,6 +205,8 @@ class _Search:
         while len(cuts) < MOST_STEPS and (cut := self._next_cut(begin, is_leap)) is not None:
             cuts.append(cut)
             begin, is_leap = cut.at, cut.is_leap
+        if len(cuts) >= LEAST and len(cuts) * LEAST_A_STEP > len(self.found.times_ns[: cuts[-1].at]):
+            raise _NotInOrder
         return cuts
 
     def _next_cut(self, begin: int, is_behind_leap: bool) -> _Cut | None:

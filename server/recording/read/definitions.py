@@ -6,6 +6,7 @@ could take half a minute of a processor.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -22,6 +23,7 @@ MAX_FIELDS = 10_000  # with those of all messages in it, as often as they stand 
 MAX_LETTERS = 256 * 1024
 
 _IDL_SEPARATOR = "=" * 80 + "\n"
+_CONSTANT = re.compile(r"\s*\S+\s+\w+\s*=")  # begins the line of one
 
 
 def bounded(text: str) -> str:
@@ -32,6 +34,20 @@ def bounded(text: str) -> str:
     if len(lines) > MAX_LINES or any(len(line) > MAX_LINE for line in lines) or sum(map(len, lines)) > MAX_LETTERS:
         raise Undecodable("its definition is too long")
     return "\n".join(lines) + "\n"
+
+
+def types_of_msg(text: str, type: str) -> dict[str, Any]:
+    """Definitions by type, as rosbags has them, of a text in .msg form. Raises Undecodable, and what its parser raises.
+
+    The parser refuses constants that ROS 1 allows, such as `int8 kLeft=1` and `string NONE=`. Constants are not in the
+    bytes: they are left out where the definition cannot be parsed with them.
+    """
+    text = bounded(text)
+    try:
+        return dict(get_types_from_msg(text, type))
+    except Exception:  # the parser raises many exception types
+        fields = [line for line in text.splitlines() if not _CONSTANT.match(line)]
+        return dict(get_types_from_msg("\n".join(fields) + "\n", type))
 
 
 def demand_few_fields(type: str, definitions: Mapping[str, Any]) -> None:
@@ -68,7 +84,7 @@ def definitions_of(channel: Channel, version: RosVersion, distro: str | None) ->
         return distribution(version, distro)
     try:
         if channel.format == "msg":
-            return dict(get_types_from_msg(bounded(channel.definition), channel.type))
+            return types_of_msg(channel.definition, channel.type)
         found: dict[str, Any] = {}
         if len(channel.definition) > MAX_LETTERS:
             raise Undecodable("its definition is too long")

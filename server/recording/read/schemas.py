@@ -12,7 +12,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from server.judge.message import RosVersion
-from server.recording.read.definitions import bounded
+from server.recording.read.definitions import types_of_msg
 from server.recording.read.encode import Encode, compile_encoder
 
 MAX_DEFINITION = 256 * 1024  # letters; the longest of the standard ones has 7 000
@@ -83,7 +83,7 @@ class TypeBook:
         text = self._texts.get(type)
         if text is not None:
             try:
-                return self._made(type, *self._completed(text, dict(get_types_from_msg(bounded(text), type))))
+                return self._made(type, *self._completed(text, types_of_msg(text, type)))
             except Exception:  # the parser raises many exception types; the distribution may still know it
                 pass
         try:

@@ -28,6 +28,10 @@ RECORDINGS = {
         rows("/chatter", STRING, {"data": "x"}) + rows("/noise", STRING, {"data": "y"}),
         "none of its 2 topics is one that",
     ),
+    "messages of one moment": (
+        [(0.0, "/catvehicle/vel", TWIST, {"linear": ZERO, "angular": ZERO})] * 50,
+        "covers 0.00 s, too short for any check",
+    ),
     "a known topic of a type that cannot be read": (
         rows("/catvehicle/vel", STRING, {"data": "x"}),
         "no message on a topic that catgraph knows could be read|is not one that|no message here",

@@ -217,6 +217,19 @@ def test_a_file_that_was_written_topic_by_topic_has_no_step(tmp_path: Path, has_
         assert recording.duration_s == pytest.approx(LENGTH_S, abs=0.2)
 
 
+@pytest.mark.parametrize("topics", [("/twist",), ("/twist", "/fix", "/imu")])
+@pytest.mark.parametrize("within_s", [2.0, LENGTH_S])
+def test_a_file_that_was_written_in_no_order_has_no_step(
+    tmp_path: Path, topics: tuple[str, ...], within_s: float
+) -> None:
+    chance = random.Random(7)
+    true = [row for row in rows(2) if row[1] in topics]
+    mixed = sorted(true, key=lambda row: row[0] + chance.uniform(0.0, within_s))
+    with open_recording([write_ros2(tmp_path / "drive", Drive(messages=mixed))]) as recording:
+        assert not recording.clock_steps
+        assert [at_s for at_s, *_ in recording.rows()] == pytest.approx([BEGIN_S + row[0] for row in true])
+
+
 def test_a_seek_begins_at_a_corrected_time(tmp_path: Path) -> None:
     for container in CONTAINERS:
         path = write(tmp_path / container, container, steps=[(20.0, -50.0), (40.0, 230 * DAY_S)])

@@ -335,3 +335,14 @@ def test_reading_is_far_faster_than_driving(recordings: Path, file: str) -> None
         best_s = min(best_s, time.process_time() - began)
     assert count == 14_228
     assert recording.duration_s / best_s > 300
+
+
+def test_a_file_with_another_one_behind_it_is_not_whole(tmp_path: Path) -> None:
+    rows: list[Row] = [(n / 10, "/text", "std_msgs/msg/String", {"data": "x" * n}) for n in range(20)]
+    one = write_ros2(tmp_path / "one", Drive(messages=rows[:5])) / "one.mcap"
+    other = write_ros2(tmp_path / "other", Drive(messages=rows[5:])) / "other.mcap"
+    both = tmp_path / "both.mcap"
+    both.write_bytes(one.read_bytes() + other.read_bytes())
+    with open_recording([both]) as recording:
+        assert len(list(recording.rows())) == 5
+        assert [sentence for sentence in recording.damage if "left out" in sentence]

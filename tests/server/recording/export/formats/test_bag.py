@@ -209,6 +209,21 @@ def test_what_ros_1_has_no_place_for_is_named(tmp_path: Path) -> None:
     assert "1 messages on /n are left out: its 5 bytes do not fit its type." in notes
 
 
+def test_long_fixed_arrays_are_refused_at_once(tmp_path: Path) -> None:
+    types = {
+        "/long": ("my_msgs/msg/Long", "float64[2000000000] data"),
+        "/many": ("my_msgs/msg/Many", "string[90000] data"),
+    }
+    made = OurFile(tmp_path / "ours.mcap", profile="ros2")
+    made.write(BEGIN_S * 10**9, "/n", INT, "int32 data", "cdr", b"\0\1\0\0\7\0\0\0")
+    for topic, (type, definition) in types.items():
+        made.write(BEGIN_S * 10**9, topic, type, definition, "cdr", b"\0\1\0\0" + bytes(8))
+    outcome = export(made.close(), tmp_path / "out.bag")
+    assert outcome.entries == 1
+    assert "1 messages on /long are left out: its 12 bytes do not fit its type." in outcome.notes
+    assert "/many (1 messages) is left out: its definition has too many fields." in outcome.notes
+
+
 def test_fields_without_a_place_are_named(tmp_path: Path) -> None:
     marker = {"ns": "a", "text": "b", "mesh_file": {"filename": "c"}}
     rows: list[Row] = [(0.0, "/mark", "visualization_msgs/msg/Marker", marker)]
