@@ -1,9 +1,9 @@
 #!/bin/sh
 # rosbag 1.15.15 (Debian 12, python3-rosbag).
 #
-# What a good engineer would guess: the loop of rosbag's cookbook, `for topic, msg, t in bag.read_messages(): out.write(topic,
-# msg, t)`, copies the messages as they are. A topic that was latched in the drive, a map or /tf_static, is latched in the
-# copy, so that a node which starts later during `rosbag play` gets it.
+# What a good engineer would guess: the loop of rosbag's cookbook, `for topic, msg, t in bag.read_messages()` with
+# `out.write(topic, msg, t)`, copies the messages as they are. A topic that was latched in the drive, a map or /tf_static,
+# is latched in the copy, so that a node which starts later during `rosbag play` gets it.
 #
 # What is seen: latching and the publisher are in the header of the connection, which this loop does not pass on: the copy
 # has neither, without a warning. `read_messages(return_connection_header=True)` gives the header, and `write` takes it as
