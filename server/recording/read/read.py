@@ -22,6 +22,7 @@ from server.recording.read.errors import RecordingUnreadable, Undecodable
 from server.recording.read.recognise import of_car, open_parts, open_with, recognise, what_is_wrong
 from server.recording.read.source import Channel, Damage, FileSource, Stream, in_time_order, why_not_decoded
 from server.recording.read.steady_time import ClockStep, make_steady, notes_on
+from server.rosbridge import codec
 
 __all__ = ["Recording", "RecordingUnreadable", "TopicInfo", "open_recording"]
 
@@ -330,8 +331,11 @@ def _is_own(source: FileSource) -> bool:
 def _decode_json(raw: bytes) -> dict[str, Any]:
     try:
         message = orjson.loads(raw)
-    except orjson.JSONDecodeError:
-        raise Undecodable("it is not JSON") from None
+    except orjson.JSONDecodeError:  # NaN is no JSON, and written as such by foxglove-sdk; it is read as on a live link
+        try:
+            message, _ = codec.decode(raw, False)
+        except codec.Unreadable:
+            raise Undecodable("it is not JSON") from None
     if not isinstance(message, dict):
         raise Undecodable("it is not a JSON object")
     return message

@@ -136,6 +136,23 @@ def test_json_messages_in_an_mcap_file(tmp_path: Path) -> None:
         assert recording.notes == ["/p (1 messages) is left out: messages encoded as 'protobuf' are not supported"]
 
 
+def test_nan_in_the_json_of_others_is_a_value_that_is_not_a_number(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start()
+        schema = writer.register_schema(name="geometry_msgs/msg/Point", encoding="jsonschema", data=b"{}")
+        channel = writer.register_channel(topic="/p", message_encoding="json", schema_id=schema)
+        for number, raw in enumerate((b'{"x": NaN, "y": -Infinity, "z": 3.0}', b'{"x": NaN', b"[NaN]")):
+            writer.add_message(channel_id=channel, log_time=number, publish_time=number, data=raw)
+        writer.finish()
+    with open_recording([path]) as recording:
+        (point,) = [m.message for m in recording.messages()]
+        assert recording.rejected == {"/p": 2}
+    assert np.isnan(point["x"])
+    assert (point["y"], point["z"]) == (-np.inf, 3.0)
+
+
 def test_several_files_are_one_drive_in_time_order(tmp_path: Path) -> None:
     odd = write_ros1(tmp_path / "odd.bag", Drive(messages=[r for i, r in enumerate(ROWS) if i % 2]))
     even = write_ros1(tmp_path / "even.bag", Drive(messages=[r for i, r in enumerate(ROWS) if not i % 2]))
