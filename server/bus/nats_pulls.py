@@ -67,9 +67,8 @@ class Pulls:
                 await asyncio.sleep(RETRY_S)
                 continue
             try:
-                message = await client.request(
-                    subject, wire.encode(wire.Pull(have=have, run=run)), timeout=wire.PULL_WAITS_S + ANSWER_S
-                )
+                pull = wire.encode(wire.Pull(have=have, run=run, inflates=True))
+                message = await client.request(subject, pull, timeout=wire.PULL_WAITS_S + ANSWER_S)
                 head, payload = wire.decode_frame(message.data)
             except (NatsError, TimeoutError):
                 await asyncio.sleep(RETRY_S)
