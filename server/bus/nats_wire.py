@@ -10,8 +10,9 @@
 
 A request about a command has its id in the header `Catgraph-Trace`, for the logs.
 
-A frame is pulled, never pushed: one is under way to a node at a time, so that a stalled hop finds nothing old. Where
-the pull allows it, the answer is compressed by zlib. All times are of the agent's monotonic clock, in seconds.
+A frame is pulled, never pushed: one is under way to a node at a time, over a slow radio a few (`nats_pulls.py`), so
+that a stalled hop finds nothing old. Where the pull allows it, the answer is compressed by zlib. All times are of the
+agent's monotonic clock, in seconds.
 """
 
 from __future__ import annotations

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, cast
 
+import pytest
 from nats.aio.client import Client
 from nats.aio.msg import Msg
 
 from server.bus import nats_wire as wire
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus
-from server.bus.nats_pulls import MOST, Pulls
+from server.bus.nats_pulls import EVERY_S, MOST, MOST_UNDER_WAY, Pulls
 from server.bus.nats_questions import GONE_AFTER_S, Questions
 from tests.server.bus.buses import Clock, local_buses, until
 
@@ -39,6 +41,60 @@ async def test_an_agent_that_answers_at_once_does_not_keep_the_node_busy() -> No
     assert requests <= MOST * (took_s + 1) + 5
     assert took_s >= 1.9, "the third hundred is not requested before the third second"
     await pulls.stop()
+
+
+@pytest.mark.parametrize(("kind", "least", "greatest"), [("state", 2, MOST_UNDER_WAY), ("scan", 1, 1)])
+async def test_over_a_slow_radio_a_few_states_are_requested_at_once_and_no_older_one_replaces_a_newer_one(
+    kind: str, least: int, greatest: int
+) -> None:
+    now = asyncio.get_running_loop().time
+    sent_s: list[float] = []
+    kept: list[str | bytes] = []
+    under_way, most = 0, 0
+
+    async def request(subject: str, body: bytes, timeout: float) -> Any:
+        nonlocal under_way, most
+        sent_s.append(now())
+        under_way += 1
+        most = max(most, under_way)
+        number = len(sent_s) if len(sent_s) % 3 else len(sent_s) - 2  # each third one brings an older frame
+        await asyncio.sleep(0.48 if len(sent_s) % 2 else 0.4)  # of four, two answers come close to each other
+        under_way -= 1
+        return SimpleNamespace(data=wire.encode_frame(wire.FrameHead(run="a", number=number, now_s=1.0), str(number)))
+
+    questions = Questions(now=now)
+    questions.client = cast(Client, SimpleNamespace(request=request))
+    pulls = Pulls(questions, lambda *frame: kept.append(frame[2]), lambda *_: None, now=now)
+    pulls.look("ocelot", kind, True)
+    await until(lambda: len(kept) >= 4)
+    await pulls.stop()
+    assert least <= most <= greatest
+    assert min(b - a for a, b in pairwise(sent_s)) >= EVERY_S - 0.01
+    assert [int(one) for one in kept] == sorted({int(one) for one in kept})
+    assert asyncio.all_tasks() == {asyncio.current_task()}, "none is left behind"
+
+
+async def test_an_agent_that_waits_for_its_next_frame_has_one_pull_of_it() -> None:
+    time_s = 0.0
+    requests = under_way = most = 0
+
+    async def request(subject: str, body: bytes, timeout: float) -> Any:
+        nonlocal time_s, requests, under_way, most
+        requests, under_way = requests + 1, under_way + 1
+        most = max(most, under_way)
+        await asyncio.sleep(1.5 * EVERY_S)
+        time_s, under_way = time_s + 1.0, under_way - 1
+        return SimpleNamespace(
+            data=wire.encode_frame(wire.FrameHead(run="a", number=requests, now_s=1.0, waited_s=0.9))
+        )
+
+    questions = Questions(now=lambda: time_s)
+    questions.client = cast(Client, SimpleNamespace(request=request))
+    pulls = Pulls(questions, lambda *_: None, lambda *_: None, now=lambda: time_s)
+    pulls.look("ocelot", "state", True)
+    await until(lambda: requests >= 5)
+    await pulls.stop()
+    assert most == 1
 
 
 async def test_what_was_requested_of_an_agent_that_was_gone_is_requested_anew_once_it_is_back() -> None:
