@@ -43,6 +43,11 @@ def unnoted(vehicle: str, command: Mapping[str, Any], why: str) -> None:
     """Nothing."""
 
 
+def _connections(before: int, client: Client | None) -> int:
+    """How many connections to the broker there were with those of this client."""
+    return before + (0 if client is None else 1 + client.stats["reconnects"])
+
+
 class Looked:
     """One kind of frame of one vehicle, while nodes pull it: counted as one viewer, and its newest frame awaited."""
 
@@ -96,7 +101,7 @@ class NatsAgent:
         self._now = now
         self._looked: dict[tuple[str, str], Looked] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        self._pulls = self._requests = 0
+        self._pulls = self._requests = self._former_connections = 0  # the last: of clients before this one
         self._published: dict[str, int] = {}  # the number of each vehicle's newest event that was published
         self._stops: list[Callable[[], None]] = []
         self._subscriptions: list[Subscription] = []
@@ -111,6 +116,7 @@ class NatsAgent:
 
     async def start(self, client: Client) -> None:
         """From now on nodes are answered by this client, until `stop`."""
+        self._former_connections = _connections(self._former_connections, self._client)
         self._client = client
         for vehicle in self._bus.vehicles:
             self._published[vehicle] = self._bus.last_event(vehicle)
@@ -172,7 +178,7 @@ class NatsAgent:
             refused = self._note_too_large(f"{kind} frame", vehicle, len(data))
             await asyncio.sleep(wire.PULL_WAITS_S)  # it would be requested again at once
             data = self._framed(came_s, None, refused)
-        await self._respond(message, data)
+        await self._respond(message, wire.compressed(data) if pull.inflates else data)
 
     def _framed(self, came_s: float, frame: Frame | None, refused: str = "") -> bytes:
         """A frame as it is sent now; None: that there is no newer one, or why it is refused."""
@@ -200,7 +206,8 @@ class NatsAgent:
     async def _be_here(self) -> None:
         while True:
             for vehicle in self._published:
-                here = wire.Here(run=self._run, last=self._bus.last_event(vehicle), resumes=True)
+                last, number = self._bus.last_event(vehicle), _connections(self._former_connections, self._client)
+                here = wire.Here(run=self._run, last=last, resumes=True, connection=number)
                 await self._publish(vehicle, "here", here)
             now_s = self._now()
             for key in [key for key, looked in self._looked.items() if looked.until_s < now_s]:
@@ -231,10 +238,8 @@ class NatsAgent:
             self.refused += 1
             return
         vehicle = wire.vehicle_of(message.subject)
-        if (trace := (message.headers or {}).get(wire.TRACE)) is None:
-            self._spawn(self._answer(message, vehicle, ask))
-            return
-        with log_context.tracing(trace):
+        trace = (message.headers or {}).get(wire.TRACE)
+        with contextlib.nullcontext() if trace is None else log_context.tracing(trace):
             self._spawn(self._answer(message, vehicle, ask))
 
     async def _answer(self, message: Msg, vehicle: str, ask: wire.Ask) -> None:

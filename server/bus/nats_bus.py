@@ -47,8 +47,7 @@ class NatsBus:
 
         `on_new` is called with the name of each vehicle that sends something for the first time, `on_message` always.
         """
-        self._on_new = on_new
-        self._on_message = on_message
+        self._on_new, self._on_message = on_new, on_message
         self._now = now
         self._read_frame = read
         self._frames: dict[tuple[str, str], Frame] = {}
@@ -124,12 +123,13 @@ class NatsBus:
         except wire.Malformed as why:
             return self._questions.refuse(message.subject, why)
         vehicle = wire.vehicle_of(message.subject)
-        self._logs.note_resuming(vehicle, is_able=here.resumes)
-        self._meet(vehicle, here.run, here.last)
+        if (is_again := self._agents.connects(vehicle, here)) is not None:
+            self._logs.note_resuming(vehicle, is_able=here.resumes)
+            self._meet(vehicle, here.run, here.last, is_again=is_again)
+        return None
 
-    def _meet(self, vehicle: str, run: str, last: int) -> None:
-        is_new = vehicle not in self._logs
-        is_back = self._agents.is_gone(vehicle)
+    def _meet(self, vehicle: str, run: str, last: int, *, is_again: bool = False) -> None:
+        is_new, is_back = vehicle not in self._logs, is_again or self._agents.is_gone(vehicle)
         self._agents.note(vehicle)
         self._on_message(vehicle)
         self._logs.begin(vehicle, run, last)

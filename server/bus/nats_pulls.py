@@ -1,19 +1,37 @@
-"""A web node pulls frames from agents: one after the other, and only what somebody looks at."""
+"""A web node pulls frames from agents: one after the other, and only what somebody looks at.
+
+Over a slow radio one for each round trip is too few: there a few pulls are under way, each as long after the one before
+as frames are made. The age of a frame counts from its own pull.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from nats.errors import Error as NatsError
 
 from server.bus import nats_wire as wire
 from server.bus.nats_questions import ANSWER_S, Questions
 
-MOST = 100  # questions a second for one kind of frame, where an agent answers at once
+MOST = 100  # pulls a second of one kind of frame, where an agent answers at once
 RETRY_S = 0.5  # after a pull that nobody answered
+EVERY_S = 0.1  # a state is made
+SLOW_S = 0.15  # the way there and back, from which on several pulls are under way
+SMOOTHING = 0.75
+MOST_UNDER_WAY = 4  # compressed, they are as many bytes as one state is
 Keep = Callable[[str, str, str | bytes, float], None]
 Refuse = Callable[[str, str, str], None]
+
+
+@dataclass(slots=True)
+class _Newest:
+    """Which frame of its kind came last."""
+
+    number: int = 0
+    run: str = ""
 
 
 class Pulls:
@@ -28,6 +46,7 @@ class Pulls:
         self._refuse = refuse
         self._now = now
         self._tasks: dict[tuple[str, str], asyncio.Task[None]] = {}
+        self._trips_s: dict[str, float] = {}  # to each vehicle's agent and back, smoothed
 
     def look(self, vehicle: str, kind: str, is_looked: bool) -> None:
         """Begin or end to pull this kind of frame; nothing where it is so already."""
@@ -52,43 +71,68 @@ class Pulls:
         await asyncio.gather(*tasks.values(), return_exceptions=True)
 
     async def _pull(self, vehicle: str, kind: str) -> None:
-        """One frame after the other: the next is requested when the last is here, so that none waits on the way."""
-        have, run = 0, ""
-        subject = wire.subject(vehicle, f"pull.{kind}")
+        """Requests frames for as long as somebody looks."""
+        newest = _Newest()
+        under_way: set[asyncio.Task[None]] = set()
         began_s, requests = self._now(), 0  # in the second that began then
-        while True:
-            if requests >= MOST:
-                await asyncio.sleep(max(0.0, began_s + 1.0 - self._now()))
-            if self._now() >= began_s + 1.0:
-                began_s, requests = self._now(), 0
-            requests += 1
-            requested_s = self._now()
-            if (client := self._questions.client) is None:
-                await asyncio.sleep(RETRY_S)
-                continue
-            try:
-                message = await client.request(
-                    subject, wire.encode(wire.Pull(have=have, run=run)), timeout=wire.PULL_WAITS_S + ANSWER_S
-                )
-                head, payload = wire.decode_frame(message.data)
-            except (NatsError, TimeoutError):
-                await asyncio.sleep(RETRY_S)
-                continue
-            except wire.Malformed as why:
-                await self._not_read(vehicle, kind, why)
-                continue
-            self._questions.set_clock(vehicle, head.run, head.now_s)
-            if head.refused:
-                self._refuse(vehicle, kind, head.refused)
-            if not head.number or (head.number, head.run) == (have, run):
-                continue
-            have, run = head.number, head.run
-            # By our clock, and no later than it was: the pull was at the agent after `requested_s`.
-            put_s = min(requested_s + max(0.0, head.waited_s), self._now()) - max(0.0, head.age_s)
-            try:
-                self._keep(vehicle, kind, payload, put_s)
-            except wire.Malformed as why:
-                await self._not_read(vehicle, kind, why)
+        try:
+            while True:
+                if requests >= MOST:
+                    await asyncio.sleep(max(0.0, began_s + 1.0 - self._now()))
+                if self._now() >= began_s + 1.0:
+                    began_s, requests = self._now(), 0
+                requests += 1
+                most = self._most_under_way(vehicle, kind)
+                if most == 1 and not under_way:
+                    await self._request(vehicle, kind, newest)
+                    continue
+                due_s = self._now() + EVERY_S
+                under_way.add(asyncio.create_task(self._request(vehicle, kind, newest)))
+                wait_s = EVERY_S if len(under_way) < most else None
+                _, under_way = await asyncio.wait(under_way, timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
+                if under_way:  # those that come together would bring the same frame for ever
+                    await asyncio.sleep(max(0.0, due_s - self._now()))
+        finally:
+            for task in under_way:
+                task.cancel()
+            await asyncio.gather(*under_way, return_exceptions=True)
+
+    def _most_under_way(self, vehicle: str, kind: str) -> int:
+        """More than one only of states, which scans are not to delay, and only where the way is slow: an agent without
+        a newer frame answers all of them with the next one."""
+        trip_s = self._trips_s.get(vehicle, 0.0)
+        return 1 if kind != "state" or trip_s < SLOW_S else min(MOST_UNDER_WAY, 1 + math.ceil(trip_s / EVERY_S))
+
+    async def _request(self, vehicle: str, kind: str, newest: _Newest) -> None:
+        """One frame newer than `newest`, where one comes."""
+        if (client := self._questions.client) is None:
+            return await asyncio.sleep(RETRY_S)
+        requested_s = self._now()
+        pull = wire.encode(wire.Pull(have=newest.number, run=newest.run, inflates=True))
+        try:
+            message = await client.request(
+                wire.subject(vehicle, f"pull.{kind}"), pull, timeout=wire.PULL_WAITS_S + ANSWER_S
+            )
+            head, payload = wire.decode_frame(message.data)
+        except (NatsError, TimeoutError):
+            return await asyncio.sleep(RETRY_S)
+        except wire.Malformed as why:
+            return await self._not_read(vehicle, kind, why)
+        waited_s = max(0.0, head.waited_s)
+        trip_s = max(0.0, self._now() - requested_s - waited_s)
+        self._trips_s[vehicle] = trip_s + SMOOTHING * (self._trips_s.get(vehicle, trip_s) - trip_s)
+        self._questions.set_clock(vehicle, head.run, head.now_s)
+        if head.refused:
+            self._refuse(vehicle, kind, head.refused)
+        if not head.number or (head.run == newest.run and head.number <= newest.number):
+            return None
+        newest.number, newest.run = head.number, head.run
+        # By our clock, and no later than it was: the pull was at the agent after `requested_s`.
+        put_s = min(requested_s + waited_s, self._now()) - max(0.0, head.age_s)
+        try:
+            self._keep(vehicle, kind, payload, put_s)
+        except wire.Malformed as why:
+            await self._not_read(vehicle, kind, why)
 
     async def _not_read(self, vehicle: str, kind: str, why: wire.Malformed) -> None:
         self._questions.refuse(wire.subject(vehicle, f"pull.{kind}"), why)

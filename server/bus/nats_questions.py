@@ -123,6 +123,7 @@ class AgentLiveness:
         self._expected = frozenset(expected)
         self._received_s: dict[str, float] = {}
         self._newest_s = 0.0  # of any agent
+        self._connections: dict[str, tuple[str, int]] = {}  # by which each announced itself last: its run, and number
 
     @property
     def vehicles(self) -> tuple[str, ...]:
@@ -132,6 +133,15 @@ class AgentLiveness:
     def note(self, vehicle: str) -> None:
         """Something was received from its agent just now."""
         self._received_s[vehicle] = self._newest_s = self._now()
+
+    def connects(self, vehicle: str, here: wire.Here) -> bool | None:
+        """Whether its agent connected again since it announced itself last; None: this was sent before, by an earlier
+        connection. Behind a gap the system still delivers it, and it shows nothing of now."""
+        run, before = self._connections.get(vehicle, ("", 0))
+        if here.run == run and here.connection < before:
+            return None
+        self._connections[vehicle] = (here.run, here.connection)
+        return here.run == run and here.connection > before
 
     def trouble(self, vehicle: str) -> str | None:
         """As `PageBus.trouble`."""

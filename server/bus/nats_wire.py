@@ -10,13 +10,15 @@
 
 A request about a command has its id in the header `Catgraph-Trace`, for the logs.
 
-A frame is pulled, never pushed: one is under way to a node at a time, so that a stalled hop finds nothing old. All
-times are of the agent's monotonic clock, in seconds.
+A frame is pulled, never pushed: one is under way to a node at a time, over a slow radio a few (`nats_pulls.py`), so
+that a stalled hop finds nothing old. Where the pull allows it, the answer is compressed by zlib. All times are of the
+agent's monotonic clock, in seconds.
 """
 
 from __future__ import annotations
 
 import logging
+import zlib
 from typing import Annotated, Any, Literal, TypeVar
 
 import orjson
@@ -33,6 +35,8 @@ LARGEST = 900_000  # bytes of a body; a broker as it is takes 1 MiB
 HEADERS = 200  # bytes that the broker counts beside a body, at most
 SMALLEST = 140_000  # bytes that a broker must take: chunks of downloads are smaller
 HEAD = 10_000  # bytes of a body besides its events
+ZLIB_BEGIN = b"\x78"  # RFC 1950; a frame that is not compressed begins with a brace
+ZLIB_LEVEL = 1  # 17 kB become 5.2 kB in 0.1 ms, and 4.5 kB by level 6 in 0.4 ms
 KINDS = frozenset({"state", "scan", SUMMARY})
 
 
@@ -61,6 +65,7 @@ class Pull(Body):
 
     have: Number
     run: Run
+    inflates: bool = False  # the answer may be compressed
 
 
 class FrameHead(Body):
@@ -79,6 +84,7 @@ class Here(Body):
     run: Run
     last: Number
     resumes: bool = False  # the agent answers `resume`
+    connection: Number = 0  # of this run to the broker; what still comes from an earlier one is old
 
 
 class Events(Body):
@@ -165,11 +171,31 @@ def encode_frame(head: FrameHead, payload: str | bytes = b"") -> bytes:
     return encode(head) + b"\n" + (payload.encode() if isinstance(payload, str) else payload)
 
 
+def compressed(frame: bytes) -> bytes:
+    """An encoded frame for a node that inflates it: a state has 14 packets, compressed 3. Over a radio that loses one
+    in ten, one of 14 is nearly always lost."""
+    return zlib.compress(frame, ZLIB_LEVEL)
+
+
 def decode_frame(data: bytes) -> tuple[FrameHead, str | bytes]:
-    """Raises Malformed."""
+    """Takes also a compressed one. Raises Malformed."""
+    if data.startswith(ZLIB_BEGIN):
+        data = _inflated(data)
     line, _, payload = data.partition(b"\n")
     head = decode(FrameHead, line)
     try:
         return head, payload.decode() if head.is_text else payload
     except UnicodeDecodeError as error:
         raise Malformed(str(error)) from None
+
+
+def _inflated(data: bytes) -> bytes:
+    """Raises Malformed, also where it would be larger than a body may be."""
+    inflater = zlib.decompressobj()
+    try:
+        found = inflater.decompress(data, LARGEST)
+    except zlib.error as error:
+        raise Malformed(str(error)) from None
+    if not inflater.eof:
+        raise Malformed(f"compressed, {len(data)} bytes, and not whole within {LARGEST}")
+    return found

@@ -43,6 +43,16 @@ def test_a_frame_of_no_sensible_age_is_refused(more: str) -> None:
         wire.decode_frame(b'{"run": "a", "number": 1, "now_s": 1.0, %s}\nx' % more.encode())
 
 
+def test_a_compressed_frame_is_read_whole_or_not_at_all() -> None:
+    frame = wire.encode_frame(wire.FrameHead(run="a", number=1, now_s=1.0), '{"kind": "state"}' * 1000)
+    small = wire.compressed(frame)
+    assert len(small) < len(frame) / 10
+    assert wire.decode_frame(small) == wire.decode_frame(frame)
+    for broken in (small[:-1], small[:20] + b"\x00\x00" + small[22:], wire.compressed(bytes(wire.LARGEST + 1))):
+        with pytest.raises(wire.Malformed):
+            wire.decode_frame(broken)
+
+
 def test_more_events_than_were_requested_are_refused() -> None:
     body = wire.encode(wire.Events.model_construct(run="a", events=events(*range(wire.PORTION + 1))))
     with pytest.raises(wire.Malformed):

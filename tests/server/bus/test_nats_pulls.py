@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, cast
 
+import pytest
 from nats.aio.client import Client
 from nats.aio.msg import Msg
 
 from server.bus import nats_wire as wire
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus
-from server.bus.nats_pulls import MOST, Pulls
+from server.bus.nats_pulls import EVERY_S, MOST, MOST_UNDER_WAY, Pulls
 from server.bus.nats_questions import GONE_AFTER_S, Questions
 from tests.server.bus.buses import Clock, local_buses, until
 
@@ -23,6 +25,7 @@ async def test_an_agent_that_answers_at_once_does_not_keep_the_node_busy() -> No
     async def request(subject: str, body: bytes, timeout: float) -> Any:
         nonlocal requests
         requests += 1
+        assert wire.decode(wire.Pull, body).inflates
         await asyncio.sleep(0)
         head = wire.FrameHead(run="a", number=requests if requests % 2 else 0, now_s=1.0)
         return SimpleNamespace(data=wire.encode_frame(head, "x"))
@@ -38,6 +41,60 @@ async def test_an_agent_that_answers_at_once_does_not_keep_the_node_busy() -> No
     assert requests <= MOST * (took_s + 1) + 5
     assert took_s >= 1.9, "the third hundred is not requested before the third second"
     await pulls.stop()
+
+
+@pytest.mark.parametrize(("kind", "least", "greatest"), [("state", 2, MOST_UNDER_WAY), ("scan", 1, 1)])
+async def test_over_a_slow_radio_a_few_states_are_requested_at_once_and_no_older_one_replaces_a_newer_one(
+    kind: str, least: int, greatest: int
+) -> None:
+    now = asyncio.get_running_loop().time
+    sent_s: list[float] = []
+    kept: list[str | bytes] = []
+    under_way, most = 0, 0
+
+    async def request(subject: str, body: bytes, timeout: float) -> Any:
+        nonlocal under_way, most
+        sent_s.append(now())
+        under_way += 1
+        most = max(most, under_way)
+        number = len(sent_s) if len(sent_s) % 3 else len(sent_s) - 2  # each third one brings an older frame
+        await asyncio.sleep(0.48 if len(sent_s) % 2 else 0.4)  # of four, two answers come close to each other
+        under_way -= 1
+        return SimpleNamespace(data=wire.encode_frame(wire.FrameHead(run="a", number=number, now_s=1.0), str(number)))
+
+    questions = Questions(now=now)
+    questions.client = cast(Client, SimpleNamespace(request=request))
+    pulls = Pulls(questions, lambda *frame: kept.append(frame[2]), lambda *_: None, now=now)
+    pulls.look("ocelot", kind, True)
+    await until(lambda: len(kept) >= 4)
+    await pulls.stop()
+    assert least <= most <= greatest
+    assert min(b - a for a, b in pairwise(sent_s)) >= EVERY_S - 0.01
+    assert [int(one) for one in kept] == sorted({int(one) for one in kept})
+    assert asyncio.all_tasks() == {asyncio.current_task()}, "none is left behind"
+
+
+async def test_an_agent_that_waits_for_its_next_frame_has_one_pull_of_it() -> None:
+    time_s = 0.0
+    requests = under_way = most = 0
+
+    async def request(subject: str, body: bytes, timeout: float) -> Any:
+        nonlocal time_s, requests, under_way, most
+        requests, under_way = requests + 1, under_way + 1
+        most = max(most, under_way)
+        await asyncio.sleep(1.5 * EVERY_S)
+        time_s, under_way = time_s + 1.0, under_way - 1
+        return SimpleNamespace(
+            data=wire.encode_frame(wire.FrameHead(run="a", number=requests, now_s=1.0, waited_s=0.9))
+        )
+
+    questions = Questions(now=lambda: time_s)
+    questions.client = cast(Client, SimpleNamespace(request=request))
+    pulls = Pulls(questions, lambda *_: None, lambda *_: None, now=lambda: time_s)
+    pulls.look("ocelot", "state", True)
+    await until(lambda: requests >= 5)
+    await pulls.stop()
+    assert most == 1
 
 
 async def test_what_was_requested_of_an_agent_that_was_gone_is_requested_anew_once_it_is_back() -> None:
@@ -71,13 +128,51 @@ async def test_what_was_requested_of_an_agent_that_was_gone_is_requested_anew_on
     await bus.stop()
 
 
+async def test_behind_a_gap_only_the_newest_connection_of_an_agent_counts() -> None:
+    """What an earlier one had sent is delivered late: it shows nothing of now, and requests would be lost with it."""
+    requests: list[str] = []
+
+    async def request(subject: str, body: bytes, timeout: float) -> Any:
+        requests.append(subject)
+        await asyncio.Event().wait()
+
+    clock = Clock()
+    bus = NatsBus(now=clock)
+    bus._questions.client = cast(Client, SimpleNamespace(request=request, is_connected=True))
+
+    async def come(connection: int, run: str = "a") -> None:
+        here = wire.encode(wire.Here(run=run, last=0, resumes=True, connection=connection))
+        await bus._on_here(cast(Msg, SimpleNamespace(subject=wire.subject("ocelot", "here"), data=here)))
+        await asyncio.sleep(0)
+
+    await come(2)
+    bus.watch("ocelot", lambda _: None)
+    await until(lambda: len(requests) == 1)
+    clock.ahead_s += GONE_AFTER_S + 0.1
+    await come(1)
+    assert len(requests) == 1
+    assert bus.link_trouble("ocelot") is not None
+    await come(3)
+    await until(lambda: len(requests) == 2)
+    assert bus.link_trouble("ocelot") is None
+    await come(4)
+    await until(lambda: len(requests) == 3), "it was lost for a moment, and requests with it"
+    await come(4)
+    assert len(requests) == 3
+    clock.ahead_s += GONE_AFTER_S + 0.1
+    await come(1, run="b")
+    await until(lambda: len(requests) == 4)
+    assert bus.link_trouble("ocelot") is None, "it has started again"
+    await bus.stop()
+
+
 async def test_an_agent_announces_itself_as_soon_as_the_broker_is_there_again() -> None:
     sent: list[str] = []
 
     async def publish(subject: str, body: bytes) -> None:
         sent.append(subject)
 
-    client = SimpleNamespace(publish=publish, is_connected=False)
+    client = SimpleNamespace(publish=publish, is_connected=False, stats={"reconnects": 0})
     clock = Clock()
     async with local_buses() as both:
         agent = NatsAgent(both.session, run="a", now=clock)
@@ -89,3 +184,46 @@ async def test_an_agent_announces_itself_as_soon_as_the_broker_is_there_again() 
         await until(lambda: sent)
         assert clock() - began_s < wire.HERE_EVERY_S / 2
         announcing.cancel()
+
+
+async def test_each_connection_of_an_agent_has_a_higher_number() -> None:
+    sent: list[wire.Here] = []
+
+    async def nothing(*_: Any, **__: Any) -> Any:
+        return SimpleNamespace(unsubscribe=nothing)
+
+    async def publish(subject: str, body: bytes) -> None:
+        sent.append(wire.decode(wire.Here, body))
+
+    async with local_buses() as both:
+        agent = NatsAgent(both.session, run="a", now=Clock())
+        for reconnects in (0, 2, 0):  # of one client after the other
+            stats = {"reconnects": reconnects}
+            client = SimpleNamespace(publish=publish, subscribe=nothing, flush=nothing, is_connected=True, stats=stats)
+            before = len(sent)
+            await agent.start(cast(Client, client))
+            await until(lambda: len(sent) > before)  # noqa: B023
+            await agent.stop()
+    assert sorted({here.connection for here in sent}) == [1, 4, 5]
+
+
+async def test_an_agent_compresses_a_frame_only_for_a_node_that_inflates_it() -> None:
+    answers: list[bytes] = []
+
+    async def respond(data: bytes) -> None:
+        answers.append(data)
+
+    async with local_buses() as both:
+        agent = NatsAgent(both.session, run="a", now=Clock())
+        agent._client = cast(Client, SimpleNamespace(is_connected=True, max_payload=1 << 20))
+        both.session.put("ocelot", "state", "x" * 5000)
+        for body in (b'{"have": 0, "run": ""}', wire.encode(wire.Pull(have=0, run="", inflates=True))):
+            before = len(answers)
+            message = SimpleNamespace(subject="veh.ocelot.pull.state", data=body, reply="node", respond=respond)
+            await agent._on_pull(cast(Msg, message))
+            await until(lambda: len(answers) > before)  # noqa: B023
+        agent._client = None
+        await agent.stop()
+    plain, small = answers
+    assert len(small) < 500 < 5000 < len(plain)
+    assert wire.decode_frame(small)[1] == wire.decode_frame(plain)[1] == "x" * 5000
