@@ -181,7 +181,7 @@ UNDER_CAPTION = """() => {
 async def test_no_number_of_the_scan_is_under_its_caption_with_a_large_font(grown: Phone, canned: Canned) -> None:
     page = grown.page
     await page.add_init_script(f"({NUMBERS})()")
-    await page.set_viewport_size({"width": 1440, "height": 900})
+    await page.set_viewport_size({"width": 1920, "height": 1000})  # of 80 × 42 em: all panes
     await opened(grown, canned)
     await expect(page.locator("#panel-scan [data-f=straight]")).to_be_visible()
     found = []
