@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { brushPath, clockWords, csvOf, extentOf, foundAt, foundWords, limitAt, lineOf, placedMarks, roundEnds, specFor, tagAt, valueTicks, viewAfter, within } from '../../static/js/home/drive-layout.js';
+import { brushPath, clockWords, csvOf, extentOf, foundAt, foundWords, limitAt, lineOf, placedMarks, roundEnds, specFor, tagAt, valueTicks, viewAfter, wholeLabel, within } from '../../static/js/home/drive-layout.js';
 import { DriveView, emptyWords, stateWords } from '../../static/js/home/drive-view.js';
 import { withFirst } from '../../static/js/home/drive-choice.js';
 
@@ -76,6 +76,11 @@ test('ticks have seconds where they are less than a minute apart', () => {
   const at_s = new Date(2026, 10, 19, 14, 7, 30).getTime() / 1000;
   assert.equal(clockWords(at_s, 30), '14:07:30');
   assert.equal(clockWords(at_s, 60), '14:07');
+});
+
+test('a tick at the right end has no label that the edge would cut', () => {
+  const shown = (/** @type {number} */ x_px) => ['17:20', '17:20:15'].map((text) => wholeLabel(text, x_px, 212));
+  assert.deepEqual([shown(150), shown(185), shown(200)], [['17:20', '17:20:15'], ['17:20', ''], ['', '']]);
 });
 
 test('values have round ticks, and in a low pane those of the ends', () => {

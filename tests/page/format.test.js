@@ -44,10 +44,17 @@ test('a heading is clockwise from north', () => {
 });
 
 test('the numbers of a sentence are distinguished from its text', () => {
-  const numbers = (/** @type {string} */ text) => pieces(text).filter((piece) => piece.isNumber).map((piece) => piece.text);
+  const numbers = (/** @type {string} */ text) => pieces(text).filter((piece) => piece.unit !== undefined).map((piece) => piece.text);
   assert.deepEqual(numbers('192.168.4.1 is there, but nothing listens on port 9090.'), ['192.168.4.1', '9090']);
   assert.deepEqual(numbers('12.6 m/s, limit 11.0 m/s since 14:07:31'), ['12.6', '11.0', '14:07:31']);
   assert.deepEqual(numbers('Float64 is not cmd_vel2'), []);
-  assert.equal(pieces('a 1 b').map((piece) => piece.text).join(''), 'a 1 b');
+  assert.equal(pieces('a 1 b').map((piece) => piece.text + (piece.unit ?? '')).join(''), 'a 1 b');
   assert.deepEqual(pieces(''), []);
+});
+
+test('a number has its unit, and no other text', () => {
+  const units = (/** @type {string} */ text) => pieces(text).flatMap(({ unit }) => unit ?? []);
+  assert.deepEqual(units('12.6 m/s, limit 11.0 m/s since 14:07:31, at −1.1 m/s² for 2.5 s'), [' m/s', ' m/s', '', ' m/s²', ' s']);
+  assert.deepEqual(units('61 of 75 Hz, 12 %, 57.1 MB at 3 MB/s, 45 km/h, 28 mph, 5 min'), [' of', ' Hz', ' %', ' MB', ' MB/s', ' km/h', ' mph', ' min']);
+  assert.deepEqual(units('3 alarms, 2 cars waiting, 4 m_x, 5 a/b'), ['', '', '', '']);
 });

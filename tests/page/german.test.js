@@ -21,7 +21,7 @@ const { unseenWords } = await import('../../static/js/core/unseen.js');
 const { rateWords } = await import('../../static/js/replay/replay-layout.js');
 const { csvOf } = await import('../../static/js/home/drive-layout.js');
 
-const shown = (/** @type {string} */ text) => pieces(inUnits(text)).map((piece) => piece.text).join('');
+const shown = (/** @type {string} */ text) => pieces(inUnits(text)).map((piece) => piece.text + (piece.unit ?? '')).join('');
 
 test('live values, ages and distances have a comma', () => {
   assert.deepEqual([fixed(4.25), fixed(-0.04), fixed(-110.9501161, 6), fixed(7, 0), fixed(null)], ['4,3', '0,0', '−110,950116', '7', '–']);

@@ -272,8 +272,8 @@ test('the number of a ring stands in the first place without a return and withou
   assert.deepEqual(clearPlace([first], [], [10, 9], scale), { index: -1, box: null });
 });
 
-test('the number of a ring stands inside of the plot and beneath the caption at its top', () => {
-  assert.deepEqual([[150, 100], [150, 25], [8, 100], [292, 100]].map((place) => isInView(place, 300)), [true, false, false, false]);
+test('the number of a ring stands whole inside of the plot', () => {
+  assert.deepEqual([[150, 100], [150, 9], [8, 100], [292, 100]].map((place) => isInView(place, 300)), [true, false, false, false]);
 });
 
 test('the distance beside the ring of the nearest object stands whole on the plot, above or below the ring where neither side has room', () => {

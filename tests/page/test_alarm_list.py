@@ -182,7 +182,7 @@ async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(p
     await expect(strip).to_have_text("Connection lost: ended1 of 2")
     await expect(strip).to_have_attribute("data-returned", "")
     ended = phone.page.locator("[data-f=alarms-ended]")
-    await expect(ended).to_have_text("Acknowledge all that ended 1")
+    await expect(ended).to_have_text("Acknowledge all that ended (1)")
     await ended.tap()
     await received(returned, 2)
     assert acknowledged(returned)[1:] == [("link_lost", 1)]

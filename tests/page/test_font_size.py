@@ -150,3 +150,45 @@ async def test_each_is_with_a_large_font_in_each_window(grown: Phone, canned: Ca
 @pytest.mark.parametrize("tab", ["home", "map", "scan", "files", "settings"])
 async def test_each_is_at_150_percent(phone: Phone, canned: Canned, tab: str) -> None:
     await all_is_in_reach(phone, canned, [(width / LARGER, height / LARGER) for width, height in SIZES], tab)
+
+
+#: Without a thread of its own the page draws the scan: the numbers of its rings, as boxes within the window.
+NUMBERS = """() => {
+  window.Worker = undefined;
+  const kept = CanvasRenderingContext2D.prototype.fillText;
+  let now = [];
+  CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+    if (/^\\d+$/.test(text) && this.canvas.matches('.scanc')) now.push([text, x, y, this.measureText(text).width]);
+    return kept.apply(this, arguments);
+  };
+  const begin = CanvasRenderingContext2D.prototype.drawImage;
+  CanvasRenderingContext2D.prototype.drawImage = function () {
+    if (this.canvas.matches('.scanc')) [window.numbers, now] = [now, []];
+    return begin.apply(this, arguments);
+  };
+}"""
+#: Those of the newest drawing of which the caption covers a part.
+UNDER_CAPTION = """() => {
+  const caption = document.querySelector('#panel-scan [data-f=straight]').getBoundingClientRect();
+  const plot = document.querySelector('.scanc').getBoundingClientRect();
+  const isUnder = ([, x, y, width]) => plot.left + x < caption.right && plot.left + x + width > caption.left
+    && plot.top + y - 6 < caption.bottom && plot.top + y + 6 > caption.top;
+  return { of: numbers.length, height: caption.height, covered: numbers.filter(isUnder).map(([text]) => text) };
+}"""
+
+
+@pytest.mark.own_phone
+async def test_no_number_of_the_scan_is_under_its_caption_with_a_large_font(grown: Phone, canned: Canned) -> None:
+    page = grown.page
+    await page.add_init_script(f"({NUMBERS})()")
+    await page.set_viewport_size({"width": 1920, "height": 1000})  # of 80 × 42 em: all panes
+    await opened(grown, canned)
+    await expect(page.locator("#panel-scan [data-f=straight]")).to_be_visible()
+    found = []
+    for key in ["farther"] * 4 + ["nearer"] * 9:
+        await page.evaluate("window.numbers = null")
+        await page.wait_for_function("() => window.numbers?.length")
+        found.append(await page.evaluate(UNDER_CAPTION))
+        await page.locator(f"#panel-scan [data-f={key}]").click()
+    assert max(one["height"] for one in found) > 28
+    assert [one["covered"] for one in found] == [[]] * len(found)

@@ -165,7 +165,7 @@ async def test_five_alarms_three_of_them_returned_are_acknowledged(
     if width < 1000:
         await phone.f("strip").tap()
     ended = page.locator("[data-f=alarms-ended]:visible")
-    await expect(ended).to_have_text("Acknowledge all that ended 3")
+    await expect(ended).to_have_text("Acknowledge all that ended (3)")
     await phone.drawn(6)
     await ended.tap()
     answer(canned, await received(canned, 4))

@@ -38,7 +38,8 @@ export default {
     format: 'es',
     entryFileNames: '[name]-[hash].js',
     chunkFileNames: '[name]-[hash].js',
-    // Two scripts of which a browser fetches both at once: over a slow link the first picture comes sooner.
-    manualChunks: (id) => (/\/js\/core\//.test(id) ? 'core' : undefined),
+    // Two scripts of which a browser fetches both at once: over a slow link the first picture comes sooner. Only maps need
+    // geodesy, and they come later.
+    manualChunks: (id) => (/\/js\/core\/(?!geodesy\.js)/.test(id) ? 'core' : undefined),
   },
 };

@@ -113,7 +113,7 @@ class AlarmList {
     const returned = this.#rows.filter(({ kind }) => kind === 'returned').map(({ key }) => key);
     if (returned.some((key) => !this.#returned.includes(key))) this.#ended.moved();
     this.#returned = returned;
-    setSentence(ended, `Acknowledge all that ended${returned.length ? ` ${returned.length}` : ''}`);
+    setSentence(ended, `Acknowledge all that ended${returned.length ? ` (${returned.length})` : ''}`);
     show(ended, !this.store.replaying);
     setAttribute(ended, 'disabled', !mayAct || returned.length === 0);
     const { alarms, isReady } = this.#together();

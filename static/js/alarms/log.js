@@ -83,7 +83,7 @@ class AlarmLog {
   }
 
   #drawEvents() {
-    const { number, list, note, older } = this.parts;
+    const { list, note, older } = this.parts;
     const { rows, last } = this.store.log;
     const { events, next } = this.older;
     setText(note, this.older.note);
@@ -92,7 +92,6 @@ class AlarmLog {
     const today = new Date(Date.now()).toDateString(); // the headings of the days change at midnight
     const key = JSON.stringify([rows.length, last, this.store.log.measured, events.length, this.filter, today]);
     if (key === this.#happened) return;
-    number.replaceChildren('no. ', html('span', { class: 'n' }, String(last ?? 0)));
     const all = joined(rows, events, this.filter);
     list.replaceChildren(...(all.length ? all.flatMap((one, i) => withDay(one, all[i - 1], all))
       : [html('li', { class: 'none' }, html('span'), html('span', { class: 't' }, this.isAll ? 'No events yet. Alarms, acknowledgements, connections and changed settings are listed here.' : 'Nothing found here'))]));
@@ -109,7 +108,6 @@ function markOf(kind) {
 /** Builds the parts of the log in `root`. @param {HTMLElement} root */
 function build(root) {
   const [inTen, standing, shelved] = [html('span', { class: 'n v' }), html('span', { class: 'n v' }), html('span', { class: 'n v' })];
-  const number = html('span');
   const list = html('ul', { class: 'log', 'data-f': 'happened' });
   const now = html('ul', { class: 'log', 'data-f': 'standing' });
   const load = html('p', { class: 'sec', 'data-f': 'load' });
@@ -125,8 +123,8 @@ function build(root) {
   root.replaceChildren(
     html('section', { class: 'three' }, figure('In 10 min', inTen), figure('Active', standing), figure('Shelved', shelved)), load, trouble, now,
     html('div', { class: 'log-tools' }, kinds, html('div', { class: 'field' }, icon('find', 's'), find)),
-    html('div', { class: 'sec log-save' }, html('span', {}, 'Newest first, ', number), html('span', {}, csv, json)), list, note, html('div', { class: 'keys' }, older));
-  return { inTen, standing, shelved, number, list, now, load, trouble, kinds, find, csv, json, older, note };
+    html('div', { class: 'sec log-save' }, html('span', {}, 'Newest first'), html('span', {}, csv, json)), list, note, html('div', { class: 'keys' }, older));
+  return { inTen, standing, shelved, list, now, load, trouble, kinds, find, csv, json, older, note };
 }
 
 /** @param {ReturnType<typeof standingRows>[number]} row */

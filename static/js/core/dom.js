@@ -96,12 +96,16 @@ export function setSentence(element, sentence) {
 }
 
 /**
- * A sentence as nodes, its numbers in spans of class n, its speeds in the unit of this phone.
+ * A sentence as nodes, its numbers in spans of class n and on one line with their units, its speeds in the unit of this phone.
  * @param {string} sentence
  * @returns {(HTMLElement | string)[]}
  */
 export function textNodes(sentence) {
-  return pieces(inUnits(sentence)).map((piece) => (piece.isNumber ? html('span', { class: 'n' }, piece.text) : piece.text));
+  return pieces(inUnits(sentence)).map(({ text, unit }) => {
+    if (unit === undefined) return text;
+    const number = html('span', { class: 'n' }, text);
+    return unit ? html('span', { class: 'nu' }, number, unit) : number;
+  });
 }
 
 /**

@@ -14,7 +14,7 @@ export class DrawProof {
     const [now, speed] = [`proof ${this.#n}`, fixed(this.#n + 0.25)];
     setText(this.#text, now);
     setAttribute(this.#text, 'data-n', this.#n);
-    setSentence(this.#sentence, `at ${speed} m`);
+    setSentence(this.#sentence, `at ${speed}`);
     const [text, sentence] = [this.#text, this.#sentence];
     return textOf(text) === now && text.attributes[0]?.value === String(this.#n) && speed.length === 3 && textOf(sentence) === 'at ' && textOf(sentence.childNodes[1]) === speed;
   }

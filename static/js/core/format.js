@@ -108,24 +108,26 @@ export function counted(count, one, many = `${one}s`) {
 
 /** A version has a point in every language. */
 const VERSION = /\b(?:TLS|HTTP|[Vv]ersion)\s$/;
-const NUMBER = /(?<![\p{L}\d_/])[+−-]?\d+(?:[.:,]\d+)*°?(?![\p{L}_])/gu;
+/** A number, and the unit behind it: what has three letters at most. */
+const NUMBER = /(?<![\p{L}\d_/])([+−-]?\d+(?:[.:,]\d+)*°?)((?: [\p{L}%]{1,3}(?:\/[sh]²?)?(?![\p{L}/]))?)(?![\p{L}_])/gu;
 
 /**
- * A sentence cut into numbers and the rest, so that numbers can stand in their own face, each with the decimal mark of this
- * browser's language.
+ * A sentence cut into numbers and the rest, so that numbers can stand in their own face and on one line with their unit, each
+ * with the decimal mark of this browser's language.
  * @param {string} sentence
- * @returns {{text: string, isNumber: boolean}[]}
+ * @returns {{text: string, unit?: string}[]} unit: of a number, with the space before it; empty where it has none
  */
 export function pieces(sentence) {
   const found = [];
   let from = 0;
   for (const match of sentence.matchAll(NUMBER)) {
-    if (match.index > from) found.push({ text: sentence.slice(from, match.index), isNumber: false });
-    const isDecimal = /^[+−-]?\d+\.\d+°?$/.test(match[0]) && !VERSION.test(sentence.slice(0, match.index));
-    found.push({ text: isDecimal ? local(match[0]) : match[0], isNumber: true });
+    if (match.index > from) found.push({ text: sentence.slice(from, match.index) });
+    const [, text = '', unit = ''] = match;
+    const isDecimal = /^[+−-]?\d+\.\d+°?$/.test(text) && !VERSION.test(sentence.slice(0, match.index));
+    found.push({ text: isDecimal ? local(text) : text, unit });
     from = match.index + match[0].length;
   }
-  if (from < sentence.length) found.push({ text: sentence.slice(from), isNumber: false });
+  if (from < sentence.length) found.push({ text: sentence.slice(from) });
   return found;
 }
 

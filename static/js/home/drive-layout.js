@@ -179,6 +179,14 @@ export function clockWords(at_s, apart_s) {
   return apart_s < 60 ? clock : clock.slice(0, 5);
 }
 
+/** Half of the width of a digit of the axes [px]. */
+const HALF_DIGIT_PX = 4;
+
+/** A label in the middle under its tick; none where the right edge of the drawing would cut it. @param {string} text @param {number} x_px of the tick @param {number} right_px */
+export function wholeLabel(text, x_px, right_px) {
+  return x_px + HALF_DIGIT_PX * text.length > right_px ? '' : text;
+}
+
 /**
  * The ticks of a value axis: multiples of a round step, or in a low pane its ends.
  * @param {number} low @param {number} high

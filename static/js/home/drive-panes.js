@@ -4,7 +4,7 @@ import uPlot from '../../vendor/uPlot.esm.js';
 import { html, setAttribute, setText, setSentence } from '../core/dom.js';
 import { fixed } from '../core/format.js';
 import { shownIn } from '../core/units.js';
-import { clockWords, extentOf, lineOf, valueTicks } from './drive-layout.js';
+import { clockWords, extentOf, lineOf, valueTicks, wholeLabel } from './drive-layout.js';
 import { AXIS_PX, axisOf, BARE, INCRS_S, LOW_PX, PaneStack, plotSize } from './pane-stack.js';
 
 /** A pane that is lower has no room for a text of two lines under its label [px]. */
@@ -117,7 +117,7 @@ class Pane {
         y: { range: () => this.#ends() },
       },
       axes: [
-        { ...axis, size: this.isLast ? AXIS_PX : 0, space: 64, incrs: INCRS_S, values: (_, splits, _axis, _space, apart_s) => splits.map((at_s) => (this.isLast ? clockWords(at_s, apart_s) : '')) },
+        { ...axis, size: this.isLast ? AXIS_PX : 0, space: 64, incrs: INCRS_S, values: (plot, splits, _axis, _space, apart_s) => splits.map((at_s) => (this.isLast ? wholeLabel(clockWords(at_s, apart_s), plot.valToPos(at_s, 'x'), plot.width - VALUES_PX) : '')) },
         { ...axis, size: VALUES_PX, space: 22, grid: { show: false }, splits: (_, _axis, low, high, apart) => valueTicks(low, high, apart, plotSize(this.host).height < LOW_PX), values: (_, splits) => splits.map((value) => fixed(value, splits.some((one) => Math.abs(one % 1) > 1e-6 && Math.abs(one) < 100) ? 1 : 0)) },
       ],
       series: [{}, ...[0, 1].map(() => ({ stroke: palette.ink, width: 2, spanGaps: false, points: { show: false } }))],

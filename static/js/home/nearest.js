@@ -2,7 +2,7 @@
 
 import { field, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { ABSENT, isAbsent, write, writeAge } from '../core/ink.js';
-import { bearing, fixed } from '../core/format.js';
+import { NOTHING, bearing, fixed } from '../core/format.js';
 
 const TAPE = { from: 26, to: 380, metres: 20 };
 
@@ -43,6 +43,7 @@ export function mount(root, store) {
     const distance_m = !isAbsent(state.ink) && typeof value?.distance_m === 'number' ? value.distance_m : null;
     const isLive = state.ink === 'fresh' || state.ink === 'ageing';
     writeAge(age, state);
+    if (isAbsent(state.ink)) setText(age, NOTHING); // why there is none stands below, larger
     show(parts.distance, distance_m !== null);
     show(none, distance_m === null);
     setText(none, isAbsent(state.ink) ? ABSENT[state.ink] : value?.none_in_range ? 'none in range' : 'distance unknown');

@@ -4,7 +4,7 @@ import uPlot from '../../vendor/uPlot.esm.js';
 import { html, setText, setSentence } from '../core/dom.js';
 import { duration, fixed, signed } from '../core/format.js';
 import { shownIn } from '../core/units.js';
-import { extentOf, foundAt, foundWords, valueTicks } from '../home/drive-layout.js';
+import { extentOf, foundAt, foundWords, valueTicks, wholeLabel } from '../home/drive-layout.js';
 import { AXIS_PX, axisOf, BARE, INCRS_S, LOW_PX, PaneStack, plotSize } from '../home/pane-stack.js';
 import { drawMarks, hatch } from './compare-draw.js';
 import { courseOf, holesOf } from './compare-layout.js';
@@ -110,7 +110,7 @@ class Pane {
       ...BARE,
       scales: { x: { time: false, range: () => this.panes.sceneOf()?.view ?? [0, 1] }, y: { range: () => this.#ends() } },
       axes: [
-        { ...axis, size: this.isLast ? AXIS_PX : 0, space: 64, incrs: INCRS_S, values: (_, splits) => splits.map((at_s) => (this.isLast ? `${at_s < 0 ? '−' : ''}${duration(Math.abs(at_s))}` : '')) },
+        { ...axis, size: this.isLast ? AXIS_PX : 0, space: 64, incrs: INCRS_S, values: (plot, splits) => splits.map((at_s) => (this.isLast ? wholeLabel(`${at_s < 0 ? '−' : ''}${duration(Math.abs(at_s))}`, plot.valToPos(at_s, 'x'), plot.width - VALUES_PX) : '')) },
         { ...axis, size: VALUES_PX, space: 22, grid: { show: false }, splits: (_, _axis, low, high, apart) => valueTicks(low, high, apart, plotSize(this.host).height < LOW_PX), values: (_, splits) => splits.map((value) => fixed(value, splits.some((one) => Math.abs(one % 1) > 1e-6 && Math.abs(one) < 100) ? 1 : 0)) },
       ],
       series: [{}, { show: true, stroke: palette.ink, points: { show: false } }],

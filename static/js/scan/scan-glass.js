@@ -26,6 +26,8 @@ export class ScanGlass {
   #theme = null;
   /** Width and height [CSS px]: read at each scan, they would force a layout of the whole page. */
   #size = { width: 0, height: 0 };
+  /** Where `caption` covers the plot. @type {import('./scan-layout.js').Box | null} */
+  #covered = null;
   #watcher = new ResizeObserver(() => this.#measure());
   /** The last request. @type {(() => Wanted | null) | null} */
   #newest = null;
@@ -37,10 +39,12 @@ export class ScanGlass {
   /** The scan that can be seen; null: none was drawn. @type {Shown | null} */
   shown = null;
 
-  /** @param {HTMLCanvasElement} canvas */
-  constructor(canvas) {
+  /** @param {HTMLCanvasElement} canvas @param {HTMLElement} caption which a wide screen has over it */
+  constructor(canvas, caption) {
     this.canvas = canvas;
+    this.caption = caption;
     this.#watcher.observe(canvas);
+    this.#watcher.observe(caption);
     this.#begin();
   }
 
@@ -124,6 +128,8 @@ export class ScanGlass {
 
   #measure() {
     this.#size = { width: this.canvas.clientWidth, height: this.canvas.clientHeight };
+    const [plot, { left, top, width, height }] = [this.canvas.getBoundingClientRect(), this.caption.getBoundingClientRect()];
+    this.#covered = height && top < plot.bottom ? { left: left - plot.left, top: top - plot.top, width, height } : null;
   }
 
   /** What is to be drawn now; null: nothing, or there is no room. @returns {{picture: import('./scan-plot.js').Picture, shows: Shown} | null} */
@@ -137,6 +143,6 @@ export class ScanGlass {
     this.#theme ??= themeAt(this.canvas);
     const { scan, at_ms, around } = wanted;
     const dpr = Math.min(window.devicePixelRatio || 1, FINEST);
-    return { picture: { scan, around, width, height, dpr, theme: this.#theme }, shows: { age_s: scan.age_s, at_ms } };
+    return { picture: { scan, around, width, height, dpr, theme: this.#theme, caption: this.#covered }, shows: { age_s: scan.age_s, at_ms } };
   }
 }

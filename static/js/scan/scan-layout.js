@@ -9,8 +9,8 @@ const NAMED_RAD = (6 * Math.PI) / 180;
 export const REACH_M = { least: 4, most: 120, first: 20 };
 /** One press of + or −. */
 const ZOOM_STEP = Math.SQRT2;
-/** A number whose middle is higher is covered by the caption "Steering unknown" of a wide screen. */
-const CAPTION_PX = 28;
+/** Half of the height of a number's plate [px]. */
+const HALF_NUMBER_PX = 10;
 /** Farther behind the nose than this a return is below the plot [m]. */
 const BEHIND_M = 0.5;
 /** Above this many beams, a return whose square of 5 px would cover its neighbour's but for this is not drawn again [px]. */
@@ -264,9 +264,9 @@ export function clearOf(taken, box) {
   return by === undefined ? null : { ...box, top: box.top + by * box.height };
 }
 
-/** Whether a number of the plot is seen there whole: inside of its sides, and beneath the caption at its top. @param {number[]} place @param {number} width */
+/** Whether a number of the plot is seen there whole: inside of its sides and beneath its top. @param {number[]} place @param {number} width */
 export function isInView([x = 0, y = 0], width) {
-  return Math.abs(x - width / 2) < width / 2 - 12 && y > CAPTION_PX;
+  return Math.abs(x - width / 2) < width / 2 - 12 && y > HALF_NUMBER_PX;
 }
 
 /**

@@ -36,6 +36,7 @@ const OTHER_TURNS = [-0.33, 0.72, -0.72, 1.1, -1.1];
  * @property {number} height [CSS px]
  * @property {number} dpr pixels of the canvas for one of CSS
  * @property {import('./scan-theme.js').Theme} theme
+ * @property {Box | null} caption what covers the plot, and grows with the font
  */
 
 export class ScanPlot {
@@ -58,14 +59,14 @@ export class ScanPlot {
   }
 
   /** @param {Picture} picture */
-  draw({ scan, around, width, height, dpr, theme }) {
+  draw({ scan, around, width, height, dpr, theme, caption }) {
     const [w, h] = [Math.round(width * dpr), Math.round(height * dpr)];
     fit(this.canvas, w, h);
     const g = penOf(this.canvas, { alpha: false });
     if (!g) return;
     ({ colour: this.#colour, font: this.#font } = theme);
     this.#width = width;
-    this.#taken = [];
+    this.#taken = caption ? [caption] : [];
     const { reach_m } = around;
     g.setTransform(1, 0, 0, 1, 0, 0);
     g.drawImage(this.#grid.draw({ width, height, dpr, reach_m, theme }), 0, 0);

@@ -71,7 +71,7 @@ class ScanTab {
   constructor(root, store) {
     this.at = (/** @type {string} */ name) => field(root, name);
     this.store = store;
-    this.glass = new ScanGlass(/** @type {HTMLCanvasElement} */ (this.at('canvas')));
+    this.glass = new ScanGlass(/** @type {HTMLCanvasElement} */ (this.at('canvas')), this.at('straight'));
     this.readout = new ScanReadout(root, store, this.mark);
     this.ranges = /** @type {HTMLElement[]} */ ([...root.querySelectorAll('[data-range]')]);
   }

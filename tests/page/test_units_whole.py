@@ -1,0 +1,111 @@
+"""Numbers stand on one line with their units, and nothing is named twice or cut: in alarms, signals, a low window."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.async_api import expect
+
+from tests.page.canned import Canned, alarm, live, slowed
+from tests.page.conftest import Phone
+from tests.page.screenshots import too_fast
+
+DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+#: Quantities of a text that begin on one line and end on another, at each of these widths of it [px].
+BROKEN = """([selector, from, to]) => {
+  const element = document.querySelector(selector);
+  const texts = document.createTreeWalker(element, NodeFilter.SHOW_TEXT);
+  const all = [];
+  while (texts.nextNode()) all.push(texts.currentNode);
+  const whole = all.map((one) => one.data).join('');
+  const place = (at) => {
+    let [n, before] = [0, 0];
+    while (at > before + all[n].data.length) before += all[n++].data.length;
+    return [all[n], at - before];
+  };
+  const found = [...whole.matchAll(/[\\d.]+ (?:m\\/s²|m\\/s|Hz|m|s)(?![a-z])/g)].map((one) => {
+    const range = document.createRange();
+    range.setStart(...place(one.index));
+    range.setEnd(...place(one.index + one[0].length));
+    return [one[0], range];
+  });
+  const broken = new Set();
+  for (let width = from; width <= to; width += 3) {
+    element.style.cssText = `display: block; width: ${width}px`;
+    for (const [text, range] of found) {
+      const tops = [...range.getClientRects()].filter((box) => box.width > 1).map((box) => box.bottom);
+      if (Math.max(...tops) - Math.min(...tops) > 12) broken.add(text);
+    }
+  }
+  element.style.cssText = '';
+  return { of: found.length, broken: [...broken] };
+}"""
+
+#: Lower ends of what acts and of the speed, and the upper end of the action bar [px].
+BOTTOMS = """() => {
+  const box = (selector) => document.querySelector(selector).getBoundingClientRect();
+  const rail = '#monitor > .rail';
+  return {
+    keys: [`${rail} [data-f=release]`, `${rail} .slide`].map((one) => box(one).bottom),
+    speed: box('.gauge .speed').bottom, rail: box(rail).top,
+  };
+}"""
+
+
+async def test_a_number_and_its_unit_stand_on_one_line(phone: Phone, canned: Canned) -> None:
+    """In the dialog of an alarm and in its row of the list, however wide they are."""
+    page = phone.page
+    canned.state = too_fast(live())
+    await phone.open(canned.address)
+    await expect(page.locator("#sheet-alarm [data-f=text]")).to_contain_text("12.8 m/s")
+    found = await page.evaluate(BROKEN, ["#sheet-alarm [data-f=text]", 120, 400])
+    assert found["of"] >= 2
+    assert found["broken"] == []
+    text = "6.3 m from where it stopped 41 s ago at 2.5 m/s; 2.0 m are allowed, 61 of 75 Hz"
+    canned.state = live() | {"alarms": [alarm("drift", "GPS drift", place="list", text=text)]}
+    await phone.f("strip").tap()
+    row = page.locator(".alarms li .m").first
+    await expect(row).to_contain_text("2.5 m/s")
+    assert await page.evaluate(BROKEN, [".alarms li .m", 120, 400]) == {"of": 5, "broken": []}
+
+
+async def test_what_is_not_published_is_named_once_at_nearest_and_on_one_line_in_signals(
+    phone: Phone, canned: Canned
+) -> None:
+    canned.state = live()
+    canned.state["signals"]["distance"] |= {"freshness": "not_published", "value": None, "age_s": None, "topic": None}
+    await phone.open(canned.address)
+    await phone.live()
+    nearest = phone.page.locator('[data-part="nearest"]')
+    await expect(nearest.locator("[data-f=none]")).to_have_text("not published")
+    await expect(nearest.locator("[data-f=age]")).to_have_text("–")
+    await nearest.locator("[data-f=age]").tap()  # it still leads to the signal
+    value = phone.page.locator(".sig .n[data-ink=not_published]").first
+    await expect(value).to_have_text("not published")
+    box = await value.bounding_box()
+    assert box is not None
+    assert box["height"] < 24
+
+
+@pytest.mark.own_phone
+@pytest.mark.parametrize("hand", ["right", "left"])
+async def test_the_keys_of_a_slow_down_are_inside_a_low_window(phone: Phone, canned: Canned, hand: str) -> None:
+    page = phone.page
+    await page.add_init_script(f"localStorage.setItem('catgraph.hand', '{hand}')")
+    canned.state = live() | {"decelerate": slowed()}
+    await phone.open(canned.address)
+    await phone.live()
+    await page.set_viewport_size({"width": 412, "height": 360})
+    await page.evaluate(DRAWN)
+    assert max((await page.evaluate(BOTTOMS))["keys"]) <= 360  # above it stands that the sound is off
+    await phone.f("sound-off").tap()
+    await expect(phone.f("sound-off")).to_be_hidden()
+    for confirmed in (True, False):
+        canned.state = live() | {"decelerate": slowed(confirmed)}
+        await expect(page.locator('.order[data-kind="crit"]')).to_have_count(0 if confirmed else 1)
+        await expect(phone.f("release")).to_be_visible()
+        for width, height in ((412, 360), (568, 360), (360, 320), (480, 320)):
+            await page.set_viewport_size({"width": width, "height": height})
+            await page.evaluate(DRAWN)
+            boxes = await page.evaluate(BOTTOMS)
+            assert max(boxes["keys"]) <= height, (confirmed, width)
+            assert height < 360 or boxes["speed"] <= boxes["rail"] + 1, (confirmed, width)
