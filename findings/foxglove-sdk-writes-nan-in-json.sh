@@ -6,7 +6,7 @@
 #
 # What is seen: the message is written as `{"speed": NaN}`, without an error. That is no JSON (RFC 8259): the strict
 # parsers, JavaScript's among them, refuse the whole message with all its other fields, while Python's own module reads
-# it, so that a test in Python passes. A sensor says NaN just when something is wrong with it. The program must replace
+# it, so that a test in Python passes. A sensor gives NaN just when something is wrong with it. The program must replace
 # such values before it logs them.
 #
 # Exit code: 0 while this behaviour holds, 1 once it changed, 2 where it could not be tried.

@@ -2,7 +2,7 @@
 # mcap 1.6.0 (PyPI).
 #
 # What a good engineer would guess: `next(reader.iter_messages(reverse=True))` is the newest message of a file. The
-# documentation says that with `reverse`, and `log_time_order` as it is by default, messages come in descending order.
+# documentation promises that with `reverse`, and `log_time_order` as it is by default, messages come in descending order.
 #
 # What is seen: in a file without chunks, which `Writer(…, use_chunking=False)` writes, `reverse` is ignored without an
 # error: the first message that comes is the oldest one. The last known position of a vehicle is then that of its start.

@@ -2,7 +2,7 @@
 # rosbags 0.11.9 (PyPI).
 #
 # What a good engineer would guess: a recorder in Python that is ended with Ctrl-C, or whose loop raises an error, leaves
-# the messages that it wrote until then. The writer is a context manager, and its documentation says to use it as one.
+# the messages that it wrote until then. The writer is a context manager, and its documentation has it used as one.
 #
 # What is seen: with SQLite, the writer's default storage, the whole recording is one transaction. An exception in the
 # `with` block, KeyboardInterrupt too, rolls it back: a database with no message and no metadata.yaml is left, without a
@@ -18,7 +18,7 @@ python3 -m venv "$folder/venv" || exit 2
 "$folder/venv/bin/pip" install --quiet --disable-pip-version-check rosbags==0.11.9 mcap==1.6.0 || exit 2
 
 cat > "$folder/record.py" <<'PYTHON'
-"""`record.py FOLDER STORAGE END`: writes 20 000 messages, then ends as END says."""
+"""`record.py FOLDER STORAGE END`: writes 20 000 messages, then ends by END."""
 
 import os
 import signal

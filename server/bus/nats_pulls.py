@@ -19,7 +19,7 @@ from server.bus.nats_questions import ANSWER_S, Questions
 MOST = 100  # pulls a second of one kind of frame, where an agent answers at once
 RETRY_S = 0.5  # after a pull that nobody answered
 EVERY_S = 0.1  # a state is made
-SLOW_S = 0.15  # the way there and back, from which on several pulls are under way
+SLOW_S = 0.15  # the round trip from which on several pulls are under way
 SMOOTHING = 0.75
 MOST_UNDER_WAY = 4  # compressed, they are as many bytes as one state is
 Keep = Callable[[str, str, str | bytes, float], None]
@@ -32,6 +32,13 @@ class _Newest:
 
     number: int = 0
     run: str = ""
+    run_requested_s: float = -math.inf  # when the pull was sent that brought the first one of this run
+
+
+async def _ended(pulls: set[asyncio.Task[None]]) -> set[asyncio.Task[None]]:
+    """None is left, once all of these have ended. Raises what one of them raised."""
+    await asyncio.gather(*pulls)
+    return set()
 
 
 class Pulls:
@@ -83,13 +90,15 @@ class Pulls:
                     began_s, requests = self._now(), 0
                 requests += 1
                 most = self._most_under_way(vehicle, kind)
-                if most == 1 and not under_way:
+                if most == 1:
+                    under_way = await _ended(under_way)
                     await self._request(vehicle, kind, newest)
                     continue
                 due_s = self._now() + EVERY_S
                 under_way.add(asyncio.create_task(self._request(vehicle, kind, newest)))
                 wait_s = EVERY_S if len(under_way) < most else None
-                _, under_way = await asyncio.wait(under_way, timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
+                done, under_way = await asyncio.wait(under_way, timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
+                await _ended(done)
                 if under_way:  # those that come together would bring the same frame for ever
                     await asyncio.sleep(max(0.0, due_s - self._now()))
         finally:
@@ -98,7 +107,7 @@ class Pulls:
             await asyncio.gather(*under_way, return_exceptions=True)
 
     def _most_under_way(self, vehicle: str, kind: str) -> int:
-        """More than one only of states, which scans are not to delay, and only where the way is slow: an agent without
+        """More than one only of states, which scans are not to delay, and only over a long round trip: an agent without
         a newer frame answers all of them with the next one."""
         trip_s = self._trips_s.get(vehicle, 0.0)
         return 1 if kind != "state" or trip_s < SLOW_S else min(MOST_UNDER_WAY, 1 + math.ceil(trip_s / EVERY_S))
@@ -118,15 +127,19 @@ class Pulls:
             return await asyncio.sleep(RETRY_S)
         except wire.Malformed as why:
             return await self._not_read(vehicle, kind, why)
+        if head.run != newest.run:
+            if requested_s < newest.run_requested_s:  # of a run that has ended since, and comes late
+                return None
+            newest.number, newest.run, newest.run_requested_s = 0, head.run, requested_s
         waited_s = max(0.0, head.waited_s)
         trip_s = max(0.0, self._now() - requested_s - waited_s)
         self._trips_s[vehicle] = trip_s + SMOOTHING * (self._trips_s.get(vehicle, trip_s) - trip_s)
         self._questions.set_clock(vehicle, head.run, head.now_s)
         if head.refused:
             self._refuse(vehicle, kind, head.refused)
-        if not head.number or (head.run == newest.run and head.number <= newest.number):
+        if head.number <= newest.number:
             return None
-        newest.number, newest.run = head.number, head.run
+        newest.number = head.number
         # By our clock, and no later than it was: the pull was at the agent after `requested_s`.
         put_s = min(requested_s + waited_s, self._now()) - max(0.0, head.age_s)
         try:

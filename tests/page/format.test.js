@@ -57,4 +57,9 @@ test('a number has its unit, and no other text', () => {
   assert.deepEqual(units('12.6 m/s, limit 11.0 m/s since 14:07:31, at −1.1 m/s² for 2.5 s'), [' m/s', ' m/s', '', ' m/s²', ' s']);
   assert.deepEqual(units('61 of 75 Hz, 12 %, 57.1 MB at 3 MB/s, 45 km/h, 28 mph, 5 min'), [' of', ' Hz', ' %', ' MB', ' MB/s', ' km/h', ' mph', ' min']);
   assert.deepEqual(units('3 alarms, 2 cars waiting, 4 m_x, 5 a/b'), ['', '', '', '']);
+  assert.deepEqual(units('5 °C, 3 kbit/s, 10 m/min, 4 cars'), [' °C', ' kbit/s', ' m/min', '']);
+});
+
+test('a part of a name is no number', () => {
+  assert.deepEqual(pieces('45m 4.5m Pixel 57f2'), [{ text: '45m 4.5m Pixel 57f2' }]);
 });

@@ -244,6 +244,7 @@ test('labels give way to labels: half a line, a line, or they are left out', () 
   assert.equal(clearOf([{ left: 30, top: 82, width: 40, height: 20 }], box)?.top, 110);
   assert.equal(clearOf([{ left: 41, top: 100, width: 40, height: 20 }], box)?.top, 100, 'beside it');
   assert.equal(clearOf([{ left: 0, top: 70, width: 40, height: 80 }], box), null);
+  assert.equal(clearOf([{ left: 0, top: 3, width: 40, height: 20 }], { ...box, top: 8 })?.top, 28, 'never above the plot');
 });
 
 test('a plot too low for its foot still has a scale: what lies ahead is above, and no radius is negative', () => {

@@ -109,3 +109,41 @@ async def test_the_keys_of_a_slow_down_are_inside_a_low_window(phone: Phone, can
             boxes = await page.evaluate(BOTTOMS)
             assert max(boxes["keys"]) <= height, (confirmed, width)
             assert height < 360 or boxes["speed"] <= boxes["rail"] + 1, (confirmed, width)
+
+
+@pytest.mark.parametrize(("sending", "state"), [(True, "not confirmed"), (False, "not sending")])
+async def test_a_slow_down_that_fails_names_the_physical_stop_while_an_alarm_is_to_be_acknowledged(
+    phone: Phone, canned: Canned, sending: bool, state: str
+) -> None:
+    page = phone.page
+    canned.state = live() | {"decelerate": slowed(False, sending=sending)}
+    await phone.open(canned.address)
+    await phone.live()
+    legend = page.locator(f'#monitor > .rail .legend > [data-state="{state}"]')
+    await expect(legend).to_have_css("font-weight", "700")
+    canned.state = too_fast(canned.state)
+    await expect(page.locator("#sheet-alarm")).to_be_visible()
+    for width, height in ((568, 320), (640, 360), (412, 360), (740, 360)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.evaluate(DRAWN)
+        stops = page.get_by_text("physical stop")
+        assert any([await stops.nth(n).is_visible() for n in range(await stops.count())]), (width, height)
+
+
+async def test_what_is_read_beneath_the_scan_is_in_sight_on_a_low_phone(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    canned.state = live()
+    await phone.open(canned.address)
+    await phone.live()
+    await page.get_by_role("tab", name="Scan").tap()
+    await expect(page.locator(".scanc")).to_be_visible()
+    for has_note in (False, True):
+        await page.evaluate("(has) => { document.querySelector('.scan-note').hidden = !has; }", has_note)
+        for width, height in ((360, 640), (360, 740), (412, 915)):
+            await page.set_viewport_size({"width": width, "height": height})
+            await page.evaluate(DRAWN)
+            ends = await page.locator("#panel-scan .three .n").last.bounding_box()
+            rail = await page.locator("#monitor > .rail").bounding_box()
+            assert ends is not None
+            assert rail is not None
+            assert ends["y"] + ends["height"] <= rail["y"], (has_note, width, height)

@@ -136,7 +136,8 @@ def scan(file: IO[bytes], *, with_messages: bool = True) -> Index:
         elif opcode == Opcode.DATA_END:
             index.is_ended = True
         elif opcode == Opcode.FOOTER:
-            index.pieces += end + len(MAGIC) < size  # what another program put behind it, such as a second file
+            file.seek(end + len(MAGIC))
+            index.pieces += file.read(len(MAGIC)) == MAGIC  # another file was joined to it
             break
         elif opcode in _DECLARING:
             _declared(index, opcode, file.read(length) if length <= MOST_TEXT else b"")

@@ -24,6 +24,7 @@ MAX_LETTERS = 256 * 1024
 
 _IDL_SEPARATOR = "=" * 80 + "\n"
 _CONSTANT = re.compile(r"\s*\S+\s+\w+\s*=")  # begins the line of one
+_PARSED_CONSTANT = re.compile(r"\s*\S+\s+[A-Z][A-Z0-9_]*\s*=\s*\S")  # … that the parser takes as one
 
 
 def bounded(text: str) -> str:
@@ -39,14 +40,14 @@ def bounded(text: str) -> str:
 def types_of_msg(text: str, type: str) -> dict[str, Any]:
     """Definitions by type, as rosbags has them, of a text in .msg form. Raises Undecodable, and what its parser raises.
 
-    The parser refuses constants that ROS 1 allows, such as `int8 kLeft=1` and `string NONE=`. Constants are not in the
-    bytes: they are left out where the definition cannot be parsed with them.
+    Constants that ROS 1 allows are refused by the parser, such as `int8 kLeft=1` and `string NONE=`, or taken for a
+    field, such as `int8 kLeft = 1`. None is in the bytes: those are left out, and all where it refuses one of the rest.
     """
-    text = bounded(text)
+    lines = [line for line in bounded(text).splitlines() if not _CONSTANT.match(line) or _PARSED_CONSTANT.match(line)]
     try:
-        return dict(get_types_from_msg(text, type))
+        return dict(get_types_from_msg("\n".join(lines) + "\n", type))
     except Exception:  # the parser raises many exception types
-        fields = [line for line in text.splitlines() if not _CONSTANT.match(line)]
+        fields = [line for line in lines if not _CONSTANT.match(line)]
         return dict(get_types_from_msg("\n".join(fields) + "\n", type))
 
 

@@ -14,13 +14,13 @@ export class DrawProof {
     const [now, speed] = [`proof ${this.#n}`, fixed(this.#n + 0.25)];
     setText(this.#text, now);
     setAttribute(this.#text, 'data-n', this.#n);
-    setSentence(this.#sentence, `at ${speed}`);
-    const [text, sentence] = [this.#text, this.#sentence];
-    return textOf(text) === now && text.attributes[0]?.value === String(this.#n) && speed.length === 3 && textOf(sentence) === 'at ' && textOf(sentence.childNodes[1]) === speed;
+    setSentence(this.#sentence, `at ${speed} m`);
+    const [text, sentence, quantity] = [this.#text, this.#sentence, this.#sentence.childNodes[1]];
+    return textOf(text) === now && text.attributes[0]?.value === String(this.#n) && speed.length === 3 && textOf(sentence) === 'at ' && textOf(quantity?.firstChild) === speed && textOf(quantity?.childNodes[1]) === ' m';
   }
 }
 
-/** By another road than it was written. @param {Node | undefined} node */
+/** By another road than it was written. @param {Node | null | undefined} node */
 function textOf(node) {
   const first = node?.firstChild;
   return first ? /** @type {Text} */ (first).data : /** @type {Text | undefined} */ (node)?.data;

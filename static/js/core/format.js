@@ -109,7 +109,7 @@ export function counted(count, one, many = `${one}s`) {
 /** A version has a point in every language. */
 const VERSION = /\b(?:TLS|HTTP|[Vv]ersion)\s$/;
 /** A number, and the unit behind it: what has three letters at most. */
-const NUMBER = /(?<![\p{L}\d_/])([+−-]?\d+(?:[.:,]\d+)*°?)((?: [\p{L}%]{1,3}(?:\/[sh]²?)?(?![\p{L}/]))?)(?![\p{L}_])/gu;
+const NUMBER = /(?<![\p{L}\d_/])([+−-]?\d+(?:[.:,]\d+)*°?)((?: (?:°C|[\p{L}%]{1,3}|\p{L}{4}(?=\/))(?:\/(?:s²?|h|min))?(?![\p{L}/]))?)(?![\p{L}\d_]|[.:,]\d)/gu;
 
 /**
  * A sentence cut into numbers and the rest, so that numbers can stand in their own face and on one line with their unit, each

@@ -42,8 +42,10 @@ export function mount(root, store) {
     const value = store.signal('distance')?.value;
     const distance_m = !isAbsent(state.ink) && typeof value?.distance_m === 'number' ? value.distance_m : null;
     const isLive = state.ink === 'fresh' || state.ink === 'ageing';
-    writeAge(age, state);
-    if (isAbsent(state.ink)) setText(age, NOTHING); // why there is none stands below, larger
+    if (isAbsent(state.ink)) {
+      setAttribute(age, 'data-ink', state.ink);
+      setText(age, NOTHING); // why there is none stands below, larger
+    } else writeAge(age, state);
     show(parts.distance, distance_m !== null);
     show(none, distance_m === null);
     setText(none, isAbsent(state.ink) ? ABSENT[state.ink] : value?.none_in_range ? 'none in range' : 'distance unknown');

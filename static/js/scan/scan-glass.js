@@ -121,6 +121,7 @@ export class ScanGlass {
     this.canvas.replaceWith(canvas);
     this.#watcher.disconnect();
     this.#watcher.observe(canvas);
+    this.#watcher.observe(this.caption);
     this.canvas = canvas;
     this.#isDue = this.#newest !== null;
     requestAnimationFrame(() => this.#drawHere());

@@ -252,13 +252,13 @@ export function pinched(reach_m, apart_px, now_px) {
 /** @typedef {{left: number, top: number, width: number, height: number}} Box */
 
 /**
- * The box moved by at most its height up or down, to where it covers none of these; null where it does everywhere.
+ * The box moved by at most its height up or down, to where it covers none of these and is below the top; null where there is no such place.
  * @param {Box[]} taken
  * @param {Box} box
  * @returns {Box | null}
  */
 export function clearOf(taken, box) {
-  const covers = (/** @type {number} */ top) => taken.some((one) =>
+  const covers = (/** @type {number} */ top) => top < 0 || taken.some((one) =>
     box.left < one.left + one.width && one.left < box.left + box.width && top < one.top + one.height && one.top < top + box.height);
   const by = [0, -0.5, 0.5, -1, 1].find((share) => !covers(box.top + share * box.height));
   return by === undefined ? null : { ...box, top: box.top + by * box.height };

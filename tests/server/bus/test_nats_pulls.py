@@ -14,7 +14,7 @@ from nats.aio.msg import Msg
 from server.bus import nats_wire as wire
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus
-from server.bus.nats_pulls import EVERY_S, MOST, MOST_UNDER_WAY, Pulls
+from server.bus.nats_pulls import EVERY_S, MOST, MOST_UNDER_WAY, Pulls, _Newest
 from server.bus.nats_questions import GONE_AFTER_S, Questions
 from tests.server.bus.buses import Clock, local_buses, until
 
@@ -43,6 +43,7 @@ async def test_an_agent_that_answers_at_once_does_not_keep_the_node_busy() -> No
     await pulls.stop()
 
 
+@pytest.mark.virtual_time
 @pytest.mark.parametrize(("kind", "least", "greatest"), [("state", 2, MOST_UNDER_WAY), ("scan", 1, 1)])
 async def test_over_a_slow_radio_a_few_states_are_requested_at_once_and_no_older_one_replaces_a_newer_one(
     kind: str, least: int, greatest: int
@@ -72,6 +73,62 @@ async def test_over_a_slow_radio_a_few_states_are_requested_at_once_and_no_older
     assert min(b - a for a, b in pairwise(sent_s)) >= EVERY_S - 0.01
     assert [int(one) for one in kept] == sorted({int(one) for one in kept})
     assert asyncio.all_tasks() == {asyncio.current_task()}, "none is left behind"
+
+
+@pytest.mark.virtual_time
+async def test_once_a_radio_is_fast_again_one_state_is_requested_at_a_time() -> None:
+    now = asyncio.get_running_loop().time
+    began_s = now()
+    under_way = 0
+    most = {True: 0, False: 0}  # while it is slow, and a second later
+
+    async def request(subject: str, body: bytes, timeout: float) -> Any:
+        nonlocal under_way
+        under_way += 1
+        is_slow = now() < began_s + 3
+        if is_slow or now() > began_s + 5:
+            most[is_slow] = max(most[is_slow], under_way)
+        await asyncio.sleep(0.5 if is_slow else 0.02)
+        under_way -= 1
+        return SimpleNamespace(data=wire.encode_frame(wire.FrameHead(run="a", number=round(1000 * now()), now_s=1.0)))
+
+    questions = Questions(now=now)
+    questions.client = cast(Client, SimpleNamespace(request=request))
+    pulls = Pulls(questions, lambda *_: None, lambda *_: None, now=now)
+    pulls.look("ocelot", "state", True)
+    await asyncio.sleep(8)
+    await pulls.stop()
+    assert most[True] > 1
+    assert most[False] == 1
+
+
+async def test_a_late_answer_of_a_run_that_has_ended_is_left_out() -> None:
+    kept: list[tuple[str, float]] = []
+    answers: list[asyncio.Future[Any]] = []
+
+    async def request(subject: str, body: bytes, timeout: float) -> Any:
+        answers.append(asyncio.get_running_loop().create_future())
+        return await answers[-1]
+
+    def frame(run: str, number: int) -> Any:
+        return SimpleNamespace(data=wire.encode_frame(wire.FrameHead(run=run, number=number, now_s=1.0), run))
+
+    clock = Clock()
+    questions = Questions(now=clock)
+    questions.client = cast(Client, SimpleNamespace(request=request))
+    pulls = Pulls(questions, lambda *frame: kept.append((str(frame[2]), frame[3])), lambda *_: None, now=clock)
+    newest = _Newest()
+    earlier = asyncio.create_task(pulls._request("ocelot", "state", newest))
+    await until(lambda: len(answers) == 1)
+    clock.ahead_s += 0.1
+    later = asyncio.create_task(pulls._request("ocelot", "state", newest))
+    await until(lambda: len(answers) == 2)
+    answers[1].set_result(frame("new", 1))
+    await later
+    answers[0].set_result(frame("old", 70))
+    await earlier
+    assert [run for run, _ in kept] == ["new"]
+    assert newest.run == "new"
 
 
 async def test_an_agent_that_waits_for_its_next_frame_has_one_pull_of_it() -> None:
@@ -156,7 +213,7 @@ async def test_behind_a_gap_only_the_newest_connection_of_an_agent_counts() -> N
     await until(lambda: len(requests) == 2)
     assert bus.link_trouble("ocelot") is None
     await come(4)
-    await until(lambda: len(requests) == 3), "it was lost for a moment, and requests with it"
+    await until(lambda: len(requests) == 3)  # it was lost for a moment, and requests with it
     await come(4)
     assert len(requests) == 3
     clock.ahead_s += GONE_AFTER_S + 0.1

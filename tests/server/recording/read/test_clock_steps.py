@@ -230,6 +230,16 @@ def test_a_file_that_was_written_in_no_order_has_no_step(
         assert [at_s for at_s, *_ in recording.rows()] == pytest.approx([BEGIN_S + row[0] for row in true])
 
 
+def test_a_clock_that_is_set_three_times_as_a_slow_recording_begins_is_no_lack_of_order(tmp_path: Path) -> None:
+    """From 1970 to the date of a clock with a battery, to that of the network, and back by 4 s."""
+    slow = [row for row in rows(2) if row[1] == "/twist"][::10]
+    ahead_s = [-BEGIN_S] * 5 + [-40 * DAY_S] * 8 + [4.0] * 8 + [0.0] * len(slow)
+    mixed = [(row[0] + by_s, *row[1:]) for row, by_s in zip(slow, ahead_s, strict=False)]
+    with open_recording([write_ros2(tmp_path / "drive", Drive(messages=mixed))]) as recording:
+        assert recording.clock_steps
+        assert recording.duration_s < 2 * LENGTH_S
+
+
 def test_a_seek_begins_at_a_corrected_time(tmp_path: Path) -> None:
     for container in CONTAINERS:
         path = write(tmp_path / container, container, steps=[(20.0, -50.0), (40.0, 230 * DAY_S)])

@@ -11,7 +11,7 @@ from server.recording.read.definitions import definitions_of
 from server.recording.read.source import Channel
 
 FIELDS = ["float32 speed", "string name", "uint8[2] two", "made_msgs/Wheel wheel"]
-NESTED = ["=" * 80, "MSG: made_msgs/Wheel", "int8 kFront=1", "int16 turns"]
+NESTED = ["=" * 80, "MSG: made_msgs/Wheel", "int16 turns"]
 RAW = struct.pack("<fI2s2Bh", 2.5, 2, b"ab", 7, 8, -3)
 
 
@@ -20,6 +20,11 @@ RAW = struct.pack("<fI2s2Bh", 2.5, 2, b"ab", 7, 8, -3)
     [
         "int8 kLeft=1",
         "int8 k = 3 # why",
+        "int8 k =3",
+        "uint8 kA =255",
+        "float32 kPi = 3.14",
+        "string n = a b",
+        "string NAME = a b",
         "int32 Mode_manual=-1",
         "string NONE=",
         "string Greeting=one = two # three",
