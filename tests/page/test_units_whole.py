@@ -138,7 +138,9 @@ async def test_what_is_read_beneath_the_scan_is_in_sight_on_a_low_phone(phone: P
     await page.get_by_role("tab", name="Scan").tap()
     await expect(page.locator(".scanc")).to_be_visible()
     for has_note in (False, True):
-        await page.evaluate("(has) => { document.querySelector('.scan-note').hidden = !has; }", has_note)
+        if has_note:
+            canned.state["signals"]["scan"]["note"] = "assumed to look ahead: no transforms, and no setting"
+        await expect(page.locator(".scan-note")).to_be_visible(visible=has_note)
         for width, height in ((360, 640), (360, 740), (412, 915)):
             await page.set_viewport_size({"width": width, "height": height})
             await page.evaluate(DRAWN)
