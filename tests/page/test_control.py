@@ -58,13 +58,13 @@ class Crew:
         return sheet
 
     async def press(self, name: str, key: str) -> None:
-        await tap(await self.sheet(name), key)
+        await tap(await self.sheet(name), key, exact=False)
 
 
-async def tap(part: Locator, key: str) -> None:
+async def tap(part: Locator, key: str, *, exact: bool = True) -> None:
     """Presses a key of a sheet or snackbar, once it takes a press."""
     await expect(part).not_to_have_attribute("data-moved", "")
-    await part.get_by_role("button", name=key, exact=True).tap()
+    await part.get_by_role("button", name=key, exact=exact).tap()
 
 
 class Sleep:
