@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Reader as Reader1
 
+from server.recording.export import to_ros1
 from server.recording.export.bag_file import CHUNK_BYTES, BagFile, BagTimeOutOfRange
 from server.recording.export.export_format import ExportRefused, Outcome
 from server.recording.export.formats.bag import write_bag
@@ -209,10 +210,13 @@ def test_what_ros_1_has_no_place_for_is_named(tmp_path: Path) -> None:
     assert "1 messages on /n are left out: its 5 bytes do not fit its type." in notes
 
 
-def test_long_fixed_arrays_are_refused_at_once(tmp_path: Path) -> None:
+def test_fixed_arrays_longer_than_the_bytes_or_the_bound_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(to_ros1, "MAX_FIELDS", 20)
     types = {
-        "/long": ("my_msgs/msg/Long", "float64[2000000000] data"),
-        "/many": ("my_msgs/msg/Many", "string[90000] data"),
+        "/long": ("my_msgs/msg/Long", "float64[40] data"),
+        "/many": ("my_msgs/msg/Many", "string[40] data"),
     }
     made = OurFile(tmp_path / "ours.mcap", profile="ros2")
     made.write(BEGIN_S * 10**9, "/n", INT, "int32 data", "cdr", b"\0\1\0\0\7\0\0\0")
