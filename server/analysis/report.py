@@ -16,9 +16,12 @@ from server.analysis.rehearse import Rehearsed
 from server.analysis.report_text import printable
 from server.judge.active_settings import SettingsOverride
 from server.judge.pipeline import TICK_S
+from server.judge.sources.source import plain_type
 from server.protocol.questions import Question
 from server.recording.read.read import Recording
 from server.recording.verification import Verification
+
+MOST_NAMED = 3  # topics in one sentence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,6 +120,13 @@ def why_nothing(run: Rehearsed, recording: Recording) -> str | None:
             "Name the topics of the signals in a file for --settings."
         )
     if not any(tally.received for tally in run.reception.by_signal.values()):
+        foreign = [
+            f"{one.topic} has another type, {plain_type(one.type)}, which is not read as {SIGNALS[name].label}"
+            for name, one in run.sources.items()
+            if one.decode is None and one.type
+        ]
+        if foreign:
+            return f"Nothing could be evaluated: {'; '.join(foreign[:MOST_NAMED])}."
         return "Nothing could be evaluated: the topics that catgraph knows have no message here."
     return "Nothing could be evaluated: no message on a topic that catgraph knows could be read."
 

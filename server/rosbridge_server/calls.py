@@ -9,10 +9,9 @@ import re
 from collections.abc import Callable, Collection
 from typing import Any
 
-from rosbags.typesys import get_types_from_msg
-
 from server.judge.message import Json
 from server.judge.ros_names import BadName
+from server.recording.read.definitions import types_of_msg
 from server.rosbridge_server import fields
 from server.rosbridge_server.completion import Completion
 from server.rosbridge_server.fields import Refused
@@ -164,7 +163,7 @@ class Calls:
         package, kind = service.type.partition("/")[0], service.type.rpartition("/")[2]
         long = f"{package}/msg/{kind}Request"
         root = f"{package}/{kind}Request" if version == 1 else f"{package}/{kind}_Request"
-        definitions = dict(get_types_from_msg(service.request, long)) if service.request else {long: ([], [])}
+        definitions = types_of_msg(service.request, long) if service.request else {long: ([], [])}
         return Completion(long, definitions, version, self._bridge.now(), root=root).message(given)
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from rosbags.typesys import get_types_from_msg
-
 from server.judge.message import Json, RosVersion
 from server.judge.ros_names import canonical_type
+from server.recording.read.definitions import types_of_msg
 from server.rosbridge_server.graph import SOURCE, Topic
 from server.rosbridge_server.interface import RosapiHost
 from server.rosbridge_server.shape import stamp
@@ -280,7 +279,7 @@ class _Rosapi:
                 f"Caused by module '{package}.srv' has no attribute '{kind}'"
             )
         long = f"{package}/msg/{kind}{side}"
-        definitions = dict(get_types_from_msg(text, long)) if text else {long: ([], [])}
+        definitions = types_of_msg(text, long) if text else {long: ([], [])}
         shown = f"{package}/{kind}{side}" if self._version == 1 else f"{package}/{kind}_{side}"
         found = describe(long, definitions, self._version)
         return {"typedefs": [{**found[0], "type": shown}, *found[1:]]}

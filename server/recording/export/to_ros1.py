@@ -11,6 +11,7 @@ hashed: constants first, as written; then fields, nested types by their own sum)
 from __future__ import annotations
 
 import hashlib
+import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -35,7 +36,8 @@ _DEEPEST = 32
 
 _PLACEHOLDER = "structure_needs_at_least_one_member"  # how ROS 2 writes a message without fields
 _WITHOUT_COUNTERPART = ("wstring", "float128")
-_LITTLE = b"\x00\x01"
+_LITTLE, _BIG = b"\x00\x01", b"\x00\x00"
+_HEAD_BYTES = 4  # of CDR
 _LENGTH_BYTES = 4  # of a string or a sequence; both may be empty
 
 
@@ -117,6 +119,7 @@ class Ros1Form:
     definition: str  # whole, with what it contains
     md5sum: str
     convert: Callable[[bytes], bytes | memoryview]  # raises Undecodable
+    body: Callable[[bytes], bytes]  # without the bytes behind the last field; raises Undecodable
     lost: tuple[str, ...] = ()  # fields that ROS 1's type of that name does not have, as "pkg/Type.field"
 
 
@@ -144,7 +147,7 @@ def _as_it_is(channel: Channel) -> Ros1Form:
         definition = str(noetic.generate_msgdef(channel.type)[0])
     elif _is_from_bridge(channel):
         definition = str(noetic.generate_msgdef(channel.type)[0])
-    return Ros1Form(type=type, definition=definition, md5sum=md5sum(type, definition), convert=_same)
+    return Ros1Form(type=type, definition=definition, md5sum=md5sum(type, definition), convert=_same, body=_same)
 
 
 def _is_from_bridge(channel: Channel) -> bool:
@@ -184,6 +187,7 @@ def _from_cdr(channel: Channel, source: FileSource) -> Ros1Form:
         definition=definition,
         md5sum=sum,
         convert=_converter(type, here, there, is_same=is_same, least=least),
+        body=_body_of(type, here, least),
         lost=tuple(_lost(type, here, there)),
     )
 
@@ -204,6 +208,22 @@ def _converter(
             raise Undecodable(f"its {len(raw)} bytes do not fit its type") from None
 
     return convert
+
+
+def _body_of(type: str, here: Typestore, least: int) -> Callable[[bytes], bytes]:
+    definition = here.get_msgdef(type)
+
+    def body(raw: bytes) -> bytes:
+        try:
+            if len(raw) < least or raw[:2] not in (_LITTLE, _BIG):
+                raise ValueError
+            read = definition.deserialize_cdr_le if raw[:2] == _LITTLE else definition.deserialize_cdr_be
+            _, end = read(memoryview(raw)[_HEAD_BYTES:], 0, definition.cls, here)
+        except (struct.error, ValueError, IndexError, AssertionError, OverflowError, MemoryError):
+            raise Undecodable(f"its {len(raw)} bytes do not fit its type") from None
+        return raw[: _HEAD_BYTES + end]
+
+    return body
 
 
 def _least_bytes(type: str, store: Typestore, known: dict[str, int], depth: int) -> int:

@@ -60,7 +60,7 @@ class McapFile:
         except BaseException:
             self._file.close()
             raise
-        self._pieces = index.pieces
+        self._pieces, self._behind_bytes = index.pieces, index.behind_bytes
         self.damage = self._new_damage()
         self._parts = sorted(index.parts, key=lambda part: (part.message_start_time, part.message_end_time))
         self.start_ns, self.end_ns = index.span_ns
@@ -158,7 +158,8 @@ class McapFile:
         self.end_ns = stretches[-1].last_ns + stretches[-1].shift_ns
 
     def _new_damage(self) -> Damage:
-        return Damage(is_cut=self.is_cut, pieces=self._pieces)
+        is_cut = self.is_cut and not self._behind_bytes
+        return Damage(is_cut=is_cut, pieces=self._pieces, behind_bytes=self._behind_bytes)
 
     def close(self) -> None:
         self._file.close()
@@ -181,6 +182,8 @@ def _summary(file: IO[bytes]) -> Index | None:
         profile = reader.get_header().profile
         summary = reader.get_summary()
         if summary is None or summary.statistics is None:
+            return None
+        if file.tell() + len(MAGIC) != file.seek(0, os.SEEK_END):  # it is that of another end: two files were joined
             return None
         statistics = summary.statistics
         if not _is_complete(summary, statistics):

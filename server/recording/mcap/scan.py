@@ -66,6 +66,7 @@ class Index:
     attachments: list[AttachmentIndex] = field(default_factory=list)
     is_ended: bool = False  # its writer ended the data
     pieces: int = 0  # records that cannot be read
+    behind_bytes: int = 0  # that follow the file's end, as where two files were joined
     why: Exception | None = None  # why the first of the chunks that cannot be read cannot
 
     @property
@@ -136,8 +137,7 @@ def scan(file: IO[bytes], *, with_messages: bool = True) -> Index:
         elif opcode == Opcode.DATA_END:
             index.is_ended = True
         elif opcode == Opcode.FOOTER:
-            file.seek(end + len(MAGIC))
-            index.pieces += file.read(len(MAGIC)) == MAGIC  # another file was joined to it
+            index.behind_bytes = max(0, size - end - len(MAGIC))
             break
         elif opcode in _DECLARING:
             _declared(index, opcode, file.read(length) if length <= MOST_TEXT else b"")

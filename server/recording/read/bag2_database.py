@@ -15,7 +15,7 @@ from server.judge.message import RosVersion
 from server.recording.read.bag2_metadata import is_latched
 from server.recording.read.clock_steps import BACK_NS, GAP_NS, Arrivals, Stretch
 from server.recording.read.errors import RecordingUnreadable
-from server.recording.read.source import Channel, Damage, DefinitionFormat
+from server.recording.read.source import Channel, Damage, DefinitionFormat, spelled
 from server.recording.read.temporary_copy import TemporaryCopy
 from server.recording.read.unpack import PACKED, unpacked
 
@@ -166,7 +166,11 @@ class Bag2Database:
     def _definitions(self) -> dict[str, tuple[str, str]]:
         """Encoding and text by type."""
         query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-        return {type: (encoding, text) for type, encoding, text in self._execute(query) if isinstance(text, str)}
+        return {
+            spelled(str(type), 2): (encoding, text)
+            for type, encoding, text in self._execute(query)
+            if isinstance(text, str)
+        }
 
     def _distro(self) -> str | None:
         with contextlib.suppress(sqlite3.OperationalError):  # before version 3 of the schema
@@ -208,11 +212,12 @@ def _channel(
     definitions: dict[str, tuple[str, str]],
     counted: dict[int, list[Any]],
 ) -> Channel:
-    form, text = definitions.get(type, ("", ""))
+    kind = spelled(str(type), 2)
+    form, text = definitions.get(kind, ("", ""))
     return Channel(
         number=number,
         topic=str(name),
-        type=str(type),
+        type=kind,
         definition=text,
         format=_FORMATS.get(form, "none") if text.strip() else "none",
         encoding=str(encoding),

@@ -29,6 +29,7 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 BACK_NS = S // 2  # less is the order in which threads of a recorder write
+SURE_BACK_NS = S  # and what is less than this may be it: the messages around show which
 GAP_NS = 2 * S  # the stamps of longer gaps are compared
 LEAP_NS = 86_400 * S  # a longer gap in one file is a clock that was set
 FIRST_NS, LAST_NS = 946_684_800 * S, 4_102_444_800 * S  # years 2000 and 2100: of other times a clock was never set
@@ -37,6 +38,9 @@ LEAST_A_STEP = 10  # messages on average: of fewer between two steps, the order 
 MOST_COMPARED = 50  # gaps whose stamps are compared
 MOST_INTERVALS = 10_000
 WINDOW = 512  # messages before and behind a step whose interval is evaluated
+AROUND = 128  # … whose order is
+SURE_RUN = 16  # so many messages in a row are not late by chance
+LATE_PART = 2  # messages that are late by so many-th of a step count
 UNKNOWN_NS = S // 100  # the interval where too few messages show one
 LEAST = 3  # messages from which the clock of a stretch is trusted
 PLACES_A_PART = 2**32
@@ -260,10 +264,32 @@ def _first_back(times_ns: Ints, highs_ns: Ints, steps_ns: Ints, channels: Ints, 
     edges = np.flatnonzero(np.diff(np.concatenate(([False], is_back, [False]))))
     for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         if sure[start:end].any():
-            return int(start)
+            is_sure = steps_ns[start:end].min() <= -SURE_BACK_NS or end - start >= SURE_RUN
+            if is_sure or _goes_on_from(start + 1, times_ns, channels, int(highs_ns[start])):
+                return int(start)
+            continue
         if len(np.unique(channels[start + 1 : end + 1])) < end - start:
             raise _NotInOrder
     return None
+
+
+def _goes_on_from(at: int, times_ns: Ints, channels: Ints, high_ns: int) -> bool:
+    """Whether the clock goes on from the time of this message, which is before the latest one until then: not where the
+    next message has the earlier clock again, nor where the messages of a channel are in no order around it."""
+    around = slice(max(at - AROUND, 0), at), slice(at, at + AROUND)
+    late_ns = (high_ns - int(times_ns[at])) // LATE_PART
+    if sum(_late_ones(times_ns[side], channels[side], late_ns) for side in around) >= LEAST:
+        return False
+    usual_ns = int(np.median(np.diff(np.sort(times_ns[around[0]])))) if at > 1 else 0
+    next_ns = int(times_ns[min(at + 1, len(times_ns) - 1)])
+    return next_ns < high_ns or next_ns - int(times_ns[at]) <= 2 * usual_ns
+
+
+def _late_ones(times_ns: Ints, channels: Ints, late_ns: int) -> int:
+    """How many messages are earlier than the one of their channel before them, by this or more."""
+    order = np.argsort(channels, kind="stable")
+    is_same = np.diff(channels[order]) == 0
+    return int(np.count_nonzero(is_same & (np.diff(times_ns[order]) <= -late_ns)))
 
 
 def _goes_back(times_ns: Ints, channels: Ints) -> Flags:

@@ -20,7 +20,16 @@ from server.recording.read.decode import Decode, Layout, RawMessage, beforehand,
 from server.recording.read.definitions import definition_of, definitions_of
 from server.recording.read.errors import RecordingUnreadable, Undecodable
 from server.recording.read.recognise import of_car, open_parts, open_with, recognise, what_is_wrong
-from server.recording.read.source import Channel, Damage, FileSource, Stream, in_time_order, why_not_decoded
+from server.recording.read.source import (
+    Channel,
+    Damage,
+    FileSource,
+    Stream,
+    in_time_order,
+    spelled,
+    types_of_topics,
+    why_not_decoded,
+)
 from server.recording.read.steady_time import ClockStep, make_steady, notes_on
 from server.rosbridge import codec
 
@@ -99,6 +108,7 @@ class Recording:
         self._readers: list[dict[int, _ChannelReader]] = []
         decoders: dict[tuple[str, str, str], tuple[Decode, Layout | None]] = {}
         self._untyped: set[str] = set()  # topics whose type is by their messages
+        self._types = types_of_topics(sources, self.ros_version)
         left_out: Counter[tuple[str, str]] = Counter()  # messages by topic and reason
         for source in sources:
             self._readers.append(self._readers_of(source, decoders, left_out))
@@ -218,12 +228,13 @@ class Recording:
                 continue
             if source.ros_version != self.ros_version:
                 continue  # it has no messages of the car
-            type = _spelled(channel.type, self.ros_version)
+            type = spelled(channel.type, self.ros_version)
             key = (channel.type, channel.definition, channel.encoding)
             try:
                 known = self.topics.get(channel.topic)
-                if known is not None and type not in ("", known.type) and channel.topic not in self._untyped:
-                    raise Undecodable(f"it has the type {type} and also {known.type}")
+                read = self._types.get(channel.topic, "")
+                if type and type != read:
+                    raise Undecodable(f"it has the type {type} and also {read}")
                 if key not in decoders:
                     decoders[key] = _decoder(channel, source)
                 decode, layout = decoders[key]
@@ -297,10 +308,6 @@ def _made_steady(sources: Sequence[FileSource]) -> list[ClockStep]:
         raise
     except Exception as error:
         raise RecordingUnreadable(what_is_wrong(sources[0].path, error)) from None
-
-
-def _spelled(type: str, version: RosVersion) -> str:
-    return type.replace("/msg/", "/") if version == 1 else type
 
 
 def _decoder(channel: Channel, source: FileSource) -> tuple[Decode, Layout | None]:

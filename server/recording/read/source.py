@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
 from server.judge.message import RosVersion
+from server.judge.topics import is_understood
 from server.recording.read.clock_steps import FIRST_NS, LAST_NS, Arrivals, Stretch
 from server.recording.read.unpack import PartTooLarge
 
@@ -50,6 +51,7 @@ class Damage:
     too_large: int = 0  # of the lost ones: larger, unpacked, than may be read
     is_cut: bool = False  # its end is missing too, of unknown length
     pieces: int = 0  # without checksums or times of their own, that could not be read either
+    behind_bytes: int = 0  # that follow the end of the file
 
     def leave_out(self, start_ns: int, end_ns: int, why: Exception) -> None:
         """One part cannot be read."""
@@ -80,6 +82,10 @@ class Damage:
         if self.pieces:
             which = "1 piece of it is" if self.pieces == 1 else f"{self.pieces} pieces of it are"
             sentences.append(f"{name} is damaged: {which} left out")
+        if self.behind_bytes:
+            sentences.append(
+                f"{name} goes on behind its end, as where two files were joined: {self.behind_bytes} bytes are left out"
+            )
         if self.is_cut:
             sentences.append(
                 f"{name} was never closed: it is read to its last whole part, {(end_ns - origin_ns) / 1e9:.1f} s"
@@ -141,6 +147,23 @@ class FileSource(Protocol):
         ...
 
     def close(self) -> None: ...
+
+
+def types_of_topics(sources: Sequence[FileSource], version: RosVersion) -> dict[str, str]:
+    """The type of which each topic's messages are read: the first, or of several one that a signal is read of."""
+    found: dict[str, str] = {}
+    for channel in (one for source in sources if source.ros_version == version for one in source.channels):
+        type, known = spelled(channel.type, version), found.get(channel.topic, "")
+        if type and (not known or is_understood(channel.topic, type) > is_understood(channel.topic, known)):
+            found[channel.topic] = type
+    return found
+
+
+def spelled(type: str, version: RosVersion) -> str:
+    """A type as its version of ROS spells it, which the file may not do."""
+    if version == 1:
+        return type.replace("/msg/", "/")
+    return type.replace("/", "/msg/") if type.count("/") == 1 else type
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -34,7 +34,7 @@ RECORDINGS = {
     ),
     "a known topic of a type that cannot be read": (
         rows("/catvehicle/vel", STRING, {"data": "x"}),
-        "no message on a topic that catgraph knows could be read|is not one that|no message here",
+        "/catvehicle/vel has another type, std_msgs/String, which is not read as Speed",
     ),
 }
 

@@ -144,3 +144,21 @@ async def test_what_cannot_be_answered_fails_with_the_reason(
     response = await car[1].hear()
     assert (response["op"], response["result"], response["id"]) == ("service_response", False, "q")
     assert why in response["values"]
+
+
+@pytest.mark.parametrize("constant", ["int8 kLeft=1", "int8 kLeft = 1", "string NONE="])
+async def test_a_service_whose_type_has_constants_of_ros_1(car: tuple[RosBridge, Probe], constant: str) -> None:
+    both = f"{constant}\nint32 side\n"
+    car[0].add_service("/turn", "demo/Turn", lambda args: {"got": dict(args)}, request=both, response=both)
+    for side in ("request", "response"):
+        [found] = (await values(car, f"/rosapi/service_{side}_details", type="demo/Turn"))["typedefs"]
+        assert (found["fieldnames"], found["fieldtypes"]) == (["side"], ["int32"])
+    assert await values(car, "/turn", side=3) == {"got": {"side": 3}}
+
+
+async def test_a_service_without_fields_but_constants(car: tuple[RosBridge, Probe]) -> None:
+    only = "int8 kLeft=1\n"
+    car[0].add_service("/turn", "demo/Turn", lambda args: {"got": dict(args)}, request=only, response=only)
+    [found] = (await values(car, "/rosapi/service_request_details", type="demo/Turn"))["typedefs"]
+    assert found["fieldnames"] == []
+    assert await values(car, "/turn") == {"got": {}}

@@ -62,6 +62,7 @@ def _copy(messages: Iterable[Raw], bag: BagFile, forms: dict[tuple[int, int], Ro
     numbers: dict[tuple[str, str, str, bool], int] = {}
     ways: dict[tuple[int, int], int] = {}
     unfit: Counter[str] = Counter()
+    longer: Counter[str] = Counter()
     why: dict[str, str] = {}
 
     def number_of(raw: Raw, form: Ros1Form) -> int:
@@ -80,7 +81,7 @@ def _copy(messages: Iterable[Raw], bag: BagFile, forms: dict[tuple[int, int], Ro
         if form is None:
             continue
         try:
-            data = form.convert(raw.data)
+            data = _converted(raw, form, longer)
             connection = ways.get(place)
             if connection is None:
                 connection = ways[place] = number_of(raw, form)
@@ -93,6 +94,20 @@ def _copy(messages: Iterable[Raw], bag: BagFile, forms: dict[tuple[int, int], Ro
     outcome.notes += [
         f"{count} messages on {topic} are left out: {why[topic]}." for topic, count in sorted(unfit.items())
     ]
+    outcome.notes += [
+        f"{count} messages on {topic} have bytes behind their last field: these are left out."
+        for topic, count in sorted(longer.items())
+    ]
+
+
+def _converted(raw: Raw, form: Ros1Form, longer: Counter[str]) -> bytes | memoryview:
+    """The message in ROS 1. Raises Undecodable. `longer`: counts by topic those of which the end is left out."""
+    try:
+        return form.convert(raw.data)
+    except Undecodable:
+        data = form.convert(form.body(raw.data))
+    longer[raw.channel.topic] += 1
+    return data
 
 
 def _forms(recording: Recording, outcome: Outcome, *, with_own: bool) -> dict[tuple[int, int], Ros1Form]:
@@ -125,7 +140,9 @@ def _form(channel: Channel, file: FileSource, outcome: Outcome) -> Ros1Form:
 
 
 def _as_text() -> Ros1Form:
-    return Ros1Form(type=_STRING_TYPE, definition=_STRING, md5sum=md5sum(_STRING_TYPE, _STRING), convert=_text)
+    return Ros1Form(
+        type=_STRING_TYPE, definition=_STRING, md5sum=md5sum(_STRING_TYPE, _STRING), convert=_text, body=_text
+    )
 
 
 def _text(raw: bytes) -> bytes:

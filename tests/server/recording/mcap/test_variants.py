@@ -174,6 +174,25 @@ def test_a_file_with_messages_in_chunks_and_outside_of_them(tmp_path: Path, orde
     assert (rows, damage) == (sorted(expected), [])
 
 
+@pytest.mark.parametrize("is_indexed", [True, False])
+@pytest.mark.parametrize("other_times", [(1, 2, 3), (70, 80), ()])
+def test_what_follows_the_end_is_named(tmp_path: Path, is_indexed: bool, other_times: tuple[int, ...]) -> None:
+    """Two files that were joined, equal or not, and bytes that are no file."""
+    variant = replace(PLAIN, messages=((0, 1), (0, 2), (0, 3)))
+    if is_indexed:
+        variant = replace(variant, indexes=frozenset(INDEXES), statistics=True, channels=True, schemas=True)
+    write(tmp_path / "a.mcap", variant)
+    rest = b"no file"
+    if other_times:
+        write(tmp_path / "b.mcap", replace(variant, messages=tuple((0, time_ns) for time_ns in other_times)))
+        rest = (tmp_path / "b.mcap").read_bytes()
+    expected = by_library(tmp_path / "a.mcap")
+    (tmp_path / "a.mcap").write_bytes((tmp_path / "a.mcap").read_bytes() + rest)
+    rows, _, damage, _ = by_us(tmp_path / "a.mcap")
+    assert rows == expected
+    assert damage == [f"a.mcap goes on behind its end, as where two files were joined: {len(rest)} bytes are left out"]
+
+
 def scanned(*_: object, **__: object) -> object:
     raise AssertionError("all records were read")
 

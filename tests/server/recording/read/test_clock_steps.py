@@ -230,6 +230,42 @@ def test_a_file_that_was_written_in_no_order_has_no_step(
         assert [at_s for at_s, *_ in recording.rows()] == pytest.approx([BEGIN_S + row[0] for row in true])
 
 
+@pytest.mark.parametrize("topics", [("/imu",), ("/twist", "/fix"), ("/twist", "/fix", "/imu")])
+@pytest.mark.parametrize("within_s", [0.55, 0.65, 0.8])
+@pytest.mark.parametrize("seed", range(3))
+def test_messages_that_were_written_up_to_a_second_late_are_no_step(
+    tmp_path: Path, topics: tuple[str, ...], within_s: float, seed: int
+) -> None:
+    chance = random.Random(seed)
+    true = [row for row in rows(2) if row[1] in topics]
+    mixed = sorted(true, key=lambda row: row[0] + chance.uniform(0.0, within_s))
+    with open_recording([write_ros2(tmp_path / "drive", Drive(messages=mixed))]) as recording:
+        assert not recording.clock_steps
+        assert [at_s for at_s, *_ in recording.rows()] == pytest.approx([BEGIN_S + row[0] for row in true])
+
+
+@pytest.mark.parametrize("late_s", [0.55, 0.9])
+def test_one_message_that_was_written_late_is_no_step(tmp_path: Path, late_s: float) -> None:
+    true = [row for row in rows(2) if row[1] == "/imu"]
+    mixed = sorted(true, key=lambda row: row[0] + (late_s if row is true[500] else 0.0))
+    with open_recording([write_ros2(tmp_path / "drive", Drive(messages=mixed))]) as recording:
+        assert not recording.clock_steps
+
+
+@pytest.mark.parametrize("by_s", [-1.0, -2.0, -30.0])
+@pytest.mark.parametrize("topic", ["/imu", "/twist", "/fix"])
+@pytest.mark.parametrize("within_s", [0.0, 0.7])
+def test_a_step_of_a_second_is_found_among_late_messages_too(
+    tmp_path: Path, by_s: float, topic: str, within_s: float
+) -> None:
+    chance = random.Random(3)
+    true = [row for row in rows(2) if row[1] == topic]
+    mixed = sorted(true, key=lambda row: row[0] + chance.uniform(0.0, within_s))
+    stepped = [(row[0] + (by_s if number > len(mixed) // 2 else 0.0), *row[1:]) for number, row in enumerate(mixed)]
+    with open_recording([write_ros2(tmp_path / "drive", Drive(messages=stepped))]) as recording:
+        assert [one.by_s for one in recording.clock_steps] == [pytest.approx(by_s, abs=1.0)]
+
+
 def test_a_clock_that_is_set_three_times_as_a_slow_recording_begins_is_no_lack_of_order(tmp_path: Path) -> None:
     """From 1970 to the date of a clock with a battery, to that of the network, and back by 4 s."""
     slow = [row for row in rows(2) if row[1] == "/twist"][::10]

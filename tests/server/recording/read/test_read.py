@@ -12,6 +12,7 @@ import orjson
 import pytest
 from mcap.writer import Writer as McapWriter
 from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Writer as BagWriter
 
 from server.recording.read.errors import Undecodable
 from server.recording.read.read import RecordingUnreadable, open_recording
@@ -19,6 +20,7 @@ from tests.server.recording.bags import BEGIN_S, Drive, Row, build, typestore, w
 from tests.server.recording.export.ours import OurFile, event
 
 INT, TEXT, SCAN = "std_msgs/msg/Int32", "std_msgs/msg/String", "sensor_msgs/msg/LaserScan"
+TWIST = "geometry_msgs/msg/Twist"
 ROWS: list[Row] = [
     (0.0, "/text", TEXT, {"data": "begin"}),
     *((0.1 * n, "/n", INT, {"data": n}) for n in range(1, 10)),
@@ -256,6 +258,65 @@ def test_a_topic_of_two_types_keeps_the_first(tmp_path: Path) -> None:
         assert recording.notes == [
             "/x (1 messages) is left out: it has the type std_msgs/String and also std_msgs/Int32"
         ]
+
+
+@pytest.mark.parametrize("types", [(TEXT, TWIST), (TWIST, TEXT)])
+@pytest.mark.parametrize("is_one_file", [True, False])
+def test_a_topic_of_two_types_is_read_as_the_one_that_a_signal_has(
+    tmp_path: Path, types: tuple[str, str], is_one_file: bool
+) -> None:
+    contents: dict[str, dict[str, Any]] = {TEXT: {"data": "a"}, TWIST: {"linear": {"x": 3.0}}}
+    drives = [Drive(messages=[(float(n), "/vel", type, contents[type])]) for n, type in enumerate(types)]
+    if is_one_file:
+        paths = [write_ros1_of_both(tmp_path / "both.bag", drives)]
+    else:
+        paths = [write_ros1(tmp_path / f"{n}.bag", drive) for n, drive in enumerate(drives)]
+    with open_recording(paths) as recording:
+        [message] = recording.messages()
+        assert message.type == "geometry_msgs/Twist"
+        assert message.message["linear"]["x"] == 3.0
+        assert recording.notes == [
+            "/vel (1 messages) is left out: it has the type std_msgs/String and also geometry_msgs/Twist"
+        ]
+
+
+def test_a_type_of_a_database_that_is_spelled_as_in_ros_1_is_read(tmp_path: Path) -> None:
+    import apsw
+
+    rows: list[Row] = [(0.0, "/vel", TWIST, {"linear": {"x": 3.0}})]
+    for number, table in enumerate(("topics SET type", "message_definitions SET topic_type")):
+        folder = write_ros2(tmp_path / str(number), Drive(messages=rows), storage="sqlite3")
+        [file] = folder.glob("*.db3")
+        database = apsw.Connection(str(file))
+        database.execute(f"UPDATE {table} = 'geometry_msgs/Twist'")
+        database.close()
+        [(_, _, type, message)] = read(file)
+        assert (type, message["linear"]["x"]) == (TWIST, 3.0)
+
+
+def test_files_that_spell_one_type_in_two_ways_are_read_as_one(tmp_path: Path) -> None:
+    for number, type in enumerate(("geometry_msgs/Twist", TWIST)):
+        with (tmp_path / f"{number}.mcap").open("wb") as file:
+            writer = McapWriter(file)
+            writer.start(profile="ros2")
+            schema = writer.register_schema(type, "jsonschema", b"{}")
+            channel = writer.register_channel("/vel", "json", schema)
+            time_ns = (BEGIN_S + number) * 10**9
+            writer.add_message(channel, time_ns, b'{"linear": {"x": 3.0}}', time_ns)
+            writer.finish()  # type: ignore[no-untyped-call]
+    found = read(tmp_path / "0.mcap", tmp_path / "1.mcap")
+    assert [(topic, type) for _, topic, type, _ in found] == [("/vel", TWIST)] * 2
+
+
+def write_ros1_of_both(path: Path, drives: list[Drive]) -> Path:
+    store = typestore(1, {})
+    with BagWriter(path) as writer:
+        for drive in drives:
+            for at_s, topic, type, message in drive.messages:
+                connection = writer.add_connection(topic, type, typestore=store)
+                raw = store.serialize_ros1(build(store, type, message), type)
+                writer.write(connection, round((BEGIN_S + at_s) * 1e9), raw)
+    return path
 
 
 def test_a_message_that_does_not_decode_is_counted_and_left_out(tmp_path: Path) -> None:

@@ -210,6 +210,24 @@ def test_what_ros_1_has_no_place_for_is_named(tmp_path: Path) -> None:
     assert "1 messages on /n are left out: its 5 bytes do not fit its type." in notes
 
 
+@pytest.mark.parametrize("behind", [b"\0" * 4, b"\xff" * 8])
+@pytest.mark.parametrize("type", ["std_msgs/msg/Int32", "my_msgs/msg/Number"])
+@pytest.mark.parametrize("order", ["little", "big"])
+def test_of_a_message_with_bytes_behind_its_last_field_the_fields_are_kept(
+    tmp_path: Path, behind: bytes, type: str, order: Literal["little", "big"]
+) -> None:
+    head = b"\0\1\0\0" if order == "little" else b"\0\0\0\0"
+    made = OurFile(tmp_path / "ours.mcap", profile="ros2")
+    for number, rest in enumerate([b"", behind, behind]):
+        data = head + number.to_bytes(4, order) + rest
+        made.write(BEGIN_S * 10**9 + number, "/n", type, "int32 data", "cdr", data)
+    outcome = export(made.close(), tmp_path / "out.bag")
+    assert outcome.entries == 3
+    assert "2 messages on /n have bytes behind their last field: these are left out." in outcome.notes
+    with open_recording([tmp_path / "out.bag"]) as after:
+        assert [message.message for message in after.messages()] == [{"data": 0}, {"data": 1}, {"data": 2}]
+
+
 def test_fixed_arrays_longer_than_the_bytes_or_the_bound_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
