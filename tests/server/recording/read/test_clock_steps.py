@@ -6,9 +6,10 @@ import random
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from server.recording.read.clock_steps import MOST_JUMPS, Jump, S, returned
+from server.recording.read.clock_steps import MOST_JUMPS, Arrivals, Jump, S, find_steps, returned
 from server.recording.read.read import Recording, open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1, write_ros2
 from tests.server.recording.stepped import CONTAINERS, LENGTH_S, Container, Step, rows, write
@@ -264,6 +265,17 @@ def test_a_step_of_a_second_is_found_among_late_messages_too(
     stepped = [(row[0] + (by_s if number > len(mixed) // 2 else 0.0), *row[1:]) for number, row in enumerate(mixed)]
     with open_recording([write_ros2(tmp_path / "drive", Drive(messages=stepped))]) as recording:
         assert [one.by_s for one in recording.clock_steps] == [pytest.approx(by_s, abs=1.0)]
+
+
+def test_a_step_of_a_second_is_found_where_messages_before_it_were_late() -> None:
+    late = (1000, 1030, 1060)
+    order = sorted(range(2000), key=lambda number: number + (30 if number in late else 0))
+    times_ns = np.array([BEGIN_S * S + number * S // 50 - (S if number > 1100 else 0) for number in order])
+    arrivals = Arrivals(places=np.arange(2000), times_ns=times_ns, channels=np.zeros(2000, np.int64))
+    found = find_steps(lambda: iter([arrivals]), lambda *_: None)
+    assert [one.place for one in found.stretches] == [0, 1101]
+    times_ns[1101:] += S
+    assert not find_steps(lambda: iter([arrivals]), lambda *_: None).stretches
 
 
 def test_a_clock_that_is_set_three_times_as_a_slow_recording_begins_is_no_lack_of_order(tmp_path: Path) -> None:
