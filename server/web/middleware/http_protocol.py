@@ -204,8 +204,17 @@ class PageRequests(H11Protocol):
                 self._await_head()
         else:
             self._head_came()
+            if self.cycle is not None and {b"content-length", b"transfer-encoding"} <= {
+                name for name, _ in self.headers
+            }:
+                self.cycle.keep_alive = False  # a proxy may have read another end of it (RFC 9112, 6.1)
 
     def send_400_response(self, msg: str) -> None:
+        if self.cycle is not None and not self.cycle.response_complete:
+            self.cycle.disconnected = (
+                True  # the rest of a request is invalid: this is its answer, and there is no other
+            )
+            self.cycle.message_event.set()
         try:
             answer = problem(400, msg)
             headers = {**answer.headers, "Connection": "close"} | FOR_ALL | FOR_DOCUMENTS
