@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 
 from monitor.alarm import Alarm
 from monitor.check import Verdict
 
 GRACE_S = 3.0  # for the alarms which explain that messages are missing: the messages need a moment to come again
+UNSEEN_S = 3.0  # beyond its on-delay an alarm that is not announced explains others for so long
 
 
 class CauseTable:
@@ -19,17 +21,27 @@ class CauseTable:
 
     An inhibitor holds while its condition does, whatever its own delays, and for its grace after. The grace is for
     missing messages; for a judged value it must be 0, because a returning danger must not be delayed.
+
+    While its alarm is not announced, an inhibitor holds for its on-delay and `UNSEEN_S` at most: a condition that comes
+    and goes faster than the on-delay would hide all that it explains, and nobody would be informed of anything.
     """
 
-    def __init__(self, inhibited_by: Mapping[str, tuple[str, ...]], grace_s: Mapping[str, float] | None = None) -> None:
+    def __init__(
+        self,
+        inhibited_by: Mapping[str, tuple[str, ...]],
+        grace_s: Mapping[str, float] | None = None,
+        on_delay_s: Mapping[str, float] | None = None,
+    ) -> None:
         """`inhibited_by` has the direct inhibitors of each alarm; raises ValueError for an unknown name or a circle."""
         self._grace_s = dict(grace_s or {})
+        self._on_delay_s = dict(on_delay_s or {})
         self._closure: dict[str, tuple[str, ...]] = {}
         self.order: list[str] = []  # every alarm after all that inhibit it
         for alarm_id in inhibited_by:
             self._visit(alarm_id, inhibited_by, ())
         self.inhibitors = frozenset(name for names in self._closure.values() for name in names)
         self._gone_at_s: dict[str, float | None] = {}  # when each inhibitor's condition went; None: it is there
+        self._unseen_s: dict[str, float | None] = {}  # since when each holds unannounced; None: it is announced
         self._held: frozenset[str] = frozenset()  # the inhibitors that hold at `_held_s`
         self._held_s: float | None = None  # None: they are to be found anew
 
@@ -37,6 +49,7 @@ class CauseTable:
         """Store whether this alarm's condition holds; called after each of its evaluations."""
         if alarm.id not in self.inhibitors:
             return
+        self._note_unseen(alarm, now_s)
         if alarm.condition:
             if self._gone_at_s.get(alarm.id, now_s) is not None:
                 self._gone_at_s[alarm.id] = self._held_s = None
@@ -45,6 +58,16 @@ class CauseTable:
             if gone_at_s is None or gone_at_s > now_s:  # it ends now, or the clock went back: the grace restarts
                 self._gone_at_s[alarm.id] = now_s
                 self._held_s = None
+
+    def _note_unseen(self, alarm: Alarm, now_s: float) -> None:
+        unseen_s = self._unseen_s.get(alarm.id)
+        if alarm.active or alarm.suppressed_by:  # what suppresses it is announced, or holds for a bounded time itself
+            self._unseen_s[alarm.id] = None
+            return
+        gone_at_s = self._gone_at_s.get(alarm.id, -math.inf)
+        is_over = gone_at_s is not None and not 0.0 <= now_s - gone_at_s < UNSEEN_S
+        if unseen_s is None or unseen_s > now_s or (alarm.condition and is_over):
+            self._unseen_s[alarm.id] = now_s
 
     def holding(self, alarm_id: str, now_s: float) -> tuple[str, ...]:
         """The alarms that suppress this one now."""
@@ -58,10 +81,13 @@ class CauseTable:
 
     def clear(self) -> None:
         self._gone_at_s.clear()
+        self._unseen_s.clear()
         self._held_s = None
 
     def _holds(self, name: str, now_s: float) -> bool:
-        gone_at_s = self._gone_at_s[name]
+        gone_at_s, unseen_s = self._gone_at_s[name], self._unseen_s[name]
+        if unseen_s is not None and now_s - unseen_s > self._on_delay_s.get(name, 0.0) + UNSEEN_S:
+            return False
         return gone_at_s is None or now_s - gone_at_s < self._grace_s.get(name, 0.0)
 
     def _visit(self, alarm_id: str, table: Mapping[str, tuple[str, ...]], path: tuple[str, ...]) -> None:
@@ -82,7 +108,9 @@ class CauseTable:
 def table_of(alarms: Iterable[Alarm]) -> CauseTable:
     known = tuple(alarms)
     return CauseTable(
-        {alarm.id: alarm.spec.inhibited_by for alarm in known}, {alarm.id: alarm.spec.grace_s for alarm in known}
+        {alarm.id: alarm.spec.inhibited_by for alarm in known},
+        {alarm.id: alarm.spec.grace_s for alarm in known},
+        {alarm.id: alarm.spec.on_delay_s for alarm in known},
     )
 
 

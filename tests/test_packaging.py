@@ -70,6 +70,13 @@ def test_the_vendored_files_come_with_their_licences() -> None:
     assert all(any(f"{name}/LICENSE" == source for source in PACKAGE["vendor"]) for name in packages)
 
 
+def test_nothing_installs_catgraph_from_a_registry_which_does_not_have_it() -> None:
+    """Who follows such a line is stuck, or gets what somebody else put there under this name."""
+    read = (path for path in project_files() if path.suffix in (".md", ".py", ".service", ".yaml", ".js", ".html"))
+    line = re.compile(r"pip install (-[^'\"\n]*)?['\"]?catgraph\b")
+    assert [path for path in read if line.search(path.read_text("utf-8"))] == []
+
+
 def test_the_container_runs_commands_that_exist(capsys: pytest.CaptureFixture[str]) -> None:
     dockerfile = (PROJECT / "Dockerfile").read_text(encoding="utf-8")
     commands = [json.loads(text) for text in re.findall(r"CMD (\[.*\])", dockerfile)]

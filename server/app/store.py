@@ -61,7 +61,7 @@ def read_options(args: argparse.Namespace, environment: Mapping[str, str]) -> St
             raise ValueError("--depot-interface has no effect without --store.")
         return None
     if find_spec("obstore") is None:
-        raise ValueError("The client of the store is not installed: pip install 'catgraph[store]'.")
+        raise ValueError("The client of the store is not installed: pip install '.[store]' in catgraph's folder.")
     if interface is not None and not re.fullmatch(r"[A-Za-z0-9_.-]{1,15}", interface):
         raise ValueError(f"“{interface[:40]}” is no name of a network interface.")
     if args.store_ca is not None and not args.store_ca.is_file():

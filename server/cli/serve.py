@@ -101,7 +101,7 @@ def add_broker_arguments(parser: argparse.ArgumentParser) -> None:
 def read_broker(args: argparse.Namespace) -> Broker:
     """What the options of `add_broker_arguments` state. Raises ValueError with one sentence."""
     if find_spec("nats") is None or find_spec("nkeys") is None:
-        raise ValueError("The client of the broker is not installed: pip install 'catgraph[fleet]'.")
+        raise ValueError("The client of the broker is not installed: pip install '.[fleet]' in catgraph's folder.")
     try:
         address = urlsplit(args.broker)
         is_one = address.scheme in ("nats", "tls") and address.hostname and (address.port or True)

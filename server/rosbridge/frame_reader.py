@@ -1,8 +1,9 @@
 """Turns the frames of one connection into what they hold: a message, an answer, a status, or why they hold nothing.
 
-ROS 2's rosbridge, and ROS 1's with a max_message_size, fragments longer messages unasked: text, in order, the id 0 for
-every message of a topic, a fractional `total`. A fragment is not parsed: its head and tail identify it, and its JSON
-escapes are those of the whole. They are put together within bounds.
+ROS 2's rosbridge, and ROS 1's with a max_message_size, fragments longer messages unasked: text, the fragments of one
+message in order, those of several messages in turn, the id 0 for every message of a topic, a fractional `total`. A
+fragment is not parsed: its head and tail identify it, and its JSON escapes are those of the whole. They are put
+together within bounds.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ _TAIL = re.compile(
     rb"[ \t\r\n]*+(\d{1,9}(?:\.\d{0,30})?)[ \t\r\n]*+\}[ \t\r\n]*+\Z"
 )
 _TAIL_BYTES = 200
+MOST_UNDER_WAY = 4  # messages: each of them may take the memory of the largest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,58 +42,70 @@ class TooLarge:
 
 
 @dataclass(slots=True)
+class _Assembly:
+    """One message whose fragments come."""
+
+    next: int = 0  # the number of the fragment that continues it
+    size: int = 0  # bytes of its fragments so far, as they are escaped
+    pieces: list[bytes] = field(default_factory=list)
+    is_skipped: bool = False  # it is too large
+    is_doubtful: bool = False  # the same one began before it and did not end: its fragments may be of either
+
+
+@dataclass(slots=True)
 class Fragments:
     """Assembles fragmented messages of a bridge, within bounds.
 
-    Of one connection: one message at a time.
+    Of one connection. A bridge sends from several threads: the fragments of several messages come in turn, all with the
+    id 0. Their `total` tells them apart, because it holds the length of the whole.
     """
 
     most_bytes: int
-    _id: bytes = b""
-    _next: int = 0  # 0: none is under way
-    _is_skipped: bool = False
-    _pieces: list[bytes] = field(default_factory=list)
-    _size: int = 0
+    _under_way: dict[tuple[bytes, bytes], _Assembly] = field(default_factory=dict)  # by id and total, the oldest first
 
     def add(self, payload: bytes) -> bytes | TooLarge | None:
         """The whole message with its last piece, once a TooLarge of one beyond the bound, else None. Raises
         Unreadable."""
         head, tail = _HEAD.match(payload), _TAIL.search(payload, max(0, len(payload) - _TAIL_BYTES))
         if head is None or tail is None or tail.start() < head.end():
-            self._forget()
             raise Unreadable("a fragment without a valid header")
-        data, id, number, total = payload[head.end() : tail.start()], head[1], int(tail[1]), float(tail[2])
-        size = 0  # of the whole
+        data, key, number, total = payload[head.end() : tail.start()], (head[1], tail[2]), int(tail[1]), float(tail[2])
+        before = self._under_way.get(key)
         if number == 0:
-            self._forget()
-            self._id = id
-            size = round((total - 1.0) * len(data)) + 1 if total > int(total) else round(total * len(data))
-            if size > self.most_bytes:
-                self._is_skipped = True
-        elif not self._next or number != self._next or id != self._id:
-            self._forget()
+            self._under_way.pop(key, None)
+            one = self._under_way[key] = _Assembly(is_doubtful=before is not None)
+        elif before is None or number != before.next:
+            self._under_way.pop(key, None)
             raise Unreadable("a fragment that does not fit the one before")
-        self._next = number + 1
-        self._size += len(data)
-        found: bytes | TooLarge | None = None
-        if number == 0 and self._is_skipped:
-            found = TooLarge(topic=_topic(data), size=size)
-        elif not self._is_skipped:
-            if self._size > self.most_bytes:  # it was announced as shorter
-                found = TooLarge(topic=_topic(self._pieces[0] if self._pieces else data), size=self._size)
-                self._is_skipped = True
-                self._pieces.clear()
-            else:
-                self._pieces.append(data)
-        if self._next >= int(total):
-            whole, is_skipped = b"".join(self._pieces), self._is_skipped
-            self._forget()
-            return found if is_skipped else _unescaped(whole)
+        else:
+            one = before
+        found = self._added(one, data, total)
+        if one.next >= int(total):
+            del self._under_way[key]
+            if one.is_doubtful:
+                raise Unreadable("fragments of two messages that cannot be told apart")
+            return found if one.is_skipped else _unescaped(b"".join(one.pieces))
+        if len(self._under_way) > MOST_UNDER_WAY:
+            del self._under_way[next(iter(self._under_way))]
+            raise Unreadable("fragments of a message that did not end")
         return found
 
-    def _forget(self) -> None:
-        self._id, self._next, self._is_skipped, self._size = b"", 0, False, 0
-        self._pieces.clear()
+    def _added(self, one: _Assembly, data: bytes, total: float) -> TooLarge | None:
+        """Takes a fragment; a TooLarge once, where the message is beyond the bound."""
+        size = one.size + len(data)
+        if one.next == 0:  # of the whole: an uneven total has its length
+            size = round((total - 1.0) * len(data)) + 1 if total > int(total) else round(total * len(data))
+        one.next += 1
+        one.size += len(data)
+        if one.is_skipped:
+            return None
+        if size > self.most_bytes:
+            one.is_skipped = True
+            topic = _topic(one.pieces[0] if one.pieces else data)
+            one.pieces.clear()
+            return TooLarge(topic=topic, size=size)
+        one.pieces.append(data)
+        return None
 
 
 def is_fragment(payload: bytes, is_binary: bool) -> bool:

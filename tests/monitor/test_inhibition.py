@@ -7,12 +7,13 @@ from dataclasses import replace
 import pytest
 
 from monitor.alarm import Alarm
-from monitor.inhibition import GRACE_S, CauseTable
+from monitor.inhibition import GRACE_S, UNSEEN_S, CauseTable
 from tests.monitor.test_alarm import SPEC
 
 TABLE = {"slow": ("stale",), "stale": ("silent",), "silent": ("lost",), "lost": (), "speed": ()}
-LOST = Alarm(id="lost", spec=SPEC, condition=True)
-GONE = replace(LOST, condition=False)
+LOST = Alarm(id="lost", spec=SPEC, condition=True, active=True)
+GONE = replace(LOST, condition=False, active=False)
+WAITS = replace(LOST, active=False)  # for its on-delay
 GRACES = {"lost": GRACE_S}
 
 
@@ -40,7 +41,7 @@ def test_the_consequences_get_a_grace_to_go_too(after_s: float, holds: bool) -> 
 
 def test_it_holds_by_its_condition_whatever_its_own_delays() -> None:
     table = CauseTable(TABLE)
-    table.note(LOST, 10.0)  # not active yet: waits out its on-delay
+    table.note(WAITS, 10.0)
     assert table.holding("stale", 10.0) == ("lost",)
     table.note(replace(GONE, active=True), 11.0)  # still active: waits out its off-delay
     assert table.holding("stale", 11.0) == ()
@@ -77,6 +78,32 @@ def test_a_clock_that_goes_back_does_not_make_the_grace_last_for_ever() -> None:
     assert table.holding("stale", 5.0) == ("lost",)
     table.note(GONE, 5.0 + GRACE_S)
     assert table.holding("stale", 5.0 + GRACE_S) == ()
+
+
+def test_a_condition_that_comes_and_goes_unannounced_explains_for_a_bounded_time() -> None:
+    table = CauseTable(TABLE, GRACES, {"lost": 1.0})
+
+    def holds(at_s: float) -> bool:
+        table.note(WAITS if round(10 * at_s) % 10 < 8 else GONE, at_s)  # 0.8 s of each second
+        return bool(table.holding("stale", at_s))
+
+    held = [holds(tenth / 10) for tenth in range(600)]
+    assert held == [tenth / 10 <= 1.0 + UNSEEN_S for tenth in range(600)]
+    table.note(LOST, 60.0)  # it is announced: what it explains is hidden for as long as it stands
+    assert table.holding("stale", 99.0) == ("lost",)
+    table.note(GONE, 100.0)
+    table.note(GONE, 100.0 + UNSEEN_S)
+    table.note(WAITS, 100.0 + UNSEEN_S)
+    assert table.holding("stale", 100.0 + UNSEEN_S) == ("lost",), "it was over: it begins anew"
+
+
+def test_what_is_explained_itself_explains_for_as_long() -> None:
+    table = CauseTable(TABLE, GRACES)
+    table.note(replace(WAITS, suppressed_by=("link",)), 10.0)
+    assert table.holding("stale", 99.0) == ("lost",)
+    table.note(WAITS, 99.0)
+    assert table.holding("stale", 99.0 + UNSEEN_S) == ("lost",)
+    assert table.holding("stale", 99.1 + UNSEEN_S) == ()
 
 
 def test_cleared_it_knows_nothing() -> None:

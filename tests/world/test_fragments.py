@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from typing import Any
 
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from server.judge.message import RosVersion
 from server.rosbridge.codec import Unreadable
-from server.rosbridge.frame_reader import Fragments, TooLarge, is_fragment
+from server.rosbridge.frame_reader import MOST_UNDER_WAY, Fragments, TooLarge, is_fragment
 from server.rosbridge_server import encoding as bridge
 from tests.world.transcripts import names, needs_transcripts, read
 
@@ -64,7 +65,7 @@ def test_one_that_will_be_too_large_is_named_with_its_first_piece_and_the_next_i
 def test_a_piece_out_of_its_place_is_refused_and_the_next_message_is_whole() -> None:
     fragments = Fragments(MOST)
     one, two, three = pieces('{"op":"publish"}', 6)
-    for wrong in ([two], [one, three], [one, two, two], [one, pieces("x" * 20, 6, "other")[1]]):
+    for wrong in ([two], [one, three], [one, two, two]):
         *before, last = wrong
         for piece in before:
             fragments.add(piece)
@@ -72,7 +73,43 @@ def test_a_piece_out_of_its_place_is_refused_and_the_next_message_is_whole() -> 
             fragments.add(last)
         assert [fragments.add(piece) for piece in (one, two, three)][-1] == b'{"op":"publish"}'
     fragments.add(one)
-    assert [fragments.add(piece) for piece in (one, two, three)][-1] == b'{"op":"publish"}', "it began anew"
+    with pytest.raises(Unreadable):
+        fragments.add(pieces("x" * 20, 6, "other")[1])
+    assert [fragments.add(piece) for piece in (two, three)][-1] == b'{"op":"publish"}', "the other has its own"
+
+
+def test_messages_whose_fragments_come_in_turn_are_each_whole() -> None:
+    """A bridge of ROS 1 sends each topic from a thread of its own, and all fragments have the id 0."""
+    texts = ["a" * 20, "b" * 23, "c" * 31]
+    fragments, whole = Fragments(MOST), []
+    for row in itertools.zip_longest(*(pieces(text, 6) for text in texts)):
+        whole += [found for piece in row if piece is not None and (found := fragments.add(piece)) is not None]
+    assert whole == [text.encode() for text in texts]
+
+
+def test_fragments_that_may_be_of_either_of_two_messages_are_refused() -> None:
+    """Two messages of one length: the first half of one and the second half of the other would be a message too."""
+    (first_a, rest_a), (first_b, rest_b) = pieces("a" * 12, 6), pieces("b" * 12, 6)
+    fragments = Fragments(MOST)
+    fragments.add(first_a)
+    fragments.add(first_b)
+    for piece in (rest_a, rest_b):
+        with pytest.raises(Unreadable):
+            fragments.add(piece)
+    assert [fragments.add(piece) for piece in (first_a, rest_a)][-1] == b"a" * 12
+
+
+def test_messages_that_do_not_end_take_bounded_memory() -> None:
+    fragments = Fragments(MOST)
+    begun = [pieces("x" * length, 6) for length in range(100, 100 + 2 * MOST_UNDER_WAY)]
+    for first, *_ in begun[:MOST_UNDER_WAY]:
+        fragments.add(first)
+    for first, *_ in begun[MOST_UNDER_WAY:]:
+        with pytest.raises(Unreadable):
+            fragments.add(first)
+    assert [fragments.add(piece) for piece in begun[-1][1:]][-1] == b"x" * 107, "those that came last are kept"
+    with pytest.raises(Unreadable):
+        fragments.add(begun[0][1])
 
 
 @pytest.mark.parametrize(
@@ -95,7 +132,7 @@ def test_more_than_was_announced_is_not_kept() -> None:
     fragments.add(piece % (b"", 0))
     found = [fragments.add(piece % (b"x" * 1_000, n)) for n in range(1, 10)]
     assert sum(isinstance(one, TooLarge) for one in found) == 1
-    assert sum(len(one) for one in fragments._pieces) <= MOST
+    assert sum(len(piece) for one in fragments._under_way.values() for piece in one.pieces) <= MOST
 
 
 @needs_transcripts

@@ -21,7 +21,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import h11
-from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.extensions.permessage_deflate import PerMessageDeflate, ServerPerMessageDeflateFactory
 from websockets.frames import CTRL_OPCODES, Frame, Opcode
@@ -204,8 +204,15 @@ class PageRequests(H11Protocol):
                 self._await_head()
         else:
             self._head_came()
+            request, names = self._request(), {name for name, _ in self.headers or ()}
+            if request is not None and {b"content-length", b"transfer-encoding"} <= names:
+                request.keep_alive = False  # a proxy may have read another end of it (RFC 9112, 6.1)
 
     def send_400_response(self, msg: str) -> None:
+        request = self._request()
+        if request is not None and not request.response_complete:
+            request.disconnected = True  # the rest of it is invalid: this is its answer, and there is no other
+            request.message_event.set()
         try:
             answer = problem(400, msg)
             headers = {**answer.headers, "Connection": "close"} | FOR_ALL | FOR_DOCUMENTS
@@ -216,6 +223,10 @@ class PageRequests(H11Protocol):
         except h11.LocalProtocolError:
             pass  # during a response no error can be sent
         self.transport.close()
+
+    def _request(self) -> RequestResponseCycle | None:
+        """The newest request of this connection; None: there was none."""
+        return self.cycle
 
     def _is_between_requests(self) -> bool:
         return self.conn.their_state is h11.IDLE

@@ -53,7 +53,7 @@ def test_what_cannot_be_is_refused(arguments: tuple[str, ...], sentence: str) ->
 
 def test_the_client_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store, "find_spec", lambda name: None)
-    with pytest.raises(ValueError, match=r"pip install 'catgraph\[store\]'"):
+    with pytest.raises(ValueError, match=r"pip install '\.\[store\]'"):
         store.read_options(parsed("--store", "s3://b-1"), LOGIN)
 
 

@@ -10,7 +10,7 @@ import contextlib
 import csv
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
@@ -169,13 +169,22 @@ def _own_row(table: OwnTable, entry: Mapping[str, Any]) -> list[Any]:
 def _settings(recording: Recording) -> dict[str, str]:
     """The settings at the beginning, and each change of them under its time."""
     texts: dict[str, str] = {}
+    newest = None
     for at_s, entry in recording.own("/catgraph/settings"):
         toml = entry.get("toml")
-        if isinstance(toml, str) and toml not in texts.values():
-            texts["settings.toml" if not texts else f"settings from {when(at_s)[:19].replace(':', '')}Z.toml"] = toml
+        if isinstance(toml, str) and toml != newest:  # each part repeats those in force
+            texts[_settings_name(at_s, texts)] = newest = toml
     if not texts and recording.metadata.get("settings"):
         texts["settings.toml"] = recording.metadata["settings"]
     return texts
+
+
+def _settings_name(at_s: float, taken: Collection[str]) -> str:
+    if not taken:
+        return "settings.toml"
+    time = when(at_s).replace(":", "")
+    name = f"settings from {time[:17]}Z.toml"
+    return name if name not in taken else f"settings from {time.removesuffix('Z')}Z.toml"
 
 
 def _without_table(drive: DecodedDrive) -> list[str]:
