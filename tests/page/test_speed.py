@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import re
+from collections import Counter
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 import pytest_asyncio
-from playwright.async_api import expect
+from playwright.async_api import Browser, expect
 
 from tests.page import drives
 from tests.page.canned import Canned
 from tests.page.conftest import Phone
 from tests.page.main_thread import heap_bytes, measure
 from tests.page.processes import replay, running, server
+from tests.page.test_load import LAID, TRACED, stack_of
 
 pytestmark = pytest.mark.own_phone  # its processor is slowed down
 SHARE = {"scan": 0.40, "home": 0.40, "desk": 0.60}  # of the main thread; desk: all panes in sight at 1440 × 900
@@ -71,6 +75,30 @@ async def test_nothing_is_animated_by_the_main_thread_while_all_is_well(phone: P
     await phone.drawn()
     assert await phone.page.evaluate("document.getAnimations().length") > 1
     assert await phone.page.evaluate(BUSY) == []
+
+
+@pytest.mark.gate
+async def test_no_script_forces_a_style_or_layout_of_the_panes(
+    browser: Browser, phone: Phone, canned: Canned, tmp_path: Path
+) -> None:
+    """Five times a second, while hardly anything moved."""
+    await phone.page.set_viewport_size({"width": 1440, "height": 900})
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    await expect(phone.page.locator(".trends-pane").first).to_be_visible()
+    await phone.page.wait_for_timeout(1500)
+    trace = tmp_path / "trace.json"
+    await browser.start_tracing(page=phone.page, path=trace, categories=TRACED)
+    await phone.drawn(15)
+    await browser.stop_tracing()
+    laid = [one for one in json.loads(trace.read_text(encoding="utf-8"))["traceEvents"] if one["name"] in LAID]
+    assert {one["name"] for one in laid} == LAID, "the trace has what is looked for"
+    forced = Counter(
+        (one["name"], frames[0]["functionName"], frames[0]["url"].rpartition("/")[2], frames[0]["lineNumber"])
+        for one in laid
+        if (frames := stack_of(one)) and canned.address in frames[0]["url"] and "/vendor/" not in frames[0]["url"]
+    )
+    assert forced.total() <= 2, forced  # a list that has other rows is measured
 
 
 #: From now on, how often a picture is requested.

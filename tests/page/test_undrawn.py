@@ -53,7 +53,7 @@ Document.prototype querySelectorAll|Document.prototype documentElement|Document.
 HTMLElement.prototype focus|DOMTokenList.prototype add|Date now never|window setTimeout never|window setInterval
 window setInterval never|window fetch|Promise.prototype catch|window matchMedia|window AudioContext
 WebSocket.prototype send|window IntersectionObserver|window MutationObserver
-EventTarget.prototype addEventListener
+EventTarget.prototype addEventListener|CharacterData.prototype data set
 """)
 REPORTED = ("toFixed", "setAttribute", "replaceChildren", "textContent", "requestAnimationFrame")  # needs none of them
 LOOK = """(() => {

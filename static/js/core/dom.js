@@ -73,13 +73,14 @@ export function setIcon(element, name) {
 }
 
 /**
- * Write text, if it is not there yet.
+ * Write text, if it is not there yet; into the text that is there, for a new node costs the browser a style and a box.
  * @param {Element} element
  * @param {string} text
  */
 export function setText(element, text) {
-  if (written.get(element) === text) return;
-  element.textContent = text;
+  const before = written.get(element);
+  if (before === text) return;
+  if (!text || !before || !fill(element.childNodes, [{ text }])) element.textContent = text;
   written.set(element, text); // last: what failed is written again
 }
 
@@ -90,9 +91,31 @@ export function setText(element, text) {
  */
 export function setSentence(element, sentence) {
   const shown = inUnits(sentence);
-  if (written.get(element) === shown) return;
-  element.replaceChildren(...textNodes(shown));
+  const before = written.get(element);
+  if (before === shown) return;
+  written.delete(element); // what failed halfway is written again, and as a whole
+  if (!before || !fill(element.childNodes, pieces(shown))) element.replaceChildren(...textNodes(shown));
   written.set(element, shown);
+}
+
+/**
+ * Write the parts of a sentence into the nodes of the one before; false where these are of other kinds, and some may be written then.
+ * @param {ArrayLike<any>} nodes
+ * @param {ReturnType<typeof pieces>} parts
+ */
+function fill(nodes, parts) {
+  return nodes.length === parts.length && parts.every(({ text, unit }, i) => {
+    const node = nodes[i];
+    if (!unit) return put(unit === undefined ? node : node.firstChild, text);
+    return put(node.firstChild?.firstChild, text) && put(node.lastChild, unit);
+  });
+}
+
+/** @param {any} node @param {string} text */
+function put(node, text) {
+  if (node?.nodeType !== 3) return false;
+  if (node.data !== text) node.data = text;
+  return true;
 }
 
 /**

@@ -44,9 +44,13 @@ export class Brush {
     for (const stop of this.stops) stop();
   }
 
+  /** It has another width: to look with each answer would make the browser do its layout at once. */
+  resize() {
+    this.#width = Math.max(1, this.host.clientWidth);
+  }
+
   /** The drive itself. @param {Answer} overview @param {string} signal */
   fill(overview, signal) {
-    this.#width = Math.max(1, this.host.clientWidth);
     this.#length_s = Math.max(1, overview.length_s);
     const trend = overview.signals[signal];
     setText(this.length, duration(overview.length_s, true));

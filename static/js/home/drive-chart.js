@@ -67,11 +67,12 @@ class DriveChart {
     const { plots, stage, ranges, signals, now, element } = this.parts;
     this.brush = new Brush((view) => this.#set(view));
     element.append(this.brush.element);
-    this.feed = new DriveFeed(store, () => this.#filled());
+    this.feed = new DriveFeed(store);
     this.panes = new Panes(plots, () => this.#scene());
     this.resize = new ResizeObserver(([plot]) => {
       this.#isShown = (plot?.contentRect.width ?? 0) > 0;
       this.panes.resize();
+      this.brush.resize();
       this.#filled();
     });
     this.#rebuild();
@@ -118,9 +119,8 @@ class DriveChart {
   }
 
   #scene() {
-    const { feed, store, view } = this;
-    const { answer } = feed;
-    const marks = answer ? placedMarks(answer.marks, view, this.panes.box.width) : [];
+    const { feed, feed: { answer }, store, view } = this;
+    const marks = answer ? placedMarks(answer.marks, view, this.panes.area.width) : [];
     /** @type {[number, number][]} */
     const unknown = answer ? [...answer.blind] : [];
     if (answer && !store.replaying && feed.isLate) unknown.push([answer.known_s, feed.end_s]);
@@ -141,6 +141,7 @@ class DriveChart {
   /** New numbers came. */
   #filled() {
     const { answer, overview } = this.feed;
+    this.feed.isNew = false;
     if (answer && this.#specs.some(({ label, name }) => label === name && answer.offered[name])) return this.#rebuild(); // their names came
     this.#keepUp();
     this.#drawn = '';
@@ -161,7 +162,8 @@ class DriveChart {
     }
     this.#keepUp();
     this.feed.look();
-    if (this.#isShown) this.#draw();
+    if (this.feed.isNew) this.#filled();
+    else if (this.#isShown) this.#draw();
   }
 
   /** Moves the view on with the drive, or with the moment of the replay. */
@@ -198,17 +200,15 @@ class DriveChart {
 
   /** The marks and the time at the cursor, above the panes. */
   #drawHead() {
-    const { head, stage } = this.parts;
-    const box = this.panes.box;
-    const left = box.left - stage.getBoundingClientRect().left;
-    const { cursor_s, view: [from_s, to_s] } = this;
+    const { left, width } = this.panes.area;
+    const { cursor_s, parts: { head }, view: [from_s, to_s] } = this;
     const marks = this.#scene().marks.map(({ x, priority, title, count, at_s }) => svg('g', { class: priority, transform: `translate(${(left + x - 11).toFixed(1)} 3)` },
       svg('title', {}, `${timeOfDay(this.#clock(at_s))} ${title}${count > 1 ? ` and ${count - 1} more` : ''}`), svg('use', { href: `#i-${ICONS[priority]}`, width: 22, height: 22 })));
     const tag = [];
     if (cursor_s !== null && cursor_s >= from_s && cursor_s <= to_s) {
-      const x = left + ((cursor_s - from_s) / (to_s - from_s)) * box.width;
+      const x = left + ((cursor_s - from_s) / (to_s - from_s)) * width;
       const middles = this.#scene().marks.map((mark) => left + mark.x);
-      const at = tagAt(x, middles, { left, right: left + box.width, width: TAG_PX, mark: 24 });
+      const at = tagAt(x, middles, { left, right: left + width, width: TAG_PX, mark: 24 });
       tag.push(svg('rect', { class: 'tag-box', x: at.toFixed(1), y: 1, width: TAG_PX, height: 26 }), svg('text', { class: 'n tag-text', x: (at + TAG_PX / 2).toFixed(1), y: 20 }, timeOfDay(this.#clock(cursor_s))));
     }
     head.replaceChildren(...tag, ...marks); // no mark is under the tag

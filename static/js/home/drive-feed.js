@@ -37,13 +37,12 @@ export class DriveFeed {
   #overview_ms = -Infinity;
   #isAsking = false;
 
-  /**
-   * @param {import('../core/store.js').Store} store
-   * @param {() => void} onNew
-   */
-  constructor(store, onNew) {
+  /** An answer came that is not drawn yet: it is drawn with the rest, for a picture of its own costs as much as theirs. */
+  isNew = false;
+
+  /** @param {import('../core/store.js').Store} store */
+  constructor(store) {
     this.store = store;
-    this.onNew = onNew;
   }
 
   /** The end of what the drive has by now [s]; it moves on while the server does not answer. */
@@ -110,7 +109,7 @@ export class DriveFeed {
     this.answer = found;
     this.answered_ms = this.store.now();
     if (isFirst) this.#isWanted = true;
-    this.onNew();
+    this.isNew = true;
   }
 
   /** @param {string} context */
@@ -119,7 +118,7 @@ export class DriveFeed {
     const found = await this.#fetch({ signals: this.#signals[0] ?? 'speed', buckets: OVERVIEW_BUCKETS });
     if (!found || context !== this.#context) return;
     this.overview = found;
-    this.onNew();
+    this.isNew = true;
   }
 
   /** @param {Record<string, string | number>} fields @returns {Promise<Answer | null>} */

@@ -28,6 +28,9 @@ const VALUES_PX = 38;
 
 /** @extends {PaneStack<Pane>} */
 export class Panes extends PaneStack {
+  /** Until they get another size: to look at each picture would make the browser do its layout at once. @type {Panes['area'] | null} */
+  #area = null;
+
   /** @param {HTMLElement} root @param {() => Scene} sceneOf */
   constructor(root, sceneOf) {
     super(root);
@@ -37,6 +40,22 @@ export class Panes extends PaneStack {
   /** Builds a pane for each signal. @param {Spec[]} specs */
   build(specs) {
     this.stack(specs, (spec, isLast) => new Pane(spec, this, isLast));
+    this.#area = null;
+  }
+
+  /** @override */
+  resize() {
+    super.resize();
+    this.#area = null;
+  }
+
+  /** The left edge of the plots within the stage, and their width [px]. @returns {{left: number, width: number}} */
+  get area() {
+    if (this.#area) return this.#area;
+    const { left, width } = this.box;
+    const area = { left: left - /** @type {HTMLElement} */ (this.root.parentElement).getBoundingClientRect().left, width };
+    if (width > 1) this.#area = area; // before, the first plot is not built
+    return area;
   }
 
   /** New numbers. */
@@ -118,7 +137,7 @@ class Pane {
       },
       axes: [
         { ...axis, size: this.isLast ? AXIS_PX : 0, space: 64, incrs: INCRS_S, values: (plot, splits, _axis, _space, apart_s) => splits.map((at_s) => (this.isLast ? wholeLabel(clockWords(at_s, apart_s), plot.valToPos(at_s, 'x'), plot.width - VALUES_PX) : '')) },
-        { ...axis, size: VALUES_PX, space: 22, grid: { show: false }, splits: (_, _axis, low, high, apart) => valueTicks(low, high, apart, plotSize(this.host).height < LOW_PX), values: (_, splits) => splits.map((value) => fixed(value, splits.some((one) => Math.abs(one % 1) > 1e-6 && Math.abs(one) < 100) ? 1 : 0)) },
+        { ...axis, size: VALUES_PX, space: 22, grid: { show: false }, splits: (plot, _axis, low, high, apart) => valueTicks(low, high, apart, plot.height < LOW_PX), values: (_, splits) => splits.map((value) => fixed(value, splits.some((one) => Math.abs(one % 1) > 1e-6 && Math.abs(one) < 100) ? 1 : 0)) },
       ],
       series: [{}, ...[0, 1].map(() => ({ stroke: palette.ink, width: 2, spanGaps: false, points: { show: false } }))],
       bands: [{ series: [2, 1], fill: palette.ink }],

@@ -238,7 +238,7 @@ function sweep(inner, outer, from, kind = '') {
 }
 
 /** A turn that is smaller than the width of the pointer is put there without a transition: it looks the same and halves the cost of Home [degrees]. */
-const PUT_DEG = 1;
+const PUT_DEG = 1.5;
 /** @type {WeakMap<Element, number>} */
 const turned = new WeakMap();
 

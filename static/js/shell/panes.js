@@ -48,6 +48,8 @@ export function mount(monitor, store) {
 class Panes {
   /** The sheet of the widest screens. @type {Promise<void> | undefined} */
   dress;
+  /** As in wall.css; to read innerWidth would make the browser do its style and layout at once. */
+  wall = matchMedia('(width >= 112.5em)');
 
   /** @param {HTMLElement} monitor @param {Store} store */
   constructor(monitor, store) {
@@ -71,7 +73,7 @@ class Panes {
     const isInSight = frame !== null && areAlarmsInSight();
     void this.list.want(isInSight);
     if (!isInSight) return;
-    if (innerWidth >= 1800 * scale()) this.dress ??= styled('wall'); // as in wall.css
+    if (this.wall.matches) this.dress ??= styled('wall');
     const heads = headsOf(frame);
     const covered = veilOf(this.store);
     for (const { name, element } of this.heads) setSentence(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // a covered pane has no text
