@@ -141,8 +141,8 @@ async def test_a_tag_shows_that_more_lies_beneath_until_the_end_is_in_sight(phon
     page = phone.page
     await page.set_viewport_size({"width": 360, "height": 640})
     await show(canned, page, "slow-down-arm")
-    await page.wait_for_function(f"({MORE})() === 'visible'")
+    await page.wait_for_function(f"() => ({MORE})() === 'visible'")
     await page.evaluate("document.querySelector('#sheet-slow').scrollTo(0, 9999)")
-    await page.wait_for_function(f"({MORE})() === 'hidden'")
+    await page.wait_for_function(f"() => ({MORE})() === 'hidden'")
     await page.set_viewport_size({"width": 412, "height": 1180})  # all of it is in sight
-    await page.wait_for_function(f"({MORE})() === 'hidden'")
+    await page.wait_for_function(f"() => ({MORE})() === 'hidden'")

@@ -183,4 +183,4 @@ async def test_the_tag_follows_its_cursor_into_another_window_while_a_replay_is_
     for width in (1920, 1440):
         await phone.page.set_viewport_size({"width": width, "height": 1000})
         await phone.page.evaluate(DRAWN)
-        await phone.page.wait_for_function(f"() => ({BESIDE})() <= 24")
+        assert await phone.page.evaluate(BESIDE) <= 24, width
