@@ -22,6 +22,7 @@ from server.system.page_files import check_vendor, static_dir
 from server.version import catgraph_version
 
 _SCRIPTS = ("layout", "elements", "view", "alarms", "plots", "track", "overview")  # each imports earlier ones only
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:m/s²|m/s|km/h|mph|km|m|ms|s|min|h|%|kB|MB|GB|Hz|°C)(?![\w/]))")
 _TIMELINE_TEXTS = 400  # reasons in one file; more would not be read
 
 
@@ -38,6 +39,7 @@ def page(report: Report, drive: FirstPart | None = None) -> str:
         "lasting": report_text.length,
         "grouped": report_text.grouped,
         "line": report_text.printable,
+        "whole": whole,
         "day_time": _day_time,
     }
     template = environment.from_string(_text("report.html"))
@@ -49,6 +51,11 @@ def page(report: Report, drive: FirstPart | None = None) -> str:
         policy=_policy(script, style),
         drive=Markup("") if drive is None else drive.sheet(environment, _text("drive.html")),
     )
+
+
+def whole(text: str) -> str:
+    """Text of which no line breaks between a number and its unit."""
+    return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text)
 
 
 class FirstPart(Protocol):

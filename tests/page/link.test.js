@@ -35,7 +35,7 @@ test('each silence is assigned to the part that fell silent', () => {
 test('a server that answers and has nothing of the car accuses what is between', () => {
   const lost = chainOf({ ...now, frame: state(), isSilent: true, silence_s: 3.4, unserved: 'The agent of car does not answer.' });
   assert.deepEqual([lost.state, lost.cut, lost.sentence, lost.isUnserved], ['Lost', 1, 'The agent of car does not answer.', true]);
-  assert.deepEqual(lost.nodes.map(({ name, mark, isBad }) => [name, mark, isBad]), [['Phone', 'here', false], ['Server', 'answers', false], ['Agent', 'silent 3.4 s', true], ['Car', 'unknown', false]]);
+  assert.deepEqual(lost.nodes.map(({ name, mark, isBad }) => [name, mark, isBad]), [['This device', 'here', false], ['Server', 'answers', false], ['Agent', 'silent 3.4 s', true], ['Car', 'unknown', false]]);
   const never = chainOf({ ...now, frame: null, isSilent: true, heard_ms: null, unserved: 'Nothing came from it.' });
   assert.deepEqual([never.age_s, never.nodes[2]?.mark, never.detail], [null, 'no answer', 'The server answers.']);
   assert.equal(chainOf({ ...now, frame: state(), unserved: 'Nothing came from it.' }).state, 'Live', 'what came since is newer');

@@ -333,6 +333,7 @@ async def link_lost(server: Canned, page: Page) -> None:
 @scene("no-messages")
 async def no_messages(server: Canned, page: Page) -> None:
     state = idle("monitoring")
+    state["checks"] = [one | {"verdict": "unknown", "brief": "not checked: stale"} for one in live()["checks"]]
     state["session"] |= {"address": "ws://192.168.4.1:9090", "connected_for_s": 4.95}
     problem = {
         "code": "no_message", "title": "The bridge answers, the car publishes nothing.", "mark": "silent",
@@ -876,7 +877,14 @@ def replayed(state: dict[str, Any]) -> dict[str, Any]:
         "alarms_from": "recording", "settings_from": "recording", "hangs_s": None,
     }  # fmt: skip
     state["alarms"] = [
-        alarm("Speed", "Speed above limit", priority="critical", state="ACKED", text="12.1 m/s, limit 11.0 m/s")
+        alarm(
+            "Speed",
+            "Speed above limit",
+            priority="critical",
+            state="ACKED",
+            text="12.1 m/s, limit 11.0 m/s",
+            raised_ms=start_ms + 237_000,
+        )
     ]
     return state
 
@@ -945,7 +953,7 @@ async def settings_lower(server: Canned, page: Page) -> None:
 @scene("topic")
 async def topic(server: Canned, page: Page) -> None:
     await settings(server, page)
-    await page.tap("[data-signal=speed]")
+    await page.tap("#panel-settings [data-signal=speed]")
 
 
 @scene("preferences")

@@ -147,13 +147,13 @@ test('the sheet: what would be commanded, who competes, and the one thing this p
   const sheet = (/** @type {any} */ now, more = {}) => sheetOf(seen(now, more), 0);
   const notArmed = sheet(slow('not_armed', { rivals: ['/lap_driver', '/joy'] }));
   assert.deepEqual([notArmed.title, notArmed.act], ['Arm the slow-down?', 'arm']);
-  assert.deepEqual(notArmed.facts[0], ['Commanded on', '/catvehicle/cmd_vel', false]);
-  assert.deepEqual(notArmed.facts[2], ['Slows at', '1.5 m/s²', false]);
-  assert.deepEqual(notArmed.facts[3], ['Other publishers', '/lap_driver, /joy: the last message wins, so the car may not slow', true]);
+  assert.deepEqual(notArmed.facts[1], ['Commanded on', '/catvehicle/cmd_vel', false]);
+  assert.deepEqual(notArmed.facts[3], ['Slows at', '1.5 m/s²', false]);
+  assert.deepEqual(notArmed.facts[0], ['Other publishers', '/lap_driver, /joy: the last message wins, so the car may not slow', true]);
   assert.match(notArmed.aid, /^An aid, not an emergency stop/);
   assert.equal(notArmed.isGuarded, false);
-  assert.equal(sheet(slow('not_armed', { rivals: null })).facts[3]?.[2], true, 'not known is no "none"');
-  assert.equal(sheet(slow('not_armed')).facts[3]?.[1], 'none');
+  assert.equal(sheet(slow('not_armed', { rivals: null })).facts[0]?.[2], true, 'not known is no "none"');
+  assert.equal(sheet(slow('not_armed')).facts[0]?.[1], 'none');
   const other = sheet(slow('not_armed'), { mayControl: false, holder: 'Ben' });
   assert.deepEqual([other.act, other.message], ['ask', 'Ben is in control and can arm it.']);
   assert.equal(sheet(slow('armed')).act, 'disarm');

@@ -223,7 +223,7 @@ async def test_a_server_that_falls_silent_covers_everything_and_its_return_uncov
     await expect(phone.page.locator(".gauge")).to_have_attribute("data-speed", "stale")
     sheet = phone.page.locator("#sheet-lost")
     await expect(sheet).to_be_visible()
-    await is_cut(sheet, "Phone", "Server")
+    await is_cut(sheet, "This device", "Server")
     canned.silent = False
     await phone.live()
     await expect(sheet).to_be_hidden()

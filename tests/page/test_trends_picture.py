@@ -13,6 +13,7 @@ from playwright.async_api import expect
 from tests.page.canned import Canned
 from tests.page.canned_drive import LOST_S, SILENT_S
 from tests.page.conftest import Phone
+from tests.page.screenshots import show
 from tests.page.test_trends import chart
 from tests.page.touch import DRAWN
 
@@ -134,3 +135,52 @@ async def test_the_picture_holds_what_is_seen(phone: Phone, canned: Canned) -> N
             rows.setdefault(y, set()).add(x)
     width = panes["distance"]["right"] - panes["distance"]["left"]
     assert max(map(len, rows.values())) > width / 3
+
+
+#: Marks of alarms that lie over the cursor's tag, and whether any gave way to it.
+OVER_TAG = """() => {
+  const tag = document.querySelector('.tag-box').getBoundingClientRect();
+  const isOver = (at) => at.left < tag.right - 1 && at.right > tag.left + 1 && at.top < tag.bottom - 0.5;
+  const over = [...document.querySelectorAll('.trends-marks > g')]
+    .map((mark) => mark.lastElementChild.getBoundingClientRect()).filter((at) => at.width < 1 || isOver(at));
+  return [over.length, document.querySelectorAll('.trends-marks > g > rect').length];
+}"""
+
+
+async def test_no_mark_of_an_alarm_lies_over_the_digits_of_the_cursors_tag(phone: Phone, canned: Canned) -> None:
+    await chart(phone, canned)
+    await phone.page.locator(".trends-tools button").nth(2).tap()  # the whole drive
+    await phone.page.wait_for_function("() => document.querySelector('.trends-stage').ariaValueMin === '0.0'")
+    box = await phone.page.locator(".trends-panes .u-over").first.bounding_box()
+    assert box is not None
+    narrow = 0
+    for share in range(5, 96, 6):
+        await phone.page.touchscreen.tap(box["x"] + box["width"] * share / 100, box["y"] + 20)
+        await expect(phone.page.locator(".tag-text")).to_have_text(re.compile(r"\d\d:\d\d:\d\d"))
+        over, bars = await phone.page.evaluate(OVER_TAG)
+        assert over == 0, share
+        narrow += bars
+    assert narrow > 0  # where there was no place beside them
+
+
+#: How far the middle of the tag stands beside the cursor of the first pane, and beyond its ends [px].
+BESIDE = """() => {
+  const tag = document.querySelector('.tag-box').getBoundingClientRect();
+  const { left, right } = document.querySelector('.trends-panes .u-over').getBoundingClientRect();
+  const stage = document.querySelector('.trends-stage');
+  const share = (stage.ariaValueNow - stage.ariaValueMin) / (stage.ariaValueMax - stage.ariaValueMin);
+  const x = left + share * (right - left);
+  return Math.max(tag.left - x, x - tag.right, left - tag.left - 1, tag.right - right - 1);
+}"""
+
+
+async def test_the_tag_follows_its_cursor_into_another_window_while_a_replay_is_paused(
+    phone: Phone, canned: Canned
+) -> None:
+    await phone.page.set_viewport_size({"width": 1440, "height": 900})
+    await show(canned, phone.page, "replay")
+    await expect(phone.page.locator(".tag-text")).to_be_visible()
+    for width in (1920, 1440):
+        await phone.page.set_viewport_size({"width": width, "height": 1000})
+        await phone.page.evaluate(DRAWN)
+        assert await phone.page.evaluate(BESIDE) <= 24, width

@@ -58,7 +58,7 @@ async def test_no_window_has_a_blank_a_sliced_or_a_covered_part(phone: Phone, ca
     published = sum(one["freshness"] != "not_published" for one in canned.state["signals"].values())
     more = published - await rows.count()
     assert more > 0
-    await expect(phone.page.locator("#monitor [data-pane=signals] .end")).to_have_text(f"{more} more · rate, age")
+    await expect(phone.f("head-signals")).to_have_text(f"Signals, {published - more} of {published}")
     await expect(phone.f("driven")).to_have_text("76.1")
     await expect(phone.f("head-people")).to_have_text("unknown")  # who is there is unknown
     await show(canned, phone.page, "home")

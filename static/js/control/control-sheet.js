@@ -25,11 +25,11 @@ class ControlSheet {
     this.title = html('h2', { id: 'control-title' });
     this.text = html('p', { class: 'sub', id: 'control-words', role: 'status' });
     this.people = html('ul', { class: 'menu-list people' });
-    this.keys = html('div', { class: 'keys', 'data-f': 'keys' });
+    this.keys = html('div', { class: 'acts', 'data-f': 'keys' });
     this.reach = html('button', { type: 'button', class: 'reach' });
-    const close = html('div', { class: 'keys' }, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'));
+    const foot = html('div', { class: 'keys' }, this.keys, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'));
     this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-control', 'aria-labelledby': 'control-title', 'aria-describedby': 'control-words' },
-      html('div', { class: 'bd' }, this.title, this.text), this.keys, this.people, this.reach, close));
+      html('div', { class: 'bd' }, this.title, this.text), this.people, this.reach, foot));
     const stops = [store.on('draw', () => this.#draw()), addSheet(this.sheet)];
     this.reach.addEventListener('click', () => control.openPhone());
     this.sheet.addEventListener('close', () => stops.forEach((stop) => stop()), { once: true });

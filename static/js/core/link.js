@@ -21,8 +21,8 @@ import { isWeak } from './round-trip.js';
 
 /** A car that has sent nothing for so long after the bridge answered is called silent [s]. */
 const FIRST_MESSAGE_S = 2;
-const NAMES = ['Phone', 'Server', 'Bridge', 'Car'];
-const BY_AGENT = ['Phone', 'Server', 'Agent', 'Car'];
+const NAMES = ['This device', 'Server', 'Bridge', 'Car'];
+const BY_AGENT = ['This device', 'Server', 'Agent', 'Car'];
 
 /**
  * The chain as the page sees it now.

@@ -17,6 +17,8 @@ import { nowOf } from './trend-feed.js';
 
 const ICONS = { critical: 'crit', warning: 'warn' };
 const TAG_PX = 84;
+/** An alarm's mark with the room about it. */
+const MARK_PX = 24;
 /** A tap so near to the cursor takes it away [px]. */
 const AGAIN_PX = 12;
 
@@ -73,7 +75,7 @@ class DriveChart {
       this.#isShown = (plot?.contentRect.width ?? 0) > 0;
       this.panes.resize();
       this.brush.resize();
-      this.#filled();
+      queueMicrotask(() => this.#isOver || this.#filled()); // after the panes have their new size
     });
     this.#rebuild();
     this.resize.observe(plots);
@@ -202,16 +204,16 @@ class DriveChart {
   #drawHead() {
     const { left, width } = this.panes.area;
     const { cursor_s, parts: { head }, view: [from_s, to_s] } = this;
-    const marks = this.#scene().marks.map(({ x, priority, title, count, at_s }) => svg('g', { class: priority, transform: `translate(${(left + x - 11).toFixed(1)} 3)` },
-      svg('title', {}, `${timeOfDay(this.#clock(at_s))} ${title}${count > 1 ? ` and ${count - 1} more` : ''}`), svg('use', { href: `#i-${ICONS[priority]}`, width: 22, height: 22 })));
+    const placed = this.#scene().marks.map((mark) => ({ ...mark, x: left + mark.x }));
+    let at = NaN; // where the tag begins
     const tag = [];
     if (cursor_s !== null && cursor_s >= from_s && cursor_s <= to_s) {
       const x = left + ((cursor_s - from_s) / (to_s - from_s)) * width;
-      const middles = this.#scene().marks.map((mark) => left + mark.x);
-      const at = tagAt(x, middles, { left, right: left + width, width: TAG_PX, mark: 24 });
-      tag.push(svg('rect', { class: 'tag-box', x: at.toFixed(1), y: 1, width: TAG_PX, height: 26 }), svg('text', { class: 'n tag-text', x: (at + TAG_PX / 2).toFixed(1), y: 20 }, timeOfDay(this.#clock(cursor_s))));
+      at = tagAt(x, placed.map((mark) => mark.x), { left, right: left + width, width: TAG_PX, mark: MARK_PX });
+      const isOver = placed.some((mark) => isUnder(mark.x, at));
+      tag.push(svg('rect', { class: 'tag-box', x: at.toFixed(1), y: 1, width: TAG_PX, height: isOver ? 20 : 26 }), svg('text', { class: 'n tag-text', x: (at + TAG_PX / 2).toFixed(1), y: isOver ? 17 : 20 }, timeOfDay(this.#clock(cursor_s))));
     }
-    head.replaceChildren(...tag, ...marks); // no mark is under the tag
+    head.replaceChildren(...tag, ...placed.map((mark) => pictureOf(mark, timeOfDay(this.#clock(mark.at_s)), at)));
   }
 
   /** The value at the cursor beside each pane; without a cursor, or beyond what is known, that of now. */
@@ -294,6 +296,15 @@ class DriveChart {
     acts[key]?.();
     return acts[key] !== undefined;
   }
+}
+
+/** Whether a mark has no place beside the tag: it is then a bar beneath it, so that it covers no digit. @param {number} x its middle @param {number} at where the tag begins */
+const isUnder = (x, at) => Math.abs(x - at - TAG_PX / 2) < (MARK_PX + TAG_PX - 1) / 2;
+
+/** An alarm's mark in the head of the chart. @param {ReturnType<typeof placedMarks>[number]} mark @param {string} clock @param {number} at where the tag begins */
+function pictureOf({ x, priority, title, count }, clock, at) {
+  return svg('g', { class: priority, transform: `translate(${(x - 11).toFixed(1)} 3)` }, svg('title', {}, `${clock} ${title}${count > 1 ? ` and ${count - 1} more` : ''}`),
+    isUnder(x, at) ? svg('rect', { x: 3, y: 19, width: 16, height: 5, fill: 'currentColor' }) : svg('use', { href: `#i-${ICONS[priority]}`, width: 22, height: 22 }));
 }
 
 /** Opens the sheet of signals and export, which is fetched with its first use. @param {import('./drive-picker.js').Chart} chart */

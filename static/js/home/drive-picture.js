@@ -66,16 +66,20 @@ export function pictureOf({ panes, head, title }) {
 /** The marks by the paths of their icons, and the tag of the cursor. @param {CanvasRenderingContext2D} g @param {SVGElement} head */
 function drawHead(g, head) {
   for (const mark of /** @type {NodeListOf<SVGGElement>} */ (head.querySelectorAll('g'))) {
-    const use = mark.querySelector('use');
-    const path = document.querySelector(`${use?.getAttribute('href')} path`)?.getAttribute('d');
+    const [use, bar] = [mark.querySelector('use'), mark.querySelector('rect')];
+    const path = use && document.querySelector(`${use.getAttribute('href')} path`)?.getAttribute('d');
     const place = mark.transform.baseVal.consolidate()?.matrix;
-    if (!path || !place) continue;
+    if (!(path || bar) || !place) continue;
     g.save();
     g.translate(place.e, place.f);
+    if (bar) {
+      g.fillStyle = getComputedStyle(mark).color;
+      g.fillRect(bar.x.baseVal.value, bar.y.baseVal.value, bar.width.baseVal.value, bar.height.baseVal.value);
+    }
     g.scale(22 / 24, 22 / 24);
     g.strokeStyle = getComputedStyle(mark).color;
     [g.lineWidth, g.lineCap, g.lineJoin] = [2, 'round', 'round'];
-    g.stroke(new Path2D(path));
+    if (path) g.stroke(new Path2D(path));
     g.restore();
   }
   const [box, text] = [head.querySelector('.tag-box'), head.querySelector('.tag-text')];

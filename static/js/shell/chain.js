@@ -62,6 +62,6 @@ export function drawBigChain(root, view) {
 
 /** @param {ChainView} view */
 function label(view) {
-  if (view.cut === null) return 'Phone, server, bridge and car answer';
+  if (view.cut === null) return 'This device, server, bridge and car answer';
   return `The link is broken between ${view.nodes[view.cut]?.name} and ${view.nodes[view.cut + 1]?.name}`;
 }

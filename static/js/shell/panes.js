@@ -1,7 +1,7 @@
 // The panes of a wide screen: their heads, the list of alarms and the log, mounted only while there is a place for them.
 
 import { countWords, rowsOf } from '../alarms/alarms-layout.js';
-import { field, html, icon, listen, need, setAttribute, setText, setSentence, textNodes } from '../core/dom.js';
+import { field, html, icon, listen, setAttribute, setText, setSentence, textNodes } from '../core/dom.js';
 import { eventWords, gapLine } from '../alarms/log-layout.js';
 import { fixed, timeOfDay } from '../core/format.js';
 import { alarmInHead } from './dialogs.js';
@@ -79,7 +79,8 @@ class Panes {
     for (const { name, element } of this.heads) setSentence(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // a covered pane has no text
     this.log.draw();
     const more = this.signals.draw(() => signalLines(frame.signals));
-    setSentence(need(this.monitor, '[data-pane="signals"] .end'), `${more ? `${more} more · ` : ''}rate, age`);
+    const shown = this.signals.list.children.length;
+    setSentence(field(this.monitor, 'head-signals'), more ? `Signals, ${shown} of ${shown + more}` : 'Signals');
     const { head, lines } = peopleLines(store.isSilent ? null : frame.replay ? frame.live?.reach : frame.reach, store.control, store.page);
     setSentence(field(this.monitor, 'head-people'), (frame.replay ? 'live: ' : '') + head);
     this.people.draw(() => lines);

@@ -17,6 +17,7 @@ export function openSheet(sheet) {
   if (!view) return sheet.showModal();
   void styled('drawers'); // again where it failed
   sheet.show();
+  sheet.scrollTop = 0; // the key that takes the focus does not scroll away what it is about
   setAttribute(need(document, '#monitor'), 'data-sheet', sheet.id);
   sheet.addEventListener('close', () => setAttribute(need(document, '#monitor'), 'data-sheet', openedSheet()?.id), { once: true });
 }

@@ -227,10 +227,10 @@ export function sheetOf(seen, lag_s) {
   const plain = { aid: AID, guard: `${guard.text}.`, isGuarded: guard.isGuarded };
   /** @type {[string, string, boolean][]} */
   const facts = now?.topic ? [
+    rivalsOf(now.rivals), // first: they may keep the car from slowing
     ['Commanded on', now.topic, false],
     ['Type', now.type ?? 'not known', !now.type],
     ['Slows at', `${fixed(now.deceleration_mps2 ?? null)} m/s²`, false],
-    rivalsOf(now.rivals),
   ] : [];
   if (isSilent || !now) return { ...plain, title: 'Slow-down unknown', text: 'The server does not answer.', facts: [], act: null, message: '' };
   if (isReplay) return { ...plain, title: 'As it was recorded', text: 'A recording is shown: nothing is sent to the car.', facts, act: null, message: '' };

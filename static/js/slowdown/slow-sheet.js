@@ -20,10 +20,10 @@ export function openSlow(store, control) {
   const guard = html('p', { 'data-f': 'guard' });
   const aid = html('p', { class: 'sub' });
   const message = html('p', { class: 'bad', role: 'status', 'data-f': 'message' });
-  const keys = html('div', { class: 'keys' });
+  const close = html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close');
+  const keys = html('div', { class: 'keys' }, message, close); // at the foot, which stays in sight: with them why an order was refused
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-slow', 'aria-labelledby': 'slow-title', 'aria-describedby': 'slow-words' },
-    html('div', { class: 'bd' }, html('h2', { id: 'slow-title' }, mark, title), html('div', { id: 'slow-words' }, text, guard, aid)), facts, html('div', { class: 'bd' }, message), keys,
-    html('div', { class: 'keys' }, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
+    html('div', { class: 'bd' }, html('h2', { id: 'slow-title' }, mark, title), html('div', { id: 'slow-words' }, text, guard, aid)), facts, keys));
   const { vehicle } = store;
   let shown = '';
   let refused = '';
@@ -35,6 +35,14 @@ export function openSlow(store, control) {
     if (answer.ok && act === 'ask') refused = 'Requested: control is granted within 10 s unless it is refused. Then arm it.';
     else if (answer.ok) return sheet.close();
     draw();
+  }
+
+  /** @param {'arm' | 'disarm' | 'ask'} act */
+  function keyOf(act) {
+    const [label, kind] = KEYS[act];
+    const button = html('button', { type: 'button', class: kind, 'data-act': act }, label);
+    button.addEventListener('click', () => void send(act));
+    return button;
   }
 
   function draw() {
@@ -52,13 +60,8 @@ export function openSlow(store, control) {
     facts.replaceChildren(...seen.facts.flatMap(([name, value, isBad]) => [
       html('dt', {}, name), html('dd', isBad ? { class: 'bad' } : {}, ...(isBad ? [icon('warn', 's'), ' '] : []), html('span', {}, ...textNodes(value))),
     ]));
-    show(keys, seen.act !== null);
-    const { act } = seen;
-    if (act === null) return;
-    const [label, kind] = KEYS[act];
-    const button = html('button', { type: 'button', class: kind, 'data-act': act }, label);
-    button.addEventListener('click', () => void send(act));
-    keys.replaceChildren(button);
+    keys.querySelector('[data-act]')?.remove();
+    if (seen.act !== null) close.before(keyOf(seen.act));
   }
 
   const stops = [store.on('draw', draw), addSheet(sheet)];

@@ -19,6 +19,7 @@ from server.analysis.drive.axis import nice_step, ticks, time_ticks
 from server.analysis.drive.drive_report import write_drive_page
 from server.analysis.drive.form import write_forms
 from server.analysis.drive.tables import write_report_csv, write_report_json
+from server.analysis.page import whole
 from server.recording.catalog import annotations
 from server.recording.drive.departure import Departure
 from server.recording.export.export_format import ExportRefused
@@ -47,9 +48,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def test_no_line_breaks_between_a_number_and_its_unit(folder: Path) -> None:
+    page = (folder / "page.html").read_text(encoding="utf-8")
+    assert "9.3\N{NO-BREAK SPACE}m/s" in page
+    kept = "2.0 in 10~min, 5 more, 3~m/s² of 4~m".replace("~", "\N{NO-BREAK SPACE}")
+    assert whole("2.0 in 10 min, 5 more, 3 m/s² of 4 m") == kept
+
+
 def test_the_page_shows_all_of_it(folder: Path) -> None:
     text = re.sub(r"<style>.*?</style>|<script.*?</script>", "", (folder / "page.html").read_text(), flags=re.S)
-    plain = html.unescape(re.sub(r"<[^>]+>", " ", text))
+    plain = " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
     for expected in (
         *(
             "Drive report",
