@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -17,6 +18,7 @@ from tests.ports import free_port
 ODOMETRY, FIX = "nav_msgs/Odometry", "sensor_msgs/NavSatFix"
 SCAN, TWIST = "sensor_msgs/LaserScan", "geometry_msgs/Twist"
 ZEROS_9, ZEROS_36 = [0.0] * 9, [0.0] * 36
+FREED_WITHIN_S = 10.0
 XYZ = {"x": 0.0, "y": 0.0, "z": 0.0}
 
 
@@ -102,10 +104,19 @@ class Peer:
         self.start()
 
     def start(self) -> None:
-        """Listens, on the same port as before."""
-        self.server = foxglove.start_server(
-            name="peer", port=self.port, context=self.context, server_listener=self.listener, **self._options
-        )
+        """Listens, on the same port as before, which a server that was stopped frees a moment later."""
+        ends_s = time.monotonic() + FREED_WITHIN_S
+        while True:
+            try:
+                self.server = foxglove.start_server(
+                    name="peer", port=self.port, context=self.context, server_listener=self.listener, **self._options
+                )
+            except RuntimeError:
+                if time.monotonic() > ends_s:
+                    raise
+                time.sleep(0.05)
+            else:
+                return
 
     def stop(self) -> None:
         self.server.stop()
