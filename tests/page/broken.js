@@ -5,7 +5,7 @@
   const broken = () => { throw new Error('broken for a test'); };
   const never = () => 0;
   const idle = () => undefined;
-  const kinds = { broken, never, idle };
+  const kinds = { broken, never, idle, mute: idle };
   let undo = null;
   const rootOf = { window, document, performance, JSON, Date, Object, Math };
 
@@ -14,7 +14,7 @@
     const key = name === '@@iterator' ? Symbol.iterator : name;
     const was = getOwnPropertyDescriptor(target, key);
     if (!was) throw new Error(`there is no ${owner}.${name}`);
-    const now = was.get || was.set ? { ...was, get: kind === 'set' ? was.get : broken, set: was.set && broken } : { ...was, value: kinds[kind] };
+    const now = was.get || was.set ? { ...was, get: kind === 'set' || kind === 'mute' ? was.get : broken, set: was.set && (kinds[kind] ?? broken) } : { ...was, value: kinds[kind] };
     undo = () => { defineProperty(target, key, was); };
     defineProperty(target, key, now);
     return 'broken';

@@ -8,14 +8,19 @@ export class DrawProof {
   #text = html('span');
   #sentence = html('span');
 
-  /** Does writing have an effect? */
+  /** Does writing have an effect, into what is there and anew? */
   isDrawn() {
     this.#n = (this.#n + 1) % 10;
+    return this.#isWritten(this.#text, this.#sentence) && this.#isWritten(html('span'), html('span'));
+  }
+
+  /** @param {Element} text @param {Element} sentence */
+  #isWritten(text, sentence) {
     const [now, speed] = [`proof ${this.#n}`, fixed(this.#n + 0.25)];
-    setText(this.#text, now);
-    setAttribute(this.#text, 'data-n', this.#n);
-    setSentence(this.#sentence, `at ${speed} m`);
-    const [text, sentence, quantity] = [this.#text, this.#sentence, this.#sentence.childNodes[1]];
+    setText(text, now);
+    setAttribute(text, 'data-n', this.#n);
+    setSentence(sentence, `at ${speed} m`);
+    const quantity = sentence.childNodes[1];
     return textOf(text) === now && text.attributes[0]?.value === String(this.#n) && speed.length === 3 && textOf(sentence) === 'at ' && textOf(quantity?.firstChild) === speed && textOf(quantity?.childNodes[1]) === ' m';
   }
 }
