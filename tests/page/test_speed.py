@@ -86,19 +86,27 @@ async def test_no_script_forces_a_style_or_layout_of_the_panes(
     await phone.open(f"{canned.address}/#home")
     await phone.live()
     await expect(phone.page.locator(".trends-pane").first).to_be_visible()
-    await phone.page.wait_for_timeout(1500)
-    trace = tmp_path / "trace.json"
+    found = []
+    for n in range(3):  # on a busy machine a pane may begin meanwhile: what it measures then, it measures once
+        forced = await forced_in(browser, phone, canned.address, tmp_path / f"trace-{n}.json")
+        if forced.total() <= 2:  # a list that has other rows is measured
+            return
+        found.append(forced)
+    raise AssertionError(found)
+
+
+async def forced_in(browser: Browser, phone: Phone, address: str, trace: Path) -> Counter[tuple[object, ...]]:
+    """The styles and layouts of the next 15 drawings that a script of the page made the browser do at once."""
     await browser.start_tracing(page=phone.page, path=trace, categories=TRACED)
     await phone.drawn(15)
     await browser.stop_tracing()
     laid = [one for one in json.loads(trace.read_text(encoding="utf-8"))["traceEvents"] if one["name"] in LAID]
     assert {one["name"] for one in laid} == LAID, "the trace has what is looked for"
-    forced = Counter(
+    return Counter(
         (one["name"], frames[0]["functionName"], frames[0]["url"].rpartition("/")[2], frames[0]["lineNumber"])
         for one in laid
-        if (frames := stack_of(one)) and canned.address in frames[0]["url"] and "/vendor/" not in frames[0]["url"]
+        if (frames := stack_of(one)) and address in frames[0]["url"] and "/vendor/" not in frames[0]["url"]
     )
-    assert forced.total() <= 2, forced  # a list that has other rows is measured
 
 
 #: From now on, how often a picture is requested.
