@@ -6,7 +6,8 @@
 #
 # What is seen: the checksums of chunks are compared, those of attachments are passed over. A calibration or a note
 # with a flipped bit is given as it is, by both readers, without an error; a message with the same damage raises
-# CRCValidationError. Whoever needs it must compare the record's bytes with its last four.
+# CRCValidationError. The two readers' classes state that the checksums are those of chunks; `make_reader`, by which
+# they are made, states nothing. Whoever needs it must compare the record's bytes with its last four.
 #
 # Exit code: 0 while this behaviour holds, 1 once it changed, 2 where it could not be tried.
 set -eu

@@ -8,7 +8,8 @@
 # What is seen: `stream_reader` and `copy_stream` end where the bytes end: of a cut file they give what they have,
 # here half of 100 000 bytes, without an error. `decompress` raises there; but of two joined files it gives the first
 # one only, where `stream_reader` and `copy_stream` give both. `read_to_iter` gives half of the one and the first of
-# the other. So none is right in both cases, and the size must be compared with that in the header of the frame.
+# the other. None of these is right in both cases. `decompressobj`, a frame at a time, is: of a cut file its `eof`
+# stays False, and of joined files it has the rest in `unused_data`.
 #
 # Exit code: 0 while this behaviour holds, 1 once it changed, 2 where it could not be tried.
 set -eu
