@@ -126,7 +126,8 @@ def why_nothing(run: Rehearsed, recording: Recording) -> str | None:
             if one.decode is None and one.type
         ]
         if foreign:
-            return f"Nothing could be evaluated: {'; '.join(foreign[:MOST_NAMED])}."
+            others = "; the others have no message here" if len(foreign) < len(run.sources) else ""
+            return f"Nothing could be evaluated: {'; '.join(foreign[:MOST_NAMED])}{others}."
         return "Nothing could be evaluated: the topics that catgraph knows have no message here."
     return "Nothing could be evaluated: no message on a topic that catgraph knows could be read."
 

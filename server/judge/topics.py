@@ -8,7 +8,7 @@ from server.judge.signals import TOPICS
 from server.judge.sources.source import BY_SIGNAL, COMMAND, Source, plain_type
 from server.protocol.questions import TopicOffer
 
-__all__ = ["BY_SIGNAL", "COMMAND", "Source", "candidates", "could_carry", "is_understood", "plain_type", "ros_version"]
+__all__ = ["BY_SIGNAL", "COMMAND", "Source", "candidates", "could_carry", "fitness", "plain_type", "ros_version"]
 
 
 def ros_version(types: Mapping[str, str]) -> int | None:
@@ -32,12 +32,13 @@ def candidates(found: Mapping[str, str]) -> dict[str, list[TopicOffer]]:
     return fitting
 
 
-def is_understood(topic: str, kind: str) -> bool:
-    """Whether a signal is read of a topic's messages, if they are of this type."""
+def fitness(topic: str, kind: str) -> int:
+    """2: a signal is read of a topic's messages, if they are of this type; 1: only where the topic is chosen for it."""
     plain = plain_type(kind)
-    return any(
-        plain in row.by_type or (plain in row.types and topic.lower() in map(str.lower, row.names)) for row in TOPICS
-    )
+    rows = [row for row in TOPICS if plain in row.types]
+    if any(plain in row.by_type or topic.lower() in map(str.lower, row.names) for row in rows):
+        return 2
+    return 1 if rows else 0
 
 
 def could_carry(found: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> set[str]:

@@ -29,6 +29,8 @@ from server.recording.read.unpack import PACKED, PartTooLarge, unpacked_rows
 _FORMATS: dict[str, DefinitionFormat] = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
 _INDEX_HEAD = 9 + 2 + 4  # bytes of a message index's record besides its entries
 _INDEX_ENTRY = 16
+_DATA_END = b"\x0f\4" + bytes(7)  # opcode and length
+_FOOTER_BYTES = 8 + 8 + 4  # places of summary and offsets, checksum
 
 
 class McapFile:
@@ -75,8 +77,9 @@ class McapFile:
         index = scan(self._file)
         if not index.counts and (self.is_cut or index.parts):
             raise self._unreadable(index)
-        if not self.is_cut and not index.is_ended:
-            index.pieces += 1
+        if not self.is_cut:
+            index.behind_bytes += index.rest_bytes  # it has the end of another file
+            index.pieces += not index.is_ended
         return index
 
     def _unreadable(self, index: Index) -> Exception:
@@ -183,7 +186,7 @@ def _summary(file: IO[bytes]) -> Index | None:
         summary = reader.get_summary()
         if summary is None or summary.statistics is None:
             return None
-        if file.tell() + len(MAGIC) != file.seek(0, os.SEEK_END):  # it is that of another end: two files were joined
+        if not _is_alone(file):
             return None
         statistics = summary.statistics
         if not _is_complete(summary, statistics):
@@ -197,6 +200,17 @@ def _summary(file: IO[bytes]) -> Index | None:
     except Exception:  # damage makes the library fail in every way there is
         return None
     return index
+
+
+def _is_alone(file: IO[bytes]) -> bool:
+    """Whether the summary follows the end of the data, with no other file's beginning or end in it: where two files
+    were joined, the footer of the second leads into the first."""
+    end = file.seek(-len(MAGIC), os.SEEK_END)
+    file.seek(end - _FOOTER_BYTES)
+    start = int.from_bytes(file.read(8), "little") - len(_DATA_END) - 4  # before the checksum of the data
+    file.seek(start)
+    content = file.read(end - start)
+    return content.startswith(_DATA_END) and MAGIC not in content
 
 
 def _is_complete(summary: Any, statistics: Statistics) -> bool:

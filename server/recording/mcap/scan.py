@@ -67,6 +67,7 @@ class Index:
     is_ended: bool = False  # its writer ended the data
     pieces: int = 0  # records that cannot be read
     behind_bytes: int = 0  # that follow the file's end, as where two files were joined
+    rest_bytes: int = 0  # from the first record that is none, where the file's end was not reached
     why: Exception | None = None  # why the first of the chunks that cannot be read cannot
 
     @property
@@ -110,12 +111,14 @@ def scan(file: IO[bytes], *, with_messages: bool = True) -> Index:
         file.seek(at)
         head = file.read(HEAD_BYTES)
         if len(head) < HEAD_BYTES:
+            index.rest_bytes = len(head)
             break
         opcode, length = _HEAD.unpack(head)
         end = at + HEAD_BYTES + length
         if opcode == 0 and run is not None:
             run.drop_torn(file, at, index.counts)
         if opcode == 0 or end > size:  # no record, or torn
+            index.rest_bytes = size - at
             break
         is_message = opcode == Opcode.MESSAGE and length >= _MESSAGE_BYTES
         if run is not None and not is_message:
@@ -139,10 +142,11 @@ def scan(file: IO[bytes], *, with_messages: bool = True) -> Index:
         elif opcode == Opcode.FOOTER:
             index.behind_bytes = max(0, size - end - len(MAGIC))
             break
-        elif opcode in _DECLARING:
-            _declared(index, opcode, file.read(length) if length <= MOST_TEXT else b"")
-        elif opcode == Opcode.MESSAGE:
-            index.pieces += 1
+        else:
+            body = file.read(length) if length <= MOST_TEXT else b""
+            if opcode in _DECLARING:
+                _declared(index, opcode, body)
+            index.pieces += opcode == Opcode.MESSAGE or MAGIC in body  # in a torn one another file begins
         at = end
     index.parts += [run.part(at)] if run is not None and run.count else []
     return index

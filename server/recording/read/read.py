@@ -106,12 +106,11 @@ class Recording:
         self.rejected: dict[str, int] = {}  # messages by topic that could not be decoded while reading
         self.why_rejected: dict[str, str] = {}
         self._readers: list[dict[int, _ChannelReader]] = []
-        decoders: dict[tuple[str, str, str], tuple[Decode, Layout | None]] = {}
-        self._untyped: set[str] = set()  # topics whose type is by their messages
-        self._types = types_of_topics(sources, self.ros_version)
+        self._decoders: dict[tuple[str, str, str], tuple[Decode, Layout | None]] = {}
+        self._types = types_of_topics(sources, self.ros_version, self._decoder)
         left_out: Counter[tuple[str, str]] = Counter()  # messages by topic and reason
         for source in sources:
-            self._readers.append(self._readers_of(source, decoders, left_out))
+            self._readers.append(self._readers_of(source, left_out))
         # Topics left out, each with the reason, for a person.
         self.notes = [f"{topic} ({count} messages) is left out: {why}" for (topic, why), count in left_out.items()]
         filled = [source for source in sources if any(channel.count for channel in source.channels)]
@@ -216,12 +215,14 @@ class Recording:
     ) -> None:
         self.close()
 
-    def _readers_of(
-        self,
-        source: FileSource,
-        decoders: dict[tuple[str, str, str], tuple[Decode, Layout | None]],
-        left_out: Counter[tuple[str, str]],
-    ) -> dict[int, _ChannelReader]:
+    def _decoder(self, channel: Channel, source: FileSource) -> tuple[Decode, Layout | None]:
+        """As the function: channels of one type share one."""
+        key = (channel.type, channel.definition, channel.encoding)
+        if key not in self._decoders:
+            self._decoders[key] = _decoder(channel, source)
+        return self._decoders[key]
+
+    def _readers_of(self, source: FileSource, left_out: Counter[tuple[str, str]]) -> dict[int, _ChannelReader]:
         readers: dict[int, _ChannelReader] = {}
         for channel in sorted(source.channels, key=lambda one: not one.type):
             if channel.topic.startswith(PREFIX) and channel.encoding == "json":
@@ -229,21 +230,17 @@ class Recording:
             if source.ros_version != self.ros_version:
                 continue  # it has no messages of the car
             type = spelled(channel.type, self.ros_version)
-            key = (channel.type, channel.definition, channel.encoding)
             try:
                 known = self.topics.get(channel.topic)
+                decode, layout = self._decoder(channel, source)
                 read = self._types.get(channel.topic, "")
                 if type and type != read:
                     raise Undecodable(f"it has the type {type} and also {read}")
-                if key not in decoders:
-                    decoders[key] = _decoder(channel, source)
-                decode, layout = decoders[key]
             except Undecodable as why:
                 if channel.count:
                     left_out[channel.topic, str(why)] += channel.count
                 continue
             if not type and known is None:
-                self._untyped.add(channel.topic)
                 type = type_of_first(source, channel, decode)
             type = type or (known.type if known else "")
             readers[channel.number] = _ChannelReader(topic=channel.topic, type=type, decode=decode, layout=layout)
@@ -275,7 +272,7 @@ class Recording:
         self.why_rejected.setdefault(topic, str(why))
 
     def _in_order(self, start_s: float, decoders: Sequence[_Decoders]) -> Iterator[Row]:
-        start_ns = self._start_ns + round(start_s * 1e9)
+        start_ns = self._start_ns + round(start_s * 1e9) if start_s else 0  # parts of damaged times matter too
         streams = [
             Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=self._read(source, own, start_ns))
             for source, own in zip(self._sources, decoders, strict=True)

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
 from server.judge.message import RosVersion
-from server.judge.topics import is_understood
+from server.judge.topics import fitness
 from server.recording.read.clock_steps import FIRST_NS, LAST_NS, Arrivals, Stretch
+from server.recording.read.errors import Undecodable
 from server.recording.read.unpack import PartTooLarge
 
 DefinitionFormat = Literal["none", "msg", "idl"]
@@ -149,14 +150,28 @@ class FileSource(Protocol):
     def close(self) -> None: ...
 
 
-def types_of_topics(sources: Sequence[FileSource], version: RosVersion) -> dict[str, str]:
-    """The type of which each topic's messages are read: the first, or of several one that a signal is read of."""
-    found: dict[str, str] = {}
-    for channel in (one for source in sources if source.ros_version == version for one in source.channels):
-        type, known = spelled(channel.type, version), found.get(channel.topic, "")
-        if type and (not known or is_understood(channel.topic, type) > is_understood(channel.topic, known)):
-            found[channel.topic] = type
-    return found
+def types_of_topics(
+    sources: Sequence[FileSource], version: RosVersion, decoder: Callable[[Channel, FileSource], object]
+) -> dict[str, str]:
+    """The type of which each topic's messages are read: of those with messages that can be decoded one that a signal is
+    read of, else the first. `decoder` raises Undecodable."""
+    found: dict[str, tuple[tuple[bool, bool, int], str]] = {}
+    for source in sources:
+        for channel in source.channels if source.ros_version == version else ():
+            type = spelled(channel.type, version)
+            can_decode = _can_decode(channel, source, decoder)
+            rank = can_decode and channel.count > 0, can_decode, fitness(channel.topic, type)
+            if type and (channel.topic not in found or rank > found[channel.topic][0]):
+                found[channel.topic] = rank, type
+    return {topic: type for topic, (_, type) in found.items()}
+
+
+def _can_decode(channel: Channel, source: FileSource, decoder: Callable[[Channel, FileSource], object]) -> bool:
+    try:
+        decoder(channel, source)
+    except Undecodable:
+        return False
+    return True
 
 
 def spelled(type: str, version: RosVersion) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import orjson
 import pytest
+from mcap.writer import Writer
 
 from tests.server.analysis.conftest import Checking
 from tests.server.recording.bags import Drive, write_ros2
@@ -34,7 +35,7 @@ RECORDINGS = {
     ),
     "a known topic of a type that cannot be read": (
         rows("/catvehicle/vel", STRING, {"data": "x"}),
-        "/catvehicle/vel has another type, std_msgs/String, which is not read as Speed",
+        r"/catvehicle/vel has another type, std_msgs/String, which is not read as Speed\.$",
     ),
 }
 
@@ -52,6 +53,23 @@ def test_nothing_judged_is_exit_2_and_said(check: Checking, tmp_path: Path, name
     assert "Nothing judged" in page
     assert "No alarms</b>" not in page
     assert re.search(why, ending.err)
+
+
+def test_known_topics_without_messages_beside_one_of_another_type(check: Checking, tmp_path: Path) -> None:
+    path = tmp_path / "drive.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2")
+        text = writer.register_schema(STRING, "ros2msg", b"string data")
+        written = writer.register_channel("/catvehicle/vel", "cdr", text)
+        number = writer.register_schema("sensor_msgs/msg/LaserScan", "ros2msg", b"")
+        writer.register_channel("/catvehicle/front_laser_points", "cdr", number)
+        for n in range(50):
+            writer.add_message(written, n * 10**8, b"\0\1\0\0\2\0\0\0x\0", n * 10**8)
+        writer.finish()  # type: ignore[no-untyped-call]
+    ending = check(path, "--json", "-")
+    assert ending.code == 2
+    assert "which is not read as Speed; the others have no message here." in ending.err
 
 
 def test_one_signal_is_enough_to_judge(check: Checking, tmp_path: Path) -> None:

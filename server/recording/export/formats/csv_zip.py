@@ -12,6 +12,7 @@ import tempfile
 import zipfile
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
+from itertools import chain, count
 from pathlib import Path
 from typing import IO, Any
 
@@ -183,8 +184,9 @@ def _settings_name(at_s: float, taken: Collection[str]) -> str:
     if not taken:
         return "settings.toml"
     time = when(at_s).replace(":", "")
-    name = f"settings from {time[:17]}Z.toml"
-    return name if name not in taken else f"settings from {time.removesuffix('Z')}Z.toml"
+    exact = time.removesuffix("Z")
+    names = chain((time[:17], exact), (f"{exact}-{number}" for number in count(2)))
+    return next(name for one in names if (name := f"settings from {one}Z.toml") not in taken)
 
 
 def _without_table(drive: DecodedDrive) -> list[str]:

@@ -193,6 +193,28 @@ def test_what_follows_the_end_is_named(tmp_path: Path, is_indexed: bool, other_t
     assert damage == [f"a.mcap goes on behind its end, as where two files were joined: {len(rest)} bytes are left out"]
 
 
+@pytest.mark.parametrize("is_chunked", [True, False])
+@pytest.mark.parametrize("is_indexed", [True, False])
+@pytest.mark.parametrize("other_times", [(1, 2, 3), (71, 72, 73)])
+def test_of_two_joined_files_no_message_is_missing_in_silence_wherever_the_first_is_cut(
+    tmp_path: Path, is_chunked: bool, is_indexed: bool, other_times: tuple[int, ...]
+) -> None:
+    variant = replace(PLAIN, messages=((0, 1), (0, 2), (0, 3)), chunking=is_chunked)
+    if is_indexed:
+        variant = replace(variant, indexes=frozenset(INDEXES), statistics=True, channels=True, schemas=True)
+    contents = []
+    for times in ((1, 2, 3), other_times):
+        write(tmp_path / "a.mcap", replace(variant, messages=tuple((0, time_ns) for time_ns in times)))
+        contents.append((tmp_path / "a.mcap").read_bytes())
+    first, second = contents
+    for size in range(len(MAGIC) + 1, len(first)):
+        (tmp_path / "a.mcap").write_bytes(first[:size] + second)
+        with contextlib.suppress(RecordingUnreadable), open_recording([tmp_path / "a.mcap"]) as recording:
+            times = [round(at_s * 1e9) for at_s, *_ in recording.rows()]
+            is_named = recording.damage or recording.notes or recording.rejected
+            assert is_named or times == sorted((1, 2, 3, *other_times)), size
+
+
 def scanned(*_: object, **__: object) -> object:
     raise AssertionError("all records were read")
 

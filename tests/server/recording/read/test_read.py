@@ -252,11 +252,11 @@ def test_a_db3_file_without_definitions_reads_standard_types(tmp_path: Path) -> 
 
 def test_a_topic_of_two_types_keeps_the_first(tmp_path: Path) -> None:
     one = write_ros1(tmp_path / "1.bag", Drive(messages=[(0.0, "/x", INT, {"data": 1})]))
-    two = write_ros1(tmp_path / "2.bag", Drive(messages=[(1.0, "/x", TEXT, {"data": "a"})]))
+    two = write_ros1(tmp_path / "2.bag", Drive(messages=[(1.0, "/x", "std_msgs/msg/UInt64", {"data": 2})]))
     with open_recording([one, two]) as recording:
         assert [m.message for m in recording.messages()] == [{"data": 1}]
         assert recording.notes == [
-            "/x (1 messages) is left out: it has the type std_msgs/String and also std_msgs/Int32"
+            "/x (1 messages) is left out: it has the type std_msgs/UInt64 and also std_msgs/Int32"
         ]
 
 
@@ -278,6 +278,76 @@ def test_a_topic_of_two_types_is_read_as_the_one_that_a_signal_has(
         assert recording.notes == [
             "/vel (1 messages) is left out: it has the type std_msgs/String and also geometry_msgs/Twist"
         ]
+
+
+STAMPED = "geometry_msgs/msg/TwistStamped"
+FOREIGN = "my_msgs/msg/A"
+
+
+@pytest.mark.parametrize(
+    ("other", "encoding", "count"),
+    [(STAMPED, "cdr", 0), (STAMPED, "protobuf", 1), (TEXT, "cdr", 1), (FOREIGN, "cdr", 1), (FOREIGN, "cdr", 0)],
+)
+@pytest.mark.parametrize("is_first", [True, False])
+def test_a_type_without_messages_that_can_be_decoded_hides_no_other(
+    tmp_path: Path, other: str, encoding: str, count: int, is_first: bool
+) -> None:
+    channels = [(other, encoding, [b"\0\1\0\0" + bytes(8)] * count), (TWIST, "cdr", [twist_of_3()])]
+    with open_recording([write_mcap(tmp_path / "a.mcap", channels if is_first else channels[::-1])]) as recording:
+        [message] = recording.messages()
+        assert (message.type, message.message["linear"]["x"]) == (TWIST, 3.0)
+        assert recording.topics["/vel"].count == 1
+        assert len(recording.notes) == count
+
+
+@pytest.mark.parametrize(("encoding", "count"), [("cdr", 0), ("protobuf", 1)])
+@pytest.mark.parametrize("is_first", [True, False])
+def test_a_speed_without_messages_that_can_be_decoded_hides_no_text(
+    tmp_path: Path, encoding: str, count: int, is_first: bool
+) -> None:
+    text = b"\0\1\0\0\2\0\0\0x\0"
+    channels = [(TEXT, "cdr", [text]), (TWIST, encoding, [twist_of_3()] * count)]
+    with open_recording([write_mcap(tmp_path / "a.mcap", channels if is_first else channels[::-1])]) as recording:
+        assert [(m.type, m.message) for m in recording.messages()] == [(TEXT, {"data": "x"})]
+        left_out = "/vel (1 messages) is left out: messages encoded as 'protobuf' are not supported"
+        assert recording.notes == [left_out] * count
+
+
+def test_a_type_that_a_chosen_topic_is_read_of_ranks_above_one_that_no_signal_has(tmp_path: Path) -> None:
+    float_type = "std_msgs/msg/Float64"
+    of_number = (float_type, "cdr", [b"\0\1\0\0" + np.float64(3.0).tobytes()])
+    channels = [(INT, "cdr", [b"\0\1\0\0" + bytes(4)]), of_number]
+    with open_recording([write_mcap(tmp_path / "a.mcap", channels, "/of/no/name")]) as recording:
+        assert [(m.type, m.message) for m in recording.messages()] == [(float_type, {"data": 3.0})]
+
+
+def test_a_type_without_a_definition_hides_no_other_that_no_signal_has(tmp_path: Path) -> None:
+    channels = [(FOREIGN, "cdr", [bytes(8)]), (INT, "cdr", [b"\0\1\0\0" + bytes(4)])]
+    with open_recording([write_mcap(tmp_path / "a.mcap", channels)]) as recording:
+        assert [(m.type, m.message) for m in recording.messages()] == [(INT, {"data": 0})]
+        assert len(recording.notes) == 1
+
+
+def twist_of_3() -> bytes:
+    return b"\0\1\0\0" + np.array([3.0, 0, 0, 0, 0, 0]).tobytes()
+
+
+def write_mcap(path: Path, channels: list[tuple[str, str, list[bytes]]], topic: str = "/vel") -> Path:
+    """A file with these channels of one topic: type, encoding, messages."""
+    definitions = {TWIST: b"Vector3 linear\nVector3 angular\n" + b"=" * 80 + b"\nMSG: geometry_msgs/Vector3\n"
+                   b"float64 x\nfloat64 y\nfloat64 z\n", TEXT: b"string data\n", INT: b"int32 data\n",
+                   FOREIGN: b"Missing one\n"}  # fmt: skip
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start(profile="ros2")
+        for number, (type, encoding, messages) in enumerate(channels):
+            schema = writer.register_schema(type, "ros2msg", definitions.get(type, b""))
+            channel = writer.register_channel(topic, encoding, schema)
+            time_ns = (BEGIN_S + number) * 10**9
+            for data in messages:
+                writer.add_message(channel, time_ns, data, time_ns)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
 
 
 def test_a_type_of_a_database_that_is_spelled_as_in_ros_1_is_read(tmp_path: Path) -> None:

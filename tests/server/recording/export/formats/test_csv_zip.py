@@ -189,9 +189,10 @@ def test_the_log_the_phone_and_the_settings_are_beside_them(tmp_path: Path) -> N
     assert "max_mps = 4.0" in text(tmp_path / "out.zip", "settings from 2023-11-14T221321Z.toml")
 
 
-def test_each_change_of_the_settings_is_there_also_one_that_returns_and_two_of_one_second(tmp_path: Path) -> None:
+def test_each_change_of_the_settings_is_there_also_one_that_returns_and_several_of_one_moment(tmp_path: Path) -> None:
     begin, stricter, strictest = round(BEGIN_S * NS), TOML + "# stricter\n", TOML + "# strictest\n"
     changes = [(0.0, TOML), (1.0, stricter), (1.5, strictest), (2.0, strictest), (3.0, TOML)]
+    changes += [(4.0, text) for text in (stricter, TOML, strictest, TOML)]
     own = [(begin + round(at_s * NS), "/catgraph/settings", {"version": 1, "toml": toml}) for at_s, toml in changes]
     export(made(tmp_path, ROWS, own), tmp_path / "out.zip")
     with zipfile.ZipFile(tmp_path / "out.zip") as packed:
@@ -201,6 +202,10 @@ def test_each_change_of_the_settings_is_there_also_one_that_returns_and_two_of_o
         "settings from 2023-11-14T221321Z.toml": stricter,
         "settings from 2023-11-14T221321.500000Z.toml": strictest,
         "settings from 2023-11-14T221323Z.toml": TOML,
+        "settings from 2023-11-14T221324Z.toml": stricter,
+        "settings from 2023-11-14T221324.000000Z.toml": TOML,
+        "settings from 2023-11-14T221324.000000-2Z.toml": strictest,
+        "settings from 2023-11-14T221324.000000-3Z.toml": TOML,
     }
 
 
