@@ -272,7 +272,8 @@ class Recording:
         self.why_rejected.setdefault(topic, str(why))
 
     def _in_order(self, start_s: float, decoders: Sequence[_Decoders]) -> Iterator[Row]:
-        start_ns = self._start_ns + round(start_s * 1e9) if start_s else 0  # parts of damaged times matter too
+        first_ns = min(self._start_ns, 0)  # parts with damaged times matter too
+        start_ns = self._start_ns + round(start_s * 1e9) if start_s else first_ns
         streams = [
             Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=self._read(source, own, start_ns))
             for source, own in zip(self._sources, decoders, strict=True)
