@@ -23,7 +23,8 @@ class CauseTable:
     missing messages; for a judged value it must be 0, because a returning danger must not be delayed.
 
     While its alarm is not announced, an inhibitor holds for its on-delay and `UNSEEN_S` at most: a condition that comes
-    and goes faster than the on-delay would hide all that it explains, and nobody would be informed of anything.
+    and goes faster than the on-delay would hide all that it explains, and nobody would be informed of anything. That
+    time begins anew only after a pause in which all that it explains could be announced.
     """
 
     def __init__(
@@ -40,6 +41,7 @@ class CauseTable:
         for alarm_id in inhibited_by:
             self._visit(alarm_id, inhibited_by, ())
         self.inhibitors = frozenset(name for names in self._closure.values() for name in names)
+        self._over_s = self._pauses()
         self._gone_at_s: dict[str, float | None] = {}  # when each inhibitor's condition went; None: it is there
         self._unseen_s: dict[str, float | None] = {}  # since when each holds unannounced; None: it is announced
         self._held: frozenset[str] = frozenset()  # the inhibitors that hold at `_held_s`
@@ -65,7 +67,7 @@ class CauseTable:
             self._unseen_s[alarm.id] = None
             return
         gone_at_s = self._gone_at_s.get(alarm.id, -math.inf)
-        is_over = gone_at_s is not None and not 0.0 <= now_s - gone_at_s < UNSEEN_S
+        is_over = gone_at_s is not None and not 0.0 <= now_s - gone_at_s < self._over_s[alarm.id]
         if unseen_s is None or unseen_s > now_s or (alarm.condition and is_over):
             self._unseen_s[alarm.id] = now_s
 
@@ -83,6 +85,15 @@ class CauseTable:
         self._gone_at_s.clear()
         self._unseen_s.clear()
         self._held_s = None
+
+    def _pauses(self) -> dict[str, float]:
+        """How long the condition of each inhibitor must be absent until it is over: a shorter time could be used up by
+        its grace, or end the on-delay of what it explains again and again."""
+        longest = dict.fromkeys(self.inhibitors, 0.0)
+        for alarm_id, names in self._closure.items():
+            for name in names:
+                longest[name] = max(longest[name], self._on_delay_s.get(alarm_id, 0.0))
+        return {name: UNSEEN_S + self._grace_s.get(name, 0.0) + delay_s for name, delay_s in longest.items()}
 
     def _holds(self, name: str, now_s: float) -> bool:
         gone_at_s, unseen_s = self._gone_at_s[name], self._unseen_s[name]

@@ -92,9 +92,22 @@ def test_a_condition_that_comes_and_goes_unannounced_explains_for_a_bounded_time
     table.note(LOST, 60.0)  # it is announced: what it explains is hidden for as long as it stands
     assert table.holding("stale", 99.0) == ("lost",)
     table.note(GONE, 100.0)
-    table.note(GONE, 100.0 + UNSEEN_S)
-    table.note(WAITS, 100.0 + UNSEEN_S)
-    assert table.holding("stale", 100.0 + UNSEEN_S) == ("lost",), "it was over: it begins anew"
+    over_s = 100.0 + UNSEEN_S + GRACE_S
+    table.note(GONE, over_s)
+    table.note(WAITS, over_s)
+    assert table.holding("stale", over_s) == ("lost",), "it was over: it begins anew"
+
+
+@pytest.mark.parametrize("off_s", [3.0, 3.5, 6.0, 8.0, 10.9, 11.0, 15.0])
+def test_a_pause_frees_all_that_it_explains_for_the_longest_delay_or_does_not_count(off_s: float) -> None:
+    table = CauseTable(TABLE, GRACES, {"lost": 1.0, "slow": 5.0})
+    free_s = longest_s = 0.0
+    for tenth in range(1_000):
+        at_s = tenth / 10
+        table.note(WAITS if at_s % (0.8 + off_s) < 0.8 else GONE, at_s)
+        free_s = 0.0 if table.holding("slow", at_s) else free_s + 0.1
+        longest_s = max(longest_s, free_s)
+    assert longest_s > 5.0
 
 
 def test_what_is_explained_itself_explains_for_as_long() -> None:
