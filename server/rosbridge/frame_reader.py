@@ -30,7 +30,13 @@ _TAIL = re.compile(
     rb"[ \t\r\n]*+(\d{1,9}(?:\.\d{0,30})?)[ \t\r\n]*+\}[ \t\r\n]*+\Z"
 )
 _TAIL_BYTES = 200
-MOST_UNDER_WAY = 4  # messages: each of them may take the memory of the largest
+MOST_UNDER_WAY = 64  # messages
+_MOST_LARGEST = 4  # so many messages of the largest size fit into the memory for all of them
+MOST_DOUBTFUL = 8  # messages of one topic in a row
+_MOST_UNENDED = 1_000  # kinds of messages, by id and total, whose last fragments have not come: a few bytes each
+
+
+_Key = tuple[bytes, bytes]  # id and total, as they are written
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +55,35 @@ class _Assembly:
     size: int = 0  # bytes of its fragments so far, as they are escaped
     pieces: list[bytes] = field(default_factory=list)
     is_skipped: bool = False  # it is too large
-    is_doubtful: bool = False  # the same one began before it and did not end: its fragments may be of either
+    is_doubtful: bool = False  # one of the same id and total had not ended when it began: fragments may be of either
+
+    @property
+    def kept_bytes(self) -> int:
+        return 0 if self.is_skipped else self.size
+
+
+@dataclass(slots=True)
+class _Unended:
+    """Messages of one id and total whose last fragments have not come."""
+
+    count: int = 0
+    doubtful: int = 0  # that began while another was unended, since the first of these
+    topic: str | None = None  # of all of them; None: not known, or they differ
+
+    def begin(self, topic: str | None) -> bool:
+        """Whether others are unended. A bridge sends the messages of a topic one after another, except for one of a
+        subscription that ends: if many in a row are of one topic, the first have ended, and a last fragment was
+        lost."""
+        if self.count == 0:
+            self.topic = topic
+        elif topic != self.topic:
+            self.topic = None
+        elif topic is not None and self.doubtful >= MOST_DOUBTFUL:
+            self.count = self.doubtful = 0
+        self.count += 1
+        if self.count > 1:
+            self.doubtful += 1
+        return self.count > 1
 
 
 @dataclass(slots=True)
@@ -57,11 +91,13 @@ class Fragments:
     """Assembles fragmented messages of a bridge, within bounds.
 
     Of one connection. A bridge sends from several threads: the fragments of several messages come in turn, all with the
-    id 0. Their `total` tells them apart, because it holds the length of the whole.
+    id 0. Their `total` tells them apart where it holds the length of the whole. Messages that it does not tell apart
+    are refused until as many last fragments have come as first ones: then nothing of them is still to come.
     """
 
     most_bytes: int
-    _under_way: dict[tuple[bytes, bytes], _Assembly] = field(default_factory=dict)  # by id and total, the oldest first
+    _under_way: dict[_Key, _Assembly] = field(default_factory=dict)  # that which was continued last is the last
+    _unended: dict[_Key, _Unended] = field(default_factory=dict)
 
     def add(self, payload: bytes) -> bytes | TooLarge | None:
         """The whole message with its last piece, once a TooLarge of one beyond the bound, else None. Raises
@@ -70,25 +106,44 @@ class Fragments:
         if head is None or tail is None or tail.start() < head.end():
             raise Unreadable("a fragment without a valid header")
         data, key, number, total = payload[head.end() : tail.start()], (head[1], tail[2]), int(tail[1]), float(tail[2])
-        before = self._under_way.get(key)
+        one = self._under_way.pop(key, None)
         if number == 0:
-            self._under_way.pop(key, None)
-            one = self._under_way[key] = _Assembly(is_doubtful=before is not None)
-        elif before is None or number != before.next:
-            self._under_way.pop(key, None)
+            one = _Assembly(is_doubtful=self._begin(key, data))
+        if number + 1 >= int(total):
+            self._end(key)
+        if one is None or number != one.next:
             raise Unreadable("a fragment that does not fit the one before")
-        else:
-            one = before
         found = self._added(one, data, total)
-        if one.next >= int(total):
-            del self._under_way[key]
-            if one.is_doubtful:
-                raise Unreadable("fragments of two messages that cannot be told apart")
-            return found if one.is_skipped else _unescaped(b"".join(one.pieces))
-        if len(self._under_way) > MOST_UNDER_WAY:
+        if one.next < int(total):
+            self._under_way[key] = one
+            self._bound()
+            return found
+        if one.is_doubtful:
+            raise Unreadable("fragments of two messages that cannot be told apart")
+        return found if one.is_skipped else _unescaped(b"".join(one.pieces))
+
+    def _begin(self, key: _Key, data: bytes) -> bool:
+        """Counts a first fragment; whether another message of this id and total is unended."""
+        is_doubtful = self._unended.setdefault(key, _Unended()).begin(_topic(data))
+        if len(self._unended) > _MOST_UNENDED:
+            del self._unended[next(iter(self._unended))]
+        return is_doubtful
+
+    def _end(self, key: _Key) -> None:
+        """Counts a last fragment, of whichever of them."""
+        unended = self._unended.get(key)
+        if unended is None:
+            return
+        unended.count -= 1
+        if unended.count == 0:
+            del self._unended[key]
+
+    def _bound(self) -> None:
+        """Gives up the message that was not continued for the longest if there are too many, or too many bytes."""
+        kept_bytes = sum(one.kept_bytes for one in self._under_way.values())
+        if len(self._under_way) > MOST_UNDER_WAY or kept_bytes > _MOST_LARGEST * self.most_bytes:
             del self._under_way[next(iter(self._under_way))]
             raise Unreadable("fragments of a message that did not end")
-        return found
 
     def _added(self, one: _Assembly, data: bytes, total: float) -> TooLarge | None:
         """Takes a fragment; a TooLarge once, where the message is beyond the bound."""
