@@ -166,6 +166,11 @@ def options(limits: Limits) -> dict[str, Any]:
     }
 
 
+def has_two_lengths(headers: Iterable[tuple[bytes, bytes]]) -> bool:
+    """Whether a request states the length of its body in two ways."""
+    return {b"content-length", b"transfer-encoding"} <= {name for name, _ in headers}
+
+
 class PageRequests(H11Protocol):
     """One connection."""
 
@@ -204,8 +209,8 @@ class PageRequests(H11Protocol):
                 self._await_head()
         else:
             self._head_came()
-            request, names = self._request(), {name for name, _ in self.headers or ()}
-            if request is not None and {b"content-length", b"transfer-encoding"} <= names:
+            request = self._request()
+            if request is not None and has_two_lengths(self.headers or ()):
                 request.keep_alive = False  # a proxy may have read another end of it (RFC 9112, 6.1)
 
     def send_400_response(self, msg: str) -> None:
