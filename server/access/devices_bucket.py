@@ -48,6 +48,7 @@ class DevicesBucket:
         """Nothing is left behind."""
 
     async def start(self, client: Client) -> None:
+        await self.stop()
         self._task = asyncio.create_task(self._run(client), name="shared devices")
 
     async def stop(self) -> None:

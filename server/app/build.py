@@ -176,7 +176,7 @@ def _fleet(
     from server.bus.nats_bus import NatsBus
     from server.bus.nats_http_agent import HttpAgent
     from server.bus.nats_http_node import HttpNode
-    from server.bus.nats_link import BrokerLink
+    from server.bus.nats_link import SPARES, BrokerLink
     from server.web.known_vehicles import KnownVehicles
     from server.web.remote_frames import RemoteFrames, event
 
@@ -197,7 +197,8 @@ def _fleet(
     agent = NatsAgent(bus, run=boot, now=now, admit=orders.admit, on_late=late.note)
     kept = HttpAgent(lambda: bus.vehicles, at_agent, scope_of, now=now)
     name = f"catgraph agent {' '.join(v.name for v in config.vehicles)}"
-    return bus, BrokerLink(config.broker, agent, kept, name=name, unsent=lambda: agent.unsent), None
+    link = BrokerLink(config.broker, agent, kept, name=name, unsent=lambda: agent.unsent, spares=SPARES)
+    return bus, link, None
 
 
 def _replays(

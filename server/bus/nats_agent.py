@@ -31,7 +31,6 @@ MOST_REQUESTS = 64  # requests at once; a flood is refused
 Admit = Callable[[str, Mapping[str, Any]], Awaitable[Mapping[str, Any]]]  # of vehicle, message; raises NotAdmitted
 Late = Callable[[str, Mapping[str, Any], str], None]  # of vehicle, command, and why it is late, as a sentence
 LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
-LOOKS_EVERY_S = 0.1  # whether the broker is there again
 FILTERS = frozenset({"before", "alarm", "change", "since_ms", "until_ms"})
 
 
@@ -41,11 +40,6 @@ async def as_it_is(vehicle: str, message: Mapping[str, Any]) -> Mapping[str, Any
 
 def unnoted(vehicle: str, command: Mapping[str, Any], why: str) -> None:
     """Nothing."""
-
-
-def _connections(before: int, client: Client | None) -> int:
-    """How many connections to the broker there were with those of this client."""
-    return before + (0 if client is None else 1 + client.stats["reconnects"])
 
 
 class Looked:
@@ -101,7 +95,8 @@ class NatsAgent:
         self._now = now
         self._looked: dict[tuple[str, str], Looked] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        self._pulls = self._requests = self._former_connections = 0  # the last: of clients before this one
+        self._pulls = self._requests = 0
+        self._connection = 0  # how many there were to the broker
         self._published: dict[str, int] = {}  # the number of each vehicle's newest event that was published
         self._stops: list[Callable[[], None]] = []
         self._subscriptions: list[Subscription] = []
@@ -116,15 +111,20 @@ class NatsAgent:
 
     async def start(self, client: Client) -> None:
         """From now on nodes are answered by this client, until `stop`."""
-        self._former_connections = _connections(self._former_connections, self._client)
+        if not self._published:
+            for vehicle in self._bus.vehicles:
+                self._published[vehicle] = self._bus.last_event(vehicle)
+                watched = self._bus.watch_events(vehicle, lambda name: self._spawn(self._publish_events(name)))
+                self._stops.append(watched)
+            self._spawn(self._be_here())
         self._client = client
-        for vehicle in self._bus.vehicles:
-            self._published[vehicle] = self._bus.last_event(vehicle)
+        self._connection += 1
+        self._subscriptions.clear()  # of the client before
+        for vehicle in self._published:
             for what, answer in (("pull.*", self._on_pull), ("ask", self._on_ask)):
                 self._subscriptions.append(await client.subscribe(wire.subject(vehicle, what), cb=answer))
-            self._stops.append(self._bus.watch_events(vehicle, lambda name: self._spawn(self._publish_events(name))))
-        await processed(client)  # from now on requests arrive
-        self._spawn(self._be_here())
+        # In one packet with the subscriptions: the broker has them before a node can answer this.
+        await self._announce()
 
     async def stop(self) -> None:
         client = self._client
@@ -134,6 +134,7 @@ class NatsAgent:
             if client is not None:
                 await processed(client, within_s=1)  # from now on no request arrives
         self._subscriptions.clear()
+        self._published.clear()
         while self._stops:
             self._stops.pop()()
         for task in self._tasks:
@@ -203,27 +204,19 @@ class NatsAgent:
             self._published[vehicle] = events[-1]["n"]
             await self._publish(vehicle, "events", wire.Events(run=self._run, events=events))
 
+    async def _announce(self) -> None:
+        for vehicle in self._published:
+            last = self._bus.last_event(vehicle)
+            here = wire.Here(run=self._run, last=last, resumes=True, connection=self._connection)
+            await self._publish(vehicle, "here", here)
+
     async def _be_here(self) -> None:
         while True:
-            for vehicle in self._published:
-                last, number = self._bus.last_event(vehicle), _connections(self._former_connections, self._client)
-                here = wire.Here(run=self._run, last=last, resumes=True, connection=number)
-                await self._publish(vehicle, "here", here)
+            await asyncio.sleep(wire.HERE_EVERY_S)
+            await self._announce()
             now_s = self._now()
             for key in [key for key, looked in self._looked.items() if looked.until_s < now_s]:
                 self._looked.pop(key).close()
-            await self._here_is_due()
-
-    async def _here_is_due(self) -> None:
-        """In a second, or as soon as the broker is there again: nodes request frames then, and not only once the
-        requests that were lost have ended."""
-        until_s, was_connected = self._now() + wire.HERE_EVERY_S, True
-        while (left_s := until_s - self._now()) > 0:
-            is_connected = self._client is not None and self._client.is_connected
-            if is_connected and not was_connected:
-                return
-            was_connected = is_connected
-            await asyncio.sleep(left_s if is_connected else min(left_s, LOOKS_EVERY_S))
 
     # -- requests ------------------------------------------------------------------------------------------------------
 

@@ -15,7 +15,6 @@ from nats.errors import Error as NatsError
 
 from server.bus import nats_http as http
 from server.bus import nats_wire as wire
-from server.bus.nats_link import processed
 
 log = logging.getLogger("catgraph.bus")
 
@@ -148,12 +147,13 @@ class HttpAgent:
         """Nothing."""
 
     async def start(self, client: Client) -> None:
+        if self._client is None:
+            self._spawn(self._give_up_unasked())
         self._client = client
+        self._subscriptions.clear()  # of the client before
         for vehicle in self._vehicles():
             subject = wire.subject(vehicle, "http.*")
             self._subscriptions.append(await client.subscribe(subject, cb=self._on_message))
-        await processed(client)
-        self._spawn(self._give_up_unasked())
 
     async def stop(self) -> None:
         with contextlib.suppress(NatsError, TimeoutError):  # without a broker nothing is routed to it
@@ -164,6 +164,7 @@ class HttpAgent:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._answering.clear()
+        self._client = None
 
     def _spawn(self, work: Any) -> asyncio.Task[None]:
         task = asyncio.create_task(work)

@@ -16,13 +16,20 @@ from nats.aio.client import Client
 
 from server.bus import nats_wire as wire
 from server.bus.broker import Broker, BrokerRefused
+from server.bus.nats_spares import Spares
 
 log = logging.getLogger("catgraph.bus")
 
-RETRY_S = 1
+SPARES = 2  # of an agent, which a radio may be before
+RETRY_S = 1.0
 AGAIN_S = 0.3  # between two dials of a broker that was lost: behind a gap of the radio pages wait for it
 CONNECTS_WITHIN_S = 3
-PING_EVERY_S = 2  # a broker that has not answered two of them is gone: after 4 to 6 s
+PING_EVERY_S = 2.0
+PING_ANSWERED_WITHIN_S = 4  # else the broker is gone
+SILENT_S = 1 << 30  # clients send no pings of their own: of a spare one none is to be under way when the radio is lost
+LOOKS_EVERY_S = 0.1  # whether the connection is lost: the callbacks of a client come only once its socket is closed
+ANSWERS_WITHIN_S = 1.5  # a connection that was taken, where there is another one
+ANSWERS_AT_LAST_S = 10
 LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
 MOST_REFUSED = 20  # subjects that are named
 NO_RIGHT = "permissions violation"  # as a broker words it; the connection stays
@@ -38,32 +45,36 @@ class Part(Protocol):
         """No connection is tried any more."""
 
     async def start(self, client: Client) -> None:
-        """Begin by a client that is connected. Raises the client's errors and TimeoutError."""
+        """Begin by a client that is connected, or go on by it: the one before is closed. Raises the client's errors and
+        TimeoutError."""
 
     async def stop(self) -> None:
-        """End; it may be started again with another client."""
+        """End."""
 
 
 class BrokerLink:
-    """Connects, and connects again, until it is stopped; its parts work whenever there is a connection.
-
-    The client connects again by itself where the network or the broker was lost. Where the broker sends it away, as
-    after its key was withdrawn, the client ends for good: then another one takes its place.
-    """
+    """Connects, and connects again, until it is stopped; its parts work whenever there is a connection."""
 
     def __init__(
-        self, broker: Broker, *parts: Part, name: str, unsent: Callable[[], str | None] = lambda: None
+        self,
+        broker: Broker,
+        *parts: Part,
+        name: str,
+        unsent: Callable[[], str | None] = lambda: None,
+        spares: int = 0,
     ) -> None:
         """`name`: of this program in the broker's own lists; `unsent`: what was too large for the broker, as a
-        sentence. Raises BrokerRefused."""
+        sentence; `spares`: connections that are idle until the one that works is lost. Raises BrokerRefused."""
         self._broker = broker
         self._unsent = unsent
         self._parts = parts
         self._name = name
         self._seed = _seed(broker.key)
         self._context = _context(broker)
+        self._spares = Spares(self._dial, broker.address, spares)
         self._client: Client | None = None
-        self._task: asyncio.Task[None] | None = None
+        self._pinging: asyncio.Task[None] | None = None  # by that client
+        self._tasks: list[asyncio.Task[None]] = []
         self._is_started = False
         self._why = "it was not reached yet"
         self._logged: tuple[str, float] = ("", 0.0)
@@ -75,7 +86,7 @@ class BrokerLink:
 
         Nothing else shows it: subscriptions deliver nothing, and what is published does not arrive.
         """
-        if not self._refused:
+        if not self._refused or not self._is_connected:
             return None
         what = "; ".join(self._refused)
         return f"The broker {self._broker.address} refuses a part of what this program needs: {what}."
@@ -88,71 +99,109 @@ class BrokerLink:
     @property
     def complaint(self) -> str | None:
         """Why there is no connection, as a sentence; None: there is one."""
-        if self._is_started and self._client is not None and self._client.is_connected:
+        if self._is_started and self._is_connected:
             return None
         return f"The broker {self._broker.address} is not connected: {self._why}."
+
+    @property
+    def _is_connected(self) -> bool:
+        return self._client is not None and self._client.is_connected
 
     def start(self) -> None:
         """Begin to connect, in the background, because everything else works without a broker."""
         for part in self._parts:
             part.open()
-        self._task = asyncio.create_task(self._run(), name="broker link")
+        self._tasks = [
+            asyncio.create_task(self._run(), name="broker link"),
+            asyncio.create_task(self._spares.run(), name="spare connections"),
+        ]
 
     async def stop(self) -> None:
-        if self._task is None:
+        if not self._tasks:
             return
         for part in self._parts:
             part.close()
-        self._task.cancel()
-        await asyncio.gather(self._task, return_exceptions=True)
-        self._task = None
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._tasks = []
+        self._is_started = False
+        for part in self._parts:
+            await part.stop()
+        await self._give_up()
+        await self._spares.close()
 
     async def _run(self) -> None:
         while True:
-            client, ended = Client(), asyncio.Event()
-            self._client = client
+            self._client = client = await self._spares.take()
+            self._refused.clear()  # its rights may be others
             try:
-                await self._connect(client, ended)
-                _check_size(client)
                 for part in self._parts:
                     await part.start(client)
+                await self._answers(client)
                 self._is_started = True
                 log.info("broker_connected address=%s", self._broker.address)
-                await ended.wait()
+                self._pinging = asyncio.create_task(_ping(client), name="ping the broker")
+                while client.is_connected and not self._pinging.done():
+                    await asyncio.wait({self._pinging}, timeout=LOOKS_EVERY_S)
+                if client.is_connected:
+                    await self._on_error(TimeoutError("it does not answer"))
+            except TimeoutError as why:
+                await self._on_error(why)
             except Exception as why:  # whatever it was: without a link a car would be lost for good
                 await self._on_error(why)
-            finally:
-                self._is_started = False
-                self._refused.clear()
-                for part in self._parts:
-                    await part.stop()
-                with contextlib.suppress(Exception):  # a client that never connected cannot be closed
-                    await client.close()
-            await asyncio.sleep(RETRY_S)
+                if client.is_connected:
+                    await asyncio.sleep(RETRY_S)
+            self._is_started = False
+            await self._give_up()
 
-    async def _connect(self, client: Client, ended: asyncio.Event) -> None:
-        async def on_ended() -> None:
-            ended.set()
+    async def _give_up(self) -> None:
+        """Nothing comes by this client any more: what the next one is to answer must not be answered twice."""
+        if self._client is not None:
+            await self._spares.give_up(self._client)
+        if self._pinging is not None:
+            self._pinging.cancel()
+            self._pinging = None
 
-        async def on_lost() -> None:
-            self._refused.clear()  # by the next connection its rights may be others
+    async def _answers(self, client: Client) -> None:
+        """Return once the broker has processed the subscriptions. Raises TimeoutError, early where there is another
+        connection to take."""
+        await asyncio.sleep(0)  # its writing task is first: the PING would go ahead of them, and might be lost
+        self._pinging = asyncio.create_task(client.flush(timeout=ANSWERS_AT_LAST_S))
+        now = asyncio.get_running_loop().time
+        began_s = now()
+        while not self._pinging.done():
+            await asyncio.wait({self._pinging}, timeout=LOOKS_EVERY_S)
+            is_late = now() - began_s >= ANSWERS_WITHIN_S and self._spares.is_any
+            if not self._pinging.done() and (is_late or not client.is_connected):
+                raise TimeoutError("it does not answer")
+        self._pinging.result()
 
-        await client.connect(
-            self._broker.address,
-            name=self._name,
-            error_cb=self._on_error,
-            closed_cb=on_ended,
-            disconnected_cb=on_lost,
-            nkeys_seed_str=self._seed,
-            tls=self._context,
-            inbox_prefix=f"_INBOX.{secrets.token_hex(8)}",
-            connect_timeout=CONNECTS_WITHIN_S,
-            ping_interval=PING_EVERY_S,
-            max_outstanding_pings=2,
-            reconnect_time_wait=AGAIN_S,  # type: ignore[arg-type]
-            max_reconnect_attempts=-1,
-            pending_size=0,  # what cannot be sent now is not kept: it would come late
-        )
+    async def _dial(self) -> Client:
+        """A new connection. Raises what went wrong, once it was reported."""
+        client = Client()
+        try:
+            await client.connect(
+                self._broker.address,
+                name=self._name,
+                error_cb=self._on_error,
+                nkeys_seed_str=self._seed,
+                tls=self._context,
+                inbox_prefix=f"_INBOX.{secrets.token_hex(8)}",
+                connect_timeout=CONNECTS_WITHIN_S,
+                ping_interval=SILENT_S,
+                allow_reconnect=False,  # it would subscribe again by itself, beside a spare that was taken
+                reconnect_time_wait=AGAIN_S,  # type: ignore[arg-type]
+                max_reconnect_attempts=-1,  # of its first connection
+                pending_size=0,  # what cannot be sent now is not kept: it would come late
+            )
+            _check_size(client)
+        except BaseException as why:
+            await self._spares.give_up(client)
+            if isinstance(why, Exception):
+                await self._on_error(why)
+            raise
+        return client
 
     async def _on_error(self, why: Exception) -> None:
         self._why = _reason(why)
@@ -163,6 +212,15 @@ class BrokerLink:
         if self._why != logged or now_s - at_s > LOG_AGAIN_S:
             self._logged = (self._why, now_s)
             log.warning("broker_error address=%s why=%s", self._broker.address, self._why)
+
+
+async def _ping(client: Client) -> None:
+    """Return once the broker has not answered. Not to be cancelled while the client is used: it cannot take the answer
+    to a ping that nobody waits for."""
+    with contextlib.suppress(Exception):  # whatever it was: the client has ended
+        while True:
+            await client.flush(timeout=PING_ANSWERED_WITHIN_S)
+            await asyncio.sleep(PING_EVERY_S)
 
 
 def _check_size(client: Client) -> None:

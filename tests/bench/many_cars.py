@@ -26,7 +26,7 @@ from server.bus.bus import ALL, SUMMARY
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.bus.nats_agent import NatsAgent
-from server.bus.nats_link import BrokerLink
+from server.bus.nats_link import SPARES, BrokerLink
 from tests.bench.orders import execute_orders, options
 
 CONNECTS_WITHIN_S = 30.0
@@ -87,7 +87,7 @@ class OneCar:
         self._bus = LocalBus(Journal(None), now=time.monotonic)
         self._bus.serve(name, self._answer)
         agent = NatsAgent(self._bus, run=secrets.token_hex(8), now=time.monotonic)
-        self.link = BrokerLink(Broker(address=address), agent, name=name)
+        self.link = BrokerLink(Broker(address=address), agent, name=name, spares=SPARES)
 
     async def drive(self) -> None:
         """Plays for ever, from a moment of its own."""

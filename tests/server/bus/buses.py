@@ -12,6 +12,7 @@ from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus, Read, as_it_is
+from server.bus.nats_link import processed
 from tests.server.bus.broker import connected
 
 SOON_S = 15.0  # on two busy cores
@@ -78,6 +79,7 @@ async def offering(bus: LocalBus, address: str, run: str, clock: Clock) -> Async
     async with connected(address) as client:
         agent = NatsAgent(bus, run=run, now=clock)
         await agent.start(client)
+        await processed(client)
         try:
             yield agent
         finally:

@@ -22,7 +22,7 @@ from server.bus.broker_users import FleetRefused
 from server.bus.bus import NotServed
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus
-from server.bus.nats_link import BrokerLink, processed
+from server.bus.nats_link import SPARES, BrokerLink, processed
 from tests.server.bus.broker import PINNED, Broker, check_pinned, nats_server, running_broker
 from tests.server.bus.buses import local_buses, until
 from tests.server.mail.post import certificates
@@ -131,7 +131,8 @@ async def test_an_empty_list_lets_nobody_in(tmp_path: Path) -> None:
 
 @contextlib.asynccontextmanager
 async def linked(part: NatsAgent | NatsBus, broker: Broker, key: Path) -> AsyncIterator[BrokerLink]:
-    link = BrokerLink(BrokerAddress(address=broker.address, key=key), part, name="test")
+    spares = SPARES if isinstance(part, NatsAgent) else 0
+    link = BrokerLink(BrokerAddress(address=broker.address, key=key), part, name="test", spares=spares)
     link.start()
     try:
         yield link
@@ -217,7 +218,7 @@ async def test_what_the_broker_refuses_is_reported_while_connected(tmp_path: Pat
             assert link.refused.startswith(f"The broker {broker.address} refuses a part of what this program needs: ")
             assert "veh.margay.ask" in link.refused
             assert "veh.ocelot" not in link.refused
-            assert link.complaint is None
+            await until(lambda: link.complaint is None)
             broker_users.write(tmp_path, [])
             broker.reload()
             await until(lambda: link.complaint)

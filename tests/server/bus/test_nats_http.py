@@ -72,6 +72,7 @@ async def both(app: App) -> AsyncIterator[tuple[HttpNode, HttpAgent, Client]]:
         agent = HttpAgent(lambda: ("ocelot",), app, scope_of, now=now)
         node = HttpNode(lambda _: None, now=now)
         await agent.start(there)
+        await processed(there)
         await node.start(here)
         try:
             yield node, agent, here

@@ -80,14 +80,16 @@ async def test_once_a_radio_is_fast_again_one_state_is_requested_at_a_time() -> 
     now = asyncio.get_running_loop().time
     began_s = now()
     under_way = 0
-    most = {True: 0, False: 0}  # while it is slow, and a second later
+    most = {True: 0, False: 0}  # while it is slow, and two seconds later
+    requests = 0  # two seconds later
 
     async def request(subject: str, body: bytes, timeout: float) -> Any:
-        nonlocal under_way
+        nonlocal under_way, requests
         under_way += 1
         is_slow = now() < began_s + 3
         if is_slow or now() > began_s + 5:
             most[is_slow] = max(most[is_slow], under_way)
+            requests += not is_slow
         await asyncio.sleep(0.5 if is_slow else 0.02)
         under_way -= 1
         return SimpleNamespace(data=wire.encode_frame(wire.FrameHead(run="a", number=round(1000 * now()), now_s=1.0)))
@@ -100,6 +102,7 @@ async def test_once_a_radio_is_fast_again_one_state_is_requested_at_a_time() -> 
     await pulls.stop()
     assert most[True] > 1
     assert most[False] == 1
+    assert requests >= 0.9 * 3 / 0.02, "the next one follows each answer at once"
 
 
 async def test_a_late_answer_of_a_run_that_has_ended_is_left_out() -> None:
@@ -223,26 +226,6 @@ async def test_behind_a_gap_only_the_newest_connection_of_an_agent_counts() -> N
     await bus.stop()
 
 
-async def test_an_agent_announces_itself_as_soon_as_the_broker_is_there_again() -> None:
-    sent: list[str] = []
-
-    async def publish(subject: str, body: bytes) -> None:
-        sent.append(subject)
-
-    client = SimpleNamespace(publish=publish, is_connected=False, stats={"reconnects": 0})
-    clock = Clock()
-    async with local_buses() as both:
-        agent = NatsAgent(both.session, run="a", now=clock)
-        agent._client, agent._published = cast(Client, client), {"ocelot": 0}
-        announcing = asyncio.create_task(agent._be_here())
-        await asyncio.sleep(0.02)
-        began_s = clock()
-        client.is_connected = True
-        await until(lambda: sent)
-        assert clock() - began_s < wire.HERE_EVERY_S / 2
-        announcing.cancel()
-
-
 async def test_each_connection_of_an_agent_has_a_higher_number() -> None:
     sent: list[wire.Here] = []
 
@@ -254,14 +237,13 @@ async def test_each_connection_of_an_agent_has_a_higher_number() -> None:
 
     async with local_buses() as both:
         agent = NatsAgent(both.session, run="a", now=Clock())
-        for reconnects in (0, 2, 0):  # of one client after the other
-            stats = {"reconnects": reconnects}
-            client = SimpleNamespace(publish=publish, subscribe=nothing, flush=nothing, is_connected=True, stats=stats)
-            before = len(sent)
+        for is_stopped in (False, True, False):
+            client = SimpleNamespace(publish=publish, subscribe=nothing, flush=nothing, is_connected=True)
             await agent.start(cast(Client, client))
-            await until(lambda: len(sent) > before)  # noqa: B023
-            await agent.stop()
-    assert sorted({here.connection for here in sent}) == [1, 4, 5]
+            if is_stopped:
+                await agent.stop()
+        await agent.stop()
+    assert [here.connection for here in sent] == [1, 1, 2, 2, 3, 3]
 
 
 async def test_an_agent_compresses_a_frame_only_for_a_node_that_inflates_it() -> None:
