@@ -40,7 +40,8 @@ class Spares:
         at = urlsplit(address)
         self._host, self._port = at.hostname or "", at.port or PORT
         self._idle: list[Client] = []  # the one that was silent for longest comes first
-        self._dials: set[asyncio.Task[None]] = set()  # and those that settle, or are pinged
+        self._dials: set[asyncio.Task[None]] = set()
+        self._settling: set[asyncio.Task[None]] = set()  # new ones, and one that is pinged
         self._closing: set[asyncio.Task[None]] = set()
         self._is_needed = False  # there is no connection to work by
         self._changed, self._dialled, self._reached = asyncio.Event(), asyncio.Event(), asyncio.Event()
@@ -56,13 +57,14 @@ class Spares:
             while True:
                 self._changed.clear()
                 self._forget_ended()
-                self._begin(self._count + self._is_needed - len(self._idle) - len(self._dials))
+                there = len(self._idle) + (0 if self._is_needed else len(self._settling))
+                self._begin(self._count + self._is_needed - there - len(self._dials))
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(KEEP_EVERY_S):
                         await self._changed.wait()
                     continue
                 if self._idle and not self._is_needed:  # while its ping is under way another one is given
-                    self._spawn(self._put_last(self._idle.pop(0)))
+                    self._spawn(self._put_last(self._idle.pop(0)), self._settling)
         finally:
             await _cancel(self._dials)
 
@@ -89,12 +91,12 @@ class Spares:
 
     def _begin(self, dials: int) -> None:
         for _ in range(min(dials, MOST_DIALS - len(self._dials))):
-            self._spawn(self._add())
+            self._spawn(self._add(), self._dials)
 
-    def _spawn(self, work: Coroutine[Any, Any, None]) -> None:
+    def _spawn(self, work: Coroutine[Any, Any, None], among: set[asyncio.Task[None]]) -> None:
         task = asyncio.create_task(work, name="spare connection")
-        self._dials.add(task)
-        task.add_done_callback(self._dials.discard)
+        among.add(task)
+        task.add_done_callback(among.discard)
         task.add_done_callback(lambda _: self._changed.set())
 
     async def _add(self) -> None:
@@ -107,7 +109,7 @@ class Spares:
         if self._is_needed and not self._dialled.is_set():
             self._idle.insert(0, one)
             return self._dialled.set()
-        return await self._put_last(one, SETTLES_S)
+        return self._spawn(self._put_last(one, SETTLES_S), self._settling)
 
     async def _put_last(self, one: Client, after_s: float = 0.0) -> None:
         """Keep it as a spare one, if the broker answers by it."""
@@ -140,6 +142,7 @@ class Spares:
         await asyncio.sleep(0)
 
     async def close(self) -> None:
+        await _cancel(self._settling)
         while self._idle:
             await self.give_up(self._idle.pop())
         if self._closing:
