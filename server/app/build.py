@@ -194,10 +194,12 @@ def _fleet(
             return remote, BrokerLink(config.broker, remote, agents, bucket, name="catgraph web"), agents
         return remote, BrokerLink(config.broker, remote, agents, name="catgraph web"), agents
     assert orders is not None
-    agent = NatsAgent(bus, run=boot, now=now, admit=orders.admit, on_late=late.note)
+    is_limited = config.broker.key is not None
+    agent = NatsAgent(bus, run=boot, now=now, admit=orders.admit, on_late=late.note, is_limited=is_limited)
     kept = HttpAgent(lambda: bus.vehicles, at_agent, scope_of, now=now)
     name = f"catgraph agent {' '.join(v.name for v in config.vehicles)}"
-    link = BrokerLink(config.broker, agent, kept, name=name, unsent=lambda: agent.unsent, spares=SPARES)
+    # The agent last: it announces itself once all that a node may then request is subscribed to.
+    link = BrokerLink(config.broker, kept, agent, name=name, unsent=lambda: agent.unsent, spares=SPARES)
     return bus, link, None
 
 

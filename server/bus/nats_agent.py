@@ -83,12 +83,14 @@ class NatsAgent:
     """Answers nodes for the vehicles of `bus`, in this run of it. `now`: a monotonic clock in seconds, as the bus's."""
 
     def __init__(
-        self, bus: LocalBus, *, run: str, now: Callable[[], float], admit: Admit = as_it_is, on_late: Late = unnoted
-    ) -> None:
-        """`admit` decides who gave a command that a node passes on, and whether it is carried out; `on_late` gets each
-        that came too late for that."""
+        self, bus: LocalBus, *, run: str, now: Callable[[], float], admit: Admit = as_it_is, on_late: Late = unnoted,
+        is_limited: bool = False,
+    ) -> None:  # fmt: skip
+        """`admit` decides who gave a command of a node, and whether it is carried out; `on_late` gets each that came
+        too late; `is_limited`: the broker lets it answer only by the connection of the request, as with keys."""
         self._admit = admit
         self._on_late = on_late
+        self._is_limited = is_limited
         self._bus = bus
         self._client: Client | None = None
         self._run = run
@@ -111,11 +113,10 @@ class NatsAgent:
 
     async def start(self, client: Client) -> None:
         """From now on nodes are answered by this client, until `stop`."""
-        if not self._published:
-            for vehicle in self._bus.vehicles:
-                self._published[vehicle] = self._bus.last_event(vehicle)
-                watched = self._bus.watch_events(vehicle, lambda name: self._spawn(self._publish_events(name)))
-                self._stops.append(watched)
+        for vehicle in [one for one in self._bus.vehicles if one not in self._published]:
+            self._published[vehicle] = self._bus.last_event(vehicle)
+            self._stops.append(self._bus.watch_events(vehicle, lambda name: self._spawn(self._publish_events(name))))
+        if self._client is None:
             self._spawn(self._be_here())
         self._client = client
         self._connection += 1
@@ -137,6 +138,7 @@ class NatsAgent:
         self._published.clear()
         while self._stops:
             self._stops.pop()()
+        self._client = None
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -205,7 +207,7 @@ class NatsAgent:
             await self._publish(vehicle, "events", wire.Events(run=self._run, events=events))
 
     async def _announce(self) -> None:
-        for vehicle in self._published:
+        for vehicle in [*self._published]:
             last = self._bus.last_event(vehicle)
             here = wire.Here(run=self._run, last=last, resumes=True, connection=self._connection)
             await self._publish(vehicle, "here", here)
@@ -324,4 +326,6 @@ class NatsAgent:
     async def _respond(self, message: Msg, data: bytes) -> None:
         with contextlib.suppress(NatsError):
             if self._client is not None and self._client.is_connected and message.reply:
-                await message.respond(data)
+                if self._is_limited:  # by another one it would be refused, which is reported as a missing right
+                    return await message.respond(data)
+                await self._client.publish(message.reply, data)

@@ -9,10 +9,11 @@ import secrets
 import ssl
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import nkeys
 from nats.aio.client import Client
+from nats.errors import NoServersError
 
 from server.bus import nats_wire as wire
 from server.bus.broker import Broker, BrokerRefused
@@ -22,7 +23,9 @@ log = logging.getLogger("catgraph.bus")
 
 SPARES = 2  # of an agent, which a radio may be before
 RETRY_S = 1.0
-AGAIN_S = 0.3  # between two dials of a broker that was lost: behind a gap of the radio pages wait for it
+MOST_AT_ONCE = 4  # connections in a row that are taken without a pause, though none could be worked by
+AGAIN_S = 0.3  # between the two tries of a dial: a broker may just have started
+TRIES = 1  # of a dial, beside the first
 CONNECTS_WITHIN_S = 3
 PING_EVERY_S = 2.0
 PING_ANSWERED_WITHIN_S = 4  # else the broker is gone
@@ -32,6 +35,7 @@ ANSWERS_WITHIN_S = 1.5  # a connection that was taken, where there is another on
 ANSWERS_AT_LAST_S = 10
 LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
 MOST_REFUSED = 20  # subjects that are named
+MOST_LOGGED = 20  # complaints in that time
 NO_RIGHT = "permissions violation"  # as a broker words it; the connection stays
 
 
@@ -73,11 +77,11 @@ class BrokerLink:
         self._context = _context(broker)
         self._spares = Spares(self._dial, broker.address, spares)
         self._client: Client | None = None
-        self._pinging: asyncio.Task[None] | None = None  # by that client
+        self._pinging: asyncio.Task[Any] | None = None  # by that client
         self._tasks: list[asyncio.Task[None]] = []
         self._is_started = False
         self._why = "it was not reached yet"
-        self._logged: tuple[str, float] = ("", 0.0)
+        self._logged: dict[str, float] = {}  # when each complaint was logged
         self._refused: dict[str, None] = {}  # what the broker refused by this connection, in its order
 
     @property
@@ -132,6 +136,7 @@ class BrokerLink:
         await self._spares.close()
 
     async def _run(self) -> None:
+        failed = 0  # in a row
         while True:
             self._client = client = await self._spares.take()
             self._refused.clear()  # its rights may be others
@@ -146,14 +151,13 @@ class BrokerLink:
                     await asyncio.wait({self._pinging}, timeout=LOOKS_EVERY_S)
                 if client.is_connected:
                     await self._on_error(TimeoutError("it does not answer"))
-            except TimeoutError as why:
-                await self._on_error(why)
             except Exception as why:  # whatever it was: without a link a car would be lost for good
                 await self._on_error(why)
-                if client.is_connected:
-                    await asyncio.sleep(RETRY_S)
+            failed = 0 if self._is_started else failed + 1
             self._is_started = False
             await self._give_up()
+            if failed > MOST_AT_ONCE or (failed and not self._spares.is_any):
+                await asyncio.sleep(RETRY_S)
 
     async def _give_up(self) -> None:
         """Nothing comes by this client any more: what the next one is to answer must not be answered twice."""
@@ -167,7 +171,7 @@ class BrokerLink:
         """Return once the broker has processed the subscriptions. Raises TimeoutError, early where there is another
         connection to take."""
         await asyncio.sleep(0)  # its writing task is first: the PING would go ahead of them, and might be lost
-        self._pinging = asyncio.create_task(client.flush(timeout=ANSWERS_AT_LAST_S))
+        self._pinging = asyncio.create_task(client.rtt(timeout=ANSWERS_AT_LAST_S))
         now = asyncio.get_running_loop().time
         began_s = now()
         while not self._pinging.done():
@@ -192,13 +196,15 @@ class BrokerLink:
                 ping_interval=SILENT_S,
                 allow_reconnect=False,  # it would subscribe again by itself, beside a spare that was taken
                 reconnect_time_wait=AGAIN_S,  # type: ignore[arg-type]
-                max_reconnect_attempts=-1,  # of its first connection
+                max_reconnect_attempts=TRIES,
                 pending_size=0,  # what cannot be sent now is not kept: it would come late
             )
+            if not client.is_connected:  # what accepted it ended it before the first answer
+                raise ConnectionResetError("it ended the connection")
             _check_size(client)
         except BaseException as why:
             await self._spares.give_up(client)
-            if isinstance(why, Exception):
+            if isinstance(why, Exception) and not isinstance(why, NoServersError):  # each try was reported
                 await self._on_error(why)
             raise
         return client
@@ -208,9 +214,9 @@ class BrokerLink:
         if NO_RIGHT in self._why.lower() and len(self._refused) < MOST_REFUSED:
             self._refused[self._why] = None
         now_s = asyncio.get_running_loop().time()
-        logged, at_s = self._logged
-        if self._why != logged or now_s - at_s > LOG_AGAIN_S:
-            self._logged = (self._why, now_s)
+        self._logged = {text: at_s for text, at_s in self._logged.items() if now_s - at_s <= LOG_AGAIN_S}
+        if self._why not in self._logged and len(self._logged) < MOST_LOGGED:
+            self._logged[self._why] = now_s
             log.warning("broker_error address=%s why=%s", self._broker.address, self._why)
 
 
@@ -219,7 +225,7 @@ async def _ping(client: Client) -> None:
     to a ping that nobody waits for."""
     with contextlib.suppress(Exception):  # whatever it was: the client has ended
         while True:
-            await client.flush(timeout=PING_ANSWERED_WITHIN_S)
+            await client.rtt(timeout=PING_ANSWERED_WITHIN_S)  # a flush returns at once where nothing reads the answer
             await asyncio.sleep(PING_EVERY_S)
 
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Collection, Coroutine
+import random
+from collections.abc import Awaitable, Callable, Collection
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -21,6 +22,7 @@ SPARE_RETRY_S = 10.0  # where it is not needed now
 PROBE_EVERY_S = 0.25  # a dial into the last moment of a gap is lost, and the system repeats it after 1 or 3 s
 PROBE_SLOWLY_S = 1.0  # where the broker was away for a minute
 PROBE_SLOWLY_AFTER_S = 60.0
+PROBE_SPREAD = 0.1  # of that time: the agents of a broker that was lost are not to dial it in step
 PROBE_FOR_S = 2.0
 REACHED_FOR_S = 2.0  # so long the answer to a probe counts
 MOST_DIALS = 6  # at once
@@ -40,10 +42,11 @@ class Spares:
         at = urlsplit(address)
         self._host, self._port = at.hostname or "", at.port or PORT
         self._idle: list[Client] = []  # the one that was silent for longest comes first
-        self._dials: set[asyncio.Task[None]] = set()
-        self._settling: set[asyncio.Task[None]] = set()  # new ones, and one that is pinged
+        self._dials: set[asyncio.Task[None]] = set()  # those as well that wait until they may be tried again
+        self._settling: dict[asyncio.Task[None], Client] = {}  # new ones, and one that is pinged
         self._closing: set[asyncio.Task[None]] = set()
-        self._is_needed = False  # there is no connection to work by
+        self._probing: asyncio.Task[None] | None = None
+        self._needed = asyncio.Event()  # there is no connection to work by
         self._changed, self._dialled, self._reached = asyncio.Event(), asyncio.Event(), asyncio.Event()
         self._reached_s = -REACHED_FOR_S
 
@@ -53,18 +56,23 @@ class Spares:
 
     async def run(self) -> None:
         """Dial what is missing, as many at once: over a bad radio a dial takes seconds."""
+        now = asyncio.get_running_loop().time
+        keep_at_s = now() + KEEP_EVERY_S
         try:
             while True:
                 self._changed.clear()
                 self._forget_ended()
-                there = len(self._idle) + (0 if self._is_needed else len(self._settling))
-                self._begin(self._count + self._is_needed - there - len(self._dials))
+                is_needed = self._needed.is_set()
+                there = len(self._idle) + (0 if is_needed else len(self._settling))
+                self._begin(self._count + is_needed - there - len(self._dials))
                 with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(KEEP_EVERY_S):
+                    async with asyncio.timeout_at(keep_at_s):
                         await self._changed.wait()
+                if now() < keep_at_s:
                     continue
-                if self._idle and not self._is_needed:  # while its ping is under way another one is given
-                    self._spawn(self._put_last(self._idle.pop(0)), self._settling)
+                keep_at_s = now() + KEEP_EVERY_S
+                if self._idle and not self._needed.is_set():  # while its ping is under way another one is given
+                    self._settle(self._idle.pop(0))
         finally:
             await _cancel(self._dials)
 
@@ -72,32 +80,33 @@ class Spares:
         """The next one to work by: an idle one, as soon as the broker's port answers, or else one that is new."""
         self._need()
         began_s = asyncio.get_running_loop().time()
-        probing = asyncio.create_task(self._probe())
-        waiting: set[asyncio.Task[Any]] = {probing, asyncio.create_task(self._dialled.wait())}
+        probing = self._probe_once()
+        dialled = asyncio.create_task(self._dialled.wait())
         try:
-            await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait({probing, dialled}, return_when=asyncio.FIRST_COMPLETED)
             if probing.done() and asyncio.get_running_loop().time() - began_s > 2 * PROBE_EVERY_S:
                 self._begin(1 + self._count)  # beside those whose first packet waits to be repeated
             while True:
                 while self._idle:
                     if (one := self._idle.pop(0)).is_connected:
                         return one
+                    self._drop(one)
                 self._need()
                 await self._dialled.wait()
-        finally:
-            self._is_needed = False
+        finally:  # without a pause: cancelled in one, the client that is returned would be lost
+            self._needed.clear()
             self._changed.set()  # one is missing now
-            await _cancel(waiting)
+            dialled.cancel()
+            if self._probing is not None:
+                self._probing.cancel()
+                self._probing = None
 
     def _begin(self, dials: int) -> None:
         for _ in range(min(dials, MOST_DIALS - len(self._dials))):
-            self._spawn(self._add(), self._dials)
-
-    def _spawn(self, work: Coroutine[Any, Any, None], among: set[asyncio.Task[None]]) -> None:
-        task = asyncio.create_task(work, name="spare connection")
-        among.add(task)
-        task.add_done_callback(among.discard)
-        task.add_done_callback(lambda _: self._changed.set())
+            task = asyncio.create_task(self._add(), name="spare connection")
+            self._dials.add(task)
+            task.add_done_callback(self._dials.discard)
+            task.add_done_callback(lambda _: self._changed.set())
 
     async def _add(self) -> None:
         try:
@@ -105,49 +114,79 @@ class Spares:
         except TimeoutError:
             return
         except Exception:  # `dial` reported it; without another try a car would be lost for good
-            return await asyncio.sleep(RETRY_S if self._is_needed else SPARE_RETRY_S)
-        if self._is_needed and not self._dialled.is_set():
+            return await self._wait_to_dial()
+        if self._needed.is_set() and not (self._dialled.is_set() and self.is_any):
             self._idle.insert(0, one)
             return self._dialled.set()
-        return self._spawn(self._put_last(one, SETTLES_S), self._settling)
+        return self._settle(one, SETTLES_S)
 
-    async def _put_last(self, one: Client, after_s: float = 0.0) -> None:
+    async def _wait_to_dial(self) -> None:
+        """Return when a dial may be tried again after one that failed."""
+        if not self._needed.is_set():
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(SPARE_RETRY_S):
+                    await self._needed.wait()
+            return
+        await asyncio.sleep(RETRY_S)
+        if self._needed.is_set():  # while the broker is away only its port is dialled
+            await asyncio.wait({self._probe_once()})
+
+    def _settle(self, one: Client, after_s: float = 0.0) -> None:
+        task = asyncio.create_task(self._put_last(one, after_s), name="spare connection")
+        self._settling[task] = one
+        task.add_done_callback(self._settling.pop)
+        task.add_done_callback(lambda _: self._changed.set())
+
+    async def _put_last(self, one: Client, after_s: float) -> None:
         """Keep it as a spare one, if the broker answers by it."""
         try:
             await asyncio.sleep(after_s)
-            await one.flush(timeout=KEPT_WITHIN_S)
-        except BaseException as why:  # whatever it was: it does not answer
-            await self.give_up(one)
-            if isinstance(why, Exception):
-                return None
-            raise
+            await one.rtt(timeout=KEPT_WITHIN_S)  # a flush returns at once where nothing reads the answer any more
+        except Exception:  # whatever it was: it does not answer
+            return self._drop(one)
         self._forget_ended()
         if len(self._idle) >= self._count:
-            return await self.give_up(one)
-        return self._idle.append(one)
+            return self._drop(one)
+        self._idle.append(one)
+        return self._dialled.set()
 
     def _forget_ended(self) -> None:
+        for one in self._idle:
+            if not one.is_connected:
+                self._drop(one)
         self._idle = [one for one in self._idle if one.is_connected]
 
     def _need(self) -> None:
-        self._is_needed = True
+        self._needed.set()
         self._dialled.clear()
         self._changed.set()
 
-    async def give_up(self, one: Client) -> None:
-        """From now on nothing comes by it. Nobody waits for its end: bytes may be left that cannot be sent now."""
+    def _drop(self, one: Client) -> None:
+        """Close it. Nobody waits for its end: bytes may be left that cannot be sent now."""
         task = asyncio.create_task(_close(one), name="close a connection")
         self._closing.add(task)
         task.add_done_callback(self._closing.discard)
+
+    async def give_up(self, one: Client) -> None:
+        """From now on nothing comes by it."""
+        self._drop(one)
         await asyncio.sleep(0)
 
     async def close(self) -> None:
-        await _cancel(self._settling)
-        while self._idle:
-            await self.give_up(self._idle.pop())
+        clients = [*self._idle, *self._settling.values()]
+        self._idle.clear()
+        await _cancel([*self._settling])
+        for one in clients:
+            self._drop(one)
         if self._closing:
             await asyncio.wait(self._closing, timeout=CLOSES_WITHIN_S)
         await _cancel(self._closing)
+
+    def _probe_once(self) -> asyncio.Task[None]:
+        """The probe that is under way, or a new one."""
+        if self._probing is None or self._probing.done():
+            self._probing = asyncio.create_task(self._probe(), name="probe the broker's port")
+        return self._probing
 
     async def _probe(self) -> None:
         """Return once the broker's port answers a dial, a new one every moment."""
@@ -159,14 +198,14 @@ class Spares:
                 dials.add(asyncio.create_task(self._reach()))
                 wait_s = PROBE_EVERY_S if now() - began_s < PROBE_SLOWLY_AFTER_S else PROBE_SLOWLY_S
                 with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(wait_s):
+                    async with asyncio.timeout(wait_s * random.uniform(1 - PROBE_SPREAD, 1 + PROBE_SPREAD)):
                         await self._reached.wait()
                 dials = {dial for dial in dials if not dial.done()}
         finally:
             await _cancel(dials)
 
     async def _reach(self) -> None:
-        with contextlib.suppress(OSError, TimeoutError):
+        with contextlib.suppress(Exception):  # whatever it was: it was not reached
             async with asyncio.timeout(PROBE_FOR_S):
                 _, writer = await asyncio.open_connection(self._host, self._port)
             writer.close()

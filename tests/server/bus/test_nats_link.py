@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import psutil
 import pytest
+from nats.aio.client import Client
 
 from server.bus import nats_link
 from server.bus.broker import Broker as BrokerAddress
+from server.bus.bus import NotServed
+from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus
 from server.bus.nats_link import BrokerLink
 from tests.server.bus.broker import running_broker
-from tests.server.bus.buses import until
+from tests.server.bus.buses import local_buses, until
+from tests.server.bus.test_broker_users import fleet, key_file, linked
+from tests.server.bus.test_nats_spares import Idle
 from tests.server.bus.test_orders_held import freeze
 from tests.server.mail.post import certificates
 
@@ -35,12 +44,126 @@ async def test_over_tls_a_broker_that_does_not_answer_is_dialled_again_at_once(
 
         address = BrokerAddress(address=broker.address.replace("nats:", "tls:"), authority=authority)
         link = BrokerLink(address, NatsBus(now=lambda: 0.0), name="test")
+        dials: list[str] = []
+
+        async def dial() -> Client:
+            dials.append("new")
+            return await link._dial()
+
         link.start()
         try:
-            await until(lambda: link.complaint is None)
-            before = ports()
+            await until(lambda: link.complaint is None and len(ports()) == 1)
+            (before,) = ports()
+            link._spares._dial = dial
             freeze(broker.pid)
             monkeypatch.setattr(nats_link, "PING_ANSWERED_WITHIN_S", 1)
-            assert not before & await until(lambda: (now := ports()) and not now & before and now)
+            await until(lambda: dials and before not in ports())
         finally:
             await link.stop()
+
+
+def link_to(address: str, *parts: Any, spares: int = 2) -> BrokerLink:
+    return BrokerLink(BrokerAddress(address=address), *parts, name="test", spares=spares)
+
+
+@pytest.mark.virtual_time
+async def test_a_broker_that_ends_each_connection_is_dialled_about_once_a_second() -> None:
+    """As one does that allows fewer subscriptions than are needed."""
+    made: list[Idle] = []
+
+    async def dial() -> Client:
+        made.append(Idle("x", []))
+        return cast(Client, made[-1])
+
+    async def start(client: Client) -> None:
+        await client.close()
+        raise ConnectionResetError
+
+    async def stop() -> None: ...
+
+    part = SimpleNamespace(open=lambda: None, close=lambda: None, start=start, stop=stop)
+    link = link_to("nats://127.0.0.1:1", part)
+    link._spares._dial = dial
+    link.start()
+    try:
+        await asyncio.sleep(60)
+        assert 30 <= len(made) <= 130
+    finally:
+        await link.stop()
+
+
+async def test_what_accepts_a_connection_and_ends_it_is_no_broker() -> None:
+    """As a proxy does whose broker is away."""
+
+    async def end(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b'INFO {"max_payload": 1048576}\r\n')
+        while not (await reader.readline()).startswith(b"PING"):
+            pass
+        writer.close()
+
+    async with await asyncio.start_server(end, "127.0.0.1", 0) as server:
+        link = link_to(f"nats://127.0.0.1:{server.sockets[0].getsockname()[1]}")
+        with pytest.raises(OSError, match="it ended the connection"):
+            await link._dial()
+        await link._spares.close()
+
+
+@pytest.mark.virtual_time
+async def test_while_a_broker_is_away_its_port_is_dialled_four_times_a_second_and_then_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    dials = 0
+    connect = asyncio.open_connection
+
+    async def counted(*args: Any, **more: Any) -> Any:
+        nonlocal dials
+        dials += 1
+        return await connect(*args, **more)
+
+    monkeypatch.setattr(asyncio, "open_connection", counted)
+    link = link_to("nats://127.0.0.1:1")
+    link.start()
+    try:
+        await asyncio.sleep(60)
+        assert 230 <= dials <= 260
+        await asyncio.sleep(10)
+        dials = 0
+        await asyncio.sleep(60)
+        assert 50 <= dials <= 70
+        assert "Connect call failed" in str(link.complaint)
+    finally:
+        await link.stop()
+
+
+@pytest.mark.virtual_time
+async def test_complaints_that_come_in_turn_are_logged_once_a_minute_each(caplog: pytest.LogCaptureFixture) -> None:
+    link = link_to("nats://127.0.0.1:1")
+    with caplog.at_level(logging.WARNING, "catgraph.bus"):
+        for number in range(100):
+            await link._on_error(OSError("odd" if number % 2 else "even"))
+        assert len(caplog.records) == 2
+        await asyncio.sleep(nats_link.LOG_AGAIN_S + 1)
+        for number in range(100):
+            await link._on_error(OSError(f"number {number}"))
+        assert len(caplog.records) == 2 + nats_link.MOST_LOGGED
+
+
+async def test_with_keys_no_answer_is_sent_by_another_connection_than_the_request_came_by(tmp_path: Path) -> None:
+    """The broker would refuse it, and that would be reported as a right that is missing."""
+    async with fleet(tmp_path) as (broker, seeds), local_buses() as both:
+        page = NatsBus(now=both.clock)
+        agent = NatsAgent(both.session, run="run-1", now=both.clock, is_limited=True)
+        both.session._handlers.pop("margay")  # this agent's key is that of ocelot alone
+        room_key, key = key_file(tmp_path, "room", seeds["room"]), key_file(tmp_path, "ocelot", seeds["ocelot"])
+        async with linked(page, broker, room_key), linked(agent, broker, key) as link:
+            await until(lambda: page.vehicles and page.trouble("ocelot") is None)
+            before = cast(Client, link._client)
+            command = {"vehicle": "ocelot", "takes_s": 0.5}
+            order = asyncio.create_task(page.request("ocelot", command, deadline_s=1.5))
+            await until(lambda: both.commands)
+            await before.close()
+            with pytest.raises(NotServed) as why:
+                await order
+            assert why.value.outcome == "unknown"
+            assert link._client is not before
+            assert link.complaint is link.refused is None

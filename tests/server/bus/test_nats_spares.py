@@ -14,6 +14,8 @@ from nats.aio.client import Client
 from server.bus import nats_link, nats_spares
 from server.bus.broker import Broker as BrokerAddress
 from server.bus.bus import NotServed
+from server.bus.journal import Journal
+from server.bus.local import LocalBus
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_link import BrokerLink
 from server.bus.nats_spares import KEEP_EVERY_S, KEPT_WITHIN_S, SETTLES_S, Spares
@@ -167,6 +169,47 @@ async def test_a_lost_connection_that_comes_to_life_again_answers_and_doubles_no
         assert link.complaint is None
 
 
+@pytest.mark.usefixtures("_soon_lost")
+async def test_a_connection_that_nothing_reads_any_more_is_given_up() -> None:
+    """A client whose reading task has ended goes on as connected, and its flush returns at once."""
+    async with with_spares() as (_, link, both):
+        first, spare, other = link._client, *link._spares._idle
+        worked: list[Client | None] = []
+
+        def is_other() -> bool:
+            if link.complaint is None and link._client not in worked:
+                worked.append(link._client)
+            return other in worked
+
+        for client in (first, spare):
+            cast(Any, client)._reading_task.cancel()
+        await until(is_other)
+        assert spare not in worked
+        assert (await both.page.request("ocelot", {"what": 1}, deadline_s=10.0))["ok"]
+
+
+@pytest.mark.usefixtures("_soon_lost")
+async def test_a_spare_connection_that_nothing_reads_any_more_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(nats_spares, "KEEP_EVERY_S", 0.05)
+    monkeypatch.setattr(nats_spares, "KEPT_WITHIN_S", 1)
+    async with with_spares() as (_, link, _both):
+        spare = link._spares._idle[0]
+        cast(Any, spare)._reading_task.cancel()
+        await until(lambda: spare.is_closed)
+
+
+@pytest.mark.usefixtures("_soon_lost")
+async def test_the_answer_to_an_order_comes_by_the_connection_that_follows() -> None:
+    async with with_spares() as (_, link, both):
+        before = link._client
+        order = asyncio.create_task(both.page.request("ocelot", {"what": 1, "takes_s": 1.5}, deadline_s=10.0))
+        await until(lambda: both.commands)
+        await cast(Client, before).close()
+        assert (await order)["got"] == 1
+        assert link._client is not before
+        assert len(both.commands) == 1
+
+
 async def test_a_broker_that_refuses_spare_connections_is_used_without(tmp_path: Any) -> None:
     (tmp_path / "few.conf").write_text("max_connections: 1\n")
     async with running_broker(include=tmp_path / "few.conf") as broker, local_buses() as both:
@@ -174,7 +217,7 @@ async def test_a_broker_that_refuses_spare_connections_is_used_without(tmp_path:
         link = BrokerLink(BrokerAddress(address=broker.address), agent, name="test", spares=2)
         link.start()
         try:
-            await until(lambda: link._logged[0] and link.complaint is None)  # a spare one was refused
+            await until(lambda: link._logged and link.complaint is None)  # a spare one was refused
             assert not link._spares.is_any
         finally:
             await link.stop()
@@ -188,11 +231,12 @@ class Idle:
         self.answers = self.is_connected = True
         self._pinged = pinged
 
-    async def flush(self, timeout: float) -> None:
+    async def rtt(self, timeout: float) -> float:
         self._pinged.append(self.name)
         if not self.answers:
             await asyncio.sleep(timeout)
             raise TimeoutError
+        return 0.0
 
     async def close(self) -> None:
         self.is_connected = False
@@ -248,6 +292,32 @@ async def test_an_agent_announces_itself_in_one_packet_with_its_subscriptions() 
         asyncio.get_running_loop().call_soon(lambda: sent.append("a pause"))
         await agent.start(cast(Client, client))
         assert [one.split()[0] for one in sent] == ["SUB"] * 4 + ["PUB"] * 2
+        agent._client = None
+        agent._subscriptions.clear()
+        await agent.stop()
+
+
+async def test_an_agent_offers_a_vehicle_that_came_later_from_its_next_connection_on() -> None:
+    begun, sent = [], []
+
+    async def subscribe(subject: str, cb: Any) -> Any:
+        sent.append(subject)
+
+    async def publish(subject: str, body: bytes) -> None:
+        sent.append(subject)
+
+    client = cast(Client, SimpleNamespace(subscribe=subscribe, publish=publish, is_connected=True))
+    async with local_buses() as both:
+        bus = LocalBus(Journal(None), now=both.clock)
+        agent = NatsAgent(bus, run="a", now=both.clock)
+        for vehicle in (None, None, "ocelot", "margay"):
+            if vehicle is not None:
+                bus.serve(vehicle, both.answer)
+            sent.clear()
+            await agent.start(client)
+            begun.append(len(agent._tasks))
+        assert begun == [1] * 4, "one task announces it, however many connections there were"
+        assert {subject.split(".")[1] for subject in sent if subject.endswith("here")} == {"ocelot", "margay"}
         agent._client = None
         agent._subscriptions.clear()
         await agent.stop()
