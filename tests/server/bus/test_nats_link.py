@@ -72,6 +72,7 @@ async def test_a_broker_that_ends_each_connection_is_dialled_about_once_a_second
     made: list[Idle] = []
 
     async def dial() -> Client:
+        await asyncio.sleep(0.01)
         made.append(Idle("x", []))
         return cast(Client, made[-1])
 
