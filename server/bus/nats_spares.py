@@ -145,7 +145,7 @@ class Spares:
         except Exception:  # whatever it was: it does not answer
             return self._drop(one)
         self._forget_ended()
-        if len(self._idle) >= self._count:
+        if len(self._idle) >= self._count + self._needed.is_set():  # one more where none works
             return self._drop(one)
         self._idle.append(one)
         return self._dialled.set()

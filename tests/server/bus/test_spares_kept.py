@@ -59,6 +59,17 @@ async def test_a_connection_that_settles_while_one_is_needed_is_given() -> None:
 
 
 @pytest.mark.virtual_time
+async def test_where_no_spare_ones_are_kept_a_connection_that_settles_is_given_as_well() -> None:
+    """As at a web node."""
+    one = Idle("a", [])
+    async with kept(Dials(0), 0) as spares:
+        taking = asyncio.create_task(taken(spares, 2))
+        await asyncio.sleep(0.05)
+        spares._settle(cast(Client, one), 1)
+        assert (await taking).name == "a"
+
+
+@pytest.mark.virtual_time
 async def test_a_second_connection_is_given_where_the_first_ends_before_it_was_given() -> None:
     async with kept(Dials(0), 0) as spares:
         taking = asyncio.create_task(taken(spares, 1))
