@@ -249,16 +249,17 @@ async def test_each_connection_of_an_agent_has_a_higher_number() -> None:
 async def test_an_agent_compresses_a_frame_only_for_a_node_that_inflates_it() -> None:
     answers: list[bytes] = []
 
-    async def respond(data: bytes) -> None:
-        answers.append(data)
+    async def publish(subject: str, data: bytes) -> None:
+        if subject == "node":
+            answers.append(data)
 
     async with local_buses() as both:
         agent = NatsAgent(both.session, run="a", now=Clock())
-        agent._client = cast(Client, SimpleNamespace(is_connected=True, max_payload=1 << 20))
+        agent._client = cast(Client, SimpleNamespace(is_connected=True, max_payload=1 << 20, publish=publish))
         both.session.put("ocelot", "state", "x" * 5000)
         for body in (b'{"have": 0, "run": ""}', wire.encode(wire.Pull(have=0, run="", inflates=True))):
             before = len(answers)
-            message = SimpleNamespace(subject="veh.ocelot.pull.state", data=body, reply="node", respond=respond)
+            message = SimpleNamespace(subject="veh.ocelot.pull.state", data=body, reply="node")
             await agent._on_pull(cast(Msg, message))
             await until(lambda: len(answers) > before)  # noqa: B023
         agent._client = None
