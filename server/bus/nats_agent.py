@@ -96,6 +96,7 @@ class NatsAgent:
         self._run = run
         self._now = now
         self._looked: dict[tuple[str, str], Looked] = {}
+        self._bases: dict[tuple[str, str], wire.Bases] = {}  # of what was sent
         self._tasks: set[asyncio.Task[None]] = set()
         self._pulls = self._requests = 0
         self._connection = 0  # how many there were to the broker
@@ -180,8 +181,13 @@ class NatsAgent:
         if len(data) > self._largest:
             refused = self._note_too_large(f"{kind} frame", vehicle, len(data))
             await asyncio.sleep(wire.PULL_WAITS_S)  # it would be requested again at once
-            data = self._framed(came_s, None, refused)
-        await self._respond(message, wire.compressed(data) if pull.inflates else data)
+            data, frame = self._framed(came_s, None, refused), None
+        if pull.inflates:
+            bases = self._bases.setdefault((vehicle, kind), wire.Bases())
+            data = wire.compressed(data, bases.get(pull.have) if pull.is_base and pull.run == self._run else b"")
+            if frame is not None and isinstance(frame.payload, str):
+                bases.add(frame.number, frame.payload)
+        await self._respond(message, data)
 
     def _framed(self, came_s: float, frame: Frame | None, refused: str = "") -> bytes:
         """A frame as it is sent now; None: that there is no newer one, or why it is refused."""

@@ -33,6 +33,7 @@ class _Newest:
     number: int = 0
     run: str = ""
     run_requested_s: float = -math.inf  # when the pull was sent that brought the first one of this run
+    text: bytes = b""  # by which the next one may be compressed; none of a scan
 
 
 async def _ended(pulls: set[asyncio.Task[None]]) -> set[asyncio.Task[None]]:
@@ -53,33 +54,35 @@ class Pulls:
         self._refuse = refuse
         self._now = now
         self._tasks: dict[tuple[str, str], asyncio.Task[None]] = {}
+        self._newest: dict[tuple[str, str], _Newest] = {}
         self._trips_s: dict[str, float] = {}  # to each vehicle's agent and back, smoothed
 
     def look(self, vehicle: str, kind: str, is_looked: bool) -> None:
         """Begin or end to pull this kind of frame; nothing where it is so already."""
         key = (vehicle, kind)
-        if is_looked and key not in self._tasks:
-            self._tasks[key] = asyncio.create_task(self._pull(vehicle, kind))
-        elif is_looked and self._tasks[key].done():
-            self._tasks[key] = asyncio.create_task(self._pull(vehicle, kind))
+        if is_looked and (key not in self._tasks or self._tasks[key].done()):
+            newest = self._newest.setdefault(key, _Newest())
+            self._tasks[key] = asyncio.create_task(self._pull(vehicle, kind, newest))
         elif not is_looked and key in self._tasks:
             self._tasks.pop(key).cancel()
+            del self._newest[key]
 
     def again(self, vehicle: str) -> None:
         """Request its frames anew: what was requested while its agent was silent is lost."""
-        for key in [key for key in self._tasks if key[0] == vehicle]:
-            self.look(*key, False)
-            self.look(*key, True)
+        for key, task in [*self._tasks.items()]:
+            if key[0] == vehicle:
+                task.cancel()
+                self._tasks[key] = asyncio.create_task(self._pull(*key, self._newest[key]))
 
     async def stop(self) -> None:
         tasks, self._tasks = self._tasks, {}
+        self._newest.clear()
         for task in tasks.values():
             task.cancel()
         await asyncio.gather(*tasks.values(), return_exceptions=True)
 
-    async def _pull(self, vehicle: str, kind: str) -> None:
+    async def _pull(self, vehicle: str, kind: str, newest: _Newest) -> None:
         """Requests frames for as long as somebody looks."""
-        newest = _Newest()
         under_way: set[asyncio.Task[None]] = set()
         began_s, requests = self._now(), 0  # in the second that began then
         try:
@@ -117,20 +120,22 @@ class Pulls:
         if (client := self._questions.client) is None:
             return await asyncio.sleep(RETRY_S)
         requested_s = self._now()
-        pull = wire.encode(wire.Pull(have=newest.number, run=newest.run, inflates=True))
+        base = newest.text
+        pull = wire.Pull(have=newest.number, run=newest.run, inflates=True, is_base=bool(base))
         try:
             message = await client.request(
-                wire.subject(vehicle, f"pull.{kind}"), pull, timeout=wire.PULL_WAITS_S + ANSWER_S
+                wire.subject(vehicle, f"pull.{kind}"), wire.encode(pull), timeout=wire.PULL_WAITS_S + ANSWER_S
             )
-            head, payload = wire.decode_frame(message.data)
+            head, payload = wire.decode_frame(message.data, base)
         except (NatsError, TimeoutError):
             return await asyncio.sleep(RETRY_S)
         except wire.Malformed as why:
+            newest.text = b""  # whatever it was: the next one is to need no other
             return await self._not_read(vehicle, kind, why)
         if head.run != newest.run:
             if requested_s < newest.run_requested_s:  # of a run that has ended since, and comes late
                 return None
-            newest.number, newest.run, newest.run_requested_s = 0, head.run, requested_s
+            newest.number, newest.run, newest.run_requested_s, newest.text = 0, head.run, requested_s, b""
         waited_s = max(0.0, head.waited_s)
         trip_s = max(0.0, self._now() - requested_s - waited_s)
         self._trips_s[vehicle] = trip_s + SMOOTHING * (self._trips_s.get(vehicle, trip_s) - trip_s)
@@ -139,7 +144,7 @@ class Pulls:
             self._refuse(vehicle, kind, head.refused)
         if head.number <= newest.number:
             return None
-        newest.number = head.number
+        newest.number, newest.text = head.number, payload.encode() if isinstance(payload, str) else b""
         # By our clock, and no later than it was: the pull was at the agent after `requested_s`.
         put_s = min(requested_s + waited_s, self._now()) - max(0.0, head.age_s)
         try:

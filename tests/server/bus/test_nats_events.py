@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from typing import Any
 
 import pytest
@@ -51,6 +52,27 @@ def test_a_compressed_frame_is_read_whole_or_not_at_all() -> None:
     for broken in (small[:-1], small[:20] + b"\x00\x00" + small[22:], wire.compressed(bytes(wire.LARGEST + 1))):
         with pytest.raises(wire.Malformed):
             wire.decode_frame(broken)
+
+
+def test_a_frame_is_read_by_the_frame_by_which_it_was_compressed_and_by_no_other() -> None:
+    state = random.Random(1).randbytes(8000).hex()
+    frame = wire.encode_frame(wire.FrameHead(run="a", number=2, now_s=1.0), f"{state}2")
+    base = f"{state}1".encode()
+    small = wire.compressed(frame, base)
+    assert len(small) < 500 < 7000 < len(wire.compressed(frame))
+    assert wire.decode_frame(small, base)[1] == f"{state}2"
+    assert wire.decode_frame(wire.compressed(frame), base)[1] == f"{state}2", "an agent that has it no more"
+    for other in (b"", f"{state}3".encode()):
+        with pytest.raises(wire.Malformed):
+            wire.decode_frame(small, other)
+
+
+def test_the_frames_that_others_are_compressed_by_are_the_newest_ones() -> None:
+    bases = wire.Bases()
+    for number in range(1, wire.MOST_BASES + 2):
+        bases.add(number, str(number))
+        bases.add(number, "a frame that is sent twice counts once")
+    assert [bases.get(n) for n in (0, 1, 2, number, number + 1)] == [b"", b"", b"2", str(number).encode(), b""]
 
 
 def test_more_events_than_were_requested_are_refused() -> None:

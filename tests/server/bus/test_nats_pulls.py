@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import random
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, cast
 
+import orjson
 import pytest
 from nats.aio.client import Client
 from nats.aio.msg import Msg
@@ -246,24 +248,68 @@ async def test_each_connection_of_an_agent_has_a_higher_number() -> None:
     assert [here.connection for here in sent] == [1, 1, 2, 2, 3, 3]
 
 
-async def test_an_agent_compresses_a_frame_only_for_a_node_that_inflates_it() -> None:
+async def test_an_agent_compresses_a_frame_for_a_node_that_inflates_it_and_by_a_frame_that_the_node_has() -> None:
     answers: list[bytes] = []
 
     async def publish(subject: str, data: bytes) -> None:
         if subject == "node":
             answers.append(data)
 
+    async def pull(kind: str, **more: Any) -> bytes:
+        before = len(answers)
+        body = orjson.dumps({"have": 0, "run": "", **more})
+        message = SimpleNamespace(subject=f"veh.ocelot.pull.{kind}", data=body, reply="node")
+        await agent._on_pull(cast(Msg, message))
+        await until(lambda: len(answers) > before)
+        return answers[-1]
+
+    state = random.Random(1).randbytes(8000).hex()
     async with local_buses() as both:
         agent = NatsAgent(both.session, run="a", now=Clock())
         agent._client = cast(Client, SimpleNamespace(is_connected=True, max_payload=1 << 20, publish=publish))
-        both.session.put("ocelot", "state", "x" * 5000)
-        for body in (b'{"have": 0, "run": ""}', wire.encode(wire.Pull(have=0, run="", inflates=True))):
-            before = len(answers)
-            message = SimpleNamespace(subject="veh.ocelot.pull.state", data=body, reply="node")
-            await agent._on_pull(cast(Msg, message))
-            await until(lambda: len(answers) > before)  # noqa: B023
+        both.session.put("ocelot", "state", f"{state}1")
+        assert len(await pull("state")) > 16_000, "a node of the version before last"
+        compressed = await pull("state", inflates=True)
+        assert 7000 < len(compressed) < 10_000
+        have = wire.decode_frame(compressed)[0].number
+        both.session.put("ocelot", "state", f"{state}2")
+        small = await pull("state", have=have, run="a", inflates=True, is_base=True)
+        assert len(small) < 500
+        assert wire.decode_frame(small, f"{state}1".encode())[1] == f"{state}2"
+        for more in ({"have": have, "run": "a"}, {"have": have, "is_base": True}, {"run": "a", "is_base": True}):
+            answer = await pull("state", inflates=True, **more)
+            assert wire.decode_frame(answer)[1] == f"{state}2", f"not by another frame: {more}"
+        both.session.put("ocelot", "scan", bytes(5000))
+        assert wire.decode_frame(await pull("scan", inflates=True))[1] == bytes(5000)
         agent._client = None
         await agent.stop()
-    plain, small = answers
-    assert len(small) < 500 < 5000 < len(plain)
-    assert wire.decode_frame(small)[1] == wire.decode_frame(plain)[1] == "x" * 5000
+
+
+async def test_a_node_has_its_newest_state_as_a_base_also_behind_a_gap_until_an_answer_cannot_be_read() -> None:
+    pulls_sent: list[wire.Pull] = []
+    state = random.Random(1).randbytes(8000).hex()
+
+    async def request(subject: str, body: bytes, timeout: float) -> Any:
+        pulls_sent.append(pull := wire.decode(wire.Pull, body))
+        number = len(pulls_sent)
+        if number == 3:
+            await asyncio.sleep(3600)
+        frame = wire.encode_frame(wire.FrameHead(run="a", number=number, now_s=1.0), f"{state}{number}")
+        base = f"{state}{pull.have}".encode() if pull.is_base else b""
+        data = wire.compressed(frame, f"{state}of another run".encode() if number == 5 else base)
+        return SimpleNamespace(data=data)
+
+    kept: list[str | bytes] = []
+    questions = Questions(now=Clock())
+    questions.client = cast(Client, SimpleNamespace(request=request))
+    pulls = Pulls(questions, lambda *frame: kept.append(frame[2]), lambda *_: None, now=Clock())
+    pulls.look("ocelot", "state", True)
+    await until(lambda: len(pulls_sent) == 3)
+    pulls.again("ocelot")
+    await until(lambda: len(pulls_sent) >= 7)
+    await pulls.stop()
+    assert [(one.have, one.is_base) for one in pulls_sent[:7]] == [
+        (0, False), (1, True), (2, True), (2, True), (4, True), (4, False), (6, True),
+    ]  # fmt: skip
+    assert kept[:4] == [f"{state}{number}" for number in (1, 2, 4, 6)]
+    assert questions.refused == 1
