@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections import defaultdict
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
@@ -22,6 +23,7 @@ from server.bus.bus import ALL, SUMMARY, Frame, NotAdmitted, NotServed
 from server.bus.local import LocalBus
 from server.bus.nats_link import processed
 from server.system import log_context
+from server.system.supervision import Supervisor, cancel
 
 log = logging.getLogger("catgraph.bus")
 
@@ -79,6 +81,28 @@ class Looked:
             self._changed = asyncio.Event()
 
 
+class TooLarge:
+    """What was too large for the broker of late. Times are monotonic, in seconds."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, tuple[str, float, float]] = {}  # what: a sentence, when it was so, and was logged
+
+    def note(self, what: str, vehicle: str, size: int, largest: int, now_s: float) -> str:
+        """A sentence on it."""
+        key = f"{what} {vehicle}"
+        _, _, logged_s = self._found.get(key, ("", 0.0, -LOG_AGAIN_S))
+        if now_s - logged_s >= LOG_AGAIN_S:
+            logged_s = now_s
+            log.error("too_large_for_the_broker what=%s vehicle=%s bytes=%d", what, vehicle, size)
+        takes = f"and the broker takes {largest // 1000} kB: it is not sent to web nodes."
+        self._found[key] = (f"The {what} of {vehicle} has {size // 1000} kB, {takes}", now_s, logged_s)
+        return self._found[key][0]
+
+    def text(self, now_s: float) -> str | None:
+        """In sentences; None: nothing."""
+        return " ".join(text for text, at_s, _ in self._found.values() if at_s > now_s - LOG_AGAIN_S) or None
+
+
 class NatsAgent:
     """Answers nodes for the vehicles of `bus`, in this run of it. `now`: a monotonic clock in seconds, as the bus's."""
 
@@ -96,15 +120,16 @@ class NatsAgent:
         self._run = run
         self._now = now
         self._looked: dict[tuple[str, str], Looked] = {}
-        self._bases: dict[tuple[str, str], wire.Bases] = {}  # of what was sent
+        self._bases = defaultdict[tuple[str, str], wire.Bases](wire.Bases)  # of what was sent
         self._tasks: set[asyncio.Task[None]] = set()
+        self._supervisor = Supervisor("agent at the broker")
         self._pulls = self._requests = 0
         self._connection = 0  # how many there were to the broker
         self._published: dict[str, int] = {}  # the number of each vehicle's newest event that was published
         self._stops: list[Callable[[], None]] = []
         self._subscriptions: list[Subscription] = []
         self.refused = 0  # what could not be read or sent, or was too much
-        self._too_large: dict[str, tuple[str, float, float]] = {}  # what: a sentence, when it was so, and was logged
+        self._too_large = TooLarge()
 
     def open(self) -> None:
         """Nothing: an agent does without a broker."""
@@ -117,8 +142,8 @@ class NatsAgent:
         for vehicle in [one for one in self._bus.vehicles if one not in self._published]:
             self._published[vehicle] = self._bus.last_event(vehicle)
             self._stops.append(self._bus.watch_events(vehicle, lambda name: self._spawn(self._publish_events(name))))
-        if self._client is None:
-            self._spawn(self._be_here())
+        if not self._supervisor.keeps("announcements"):
+            self._supervisor.keep("announcements", self._be_here)
         self._client = client
         self._connection += 1
         self._subscriptions.clear()  # of the client before
@@ -140,9 +165,8 @@ class NatsAgent:
         while self._stops:
             self._stops.pop()()
         self._client = None
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._supervisor.end("announcements")
+        await cancel(self._tasks)
         for looked in self._looked.values():
             looked.close()
         self._looked.clear()
@@ -183,7 +207,7 @@ class NatsAgent:
             await asyncio.sleep(wire.PULL_WAITS_S)  # it would be requested again at once
             data, frame = self._framed(came_s, None, refused), None
         if pull.inflates:
-            bases = self._bases.setdefault((vehicle, kind), wire.Bases())
+            bases = self._bases[vehicle, kind]
             data = wire.compressed(data, bases.get(pull.have) if pull.is_base and pull.run == self._run else b"")
             if frame is not None and isinstance(frame.payload, str):
                 bases.add(frame.number, frame.payload)
@@ -284,23 +308,12 @@ class NatsAgent:
     @property
     def unsent(self) -> str | None:
         """What of late was too large for the broker, in sentences; None: nothing."""
-        since_s = self._now() - LOG_AGAIN_S
-        return " ".join(text for text, at_s, _ in self._too_large.values() if at_s > since_s) or None
+        return self._too_large.text(self._now())
 
     def _note_too_large(self, what: str, vehicle: str, size: int) -> str:
         """A sentence on it."""
         self.refused += 1
-        now_s, key = self._now(), f"{what} {vehicle}"
-        _, _, logged_s = self._too_large.get(key, ("", 0.0, -LOG_AGAIN_S))
-        if now_s - logged_s >= LOG_AGAIN_S:
-            logged_s = now_s
-            log.error("too_large_for_the_broker what=%s vehicle=%s bytes=%d", what, vehicle, size)
-        text = (
-            f"The {what} of {vehicle} has {size // 1000} kB, and the broker takes {self._largest // 1000} kB: "
-            "it is not sent to web nodes."
-        )
-        self._too_large[key] = (text, now_s, logged_s)
-        return text
+        return self._too_large.note(what, vehicle, size, self._largest, self._now())
 
     async def _command(self, vehicle: str, ask: wire.Ask) -> Any:
         """Raises NotServed, also for a command that came too late or was meant for an earlier run."""

@@ -12,7 +12,6 @@ from nats.aio.msg import Msg
 from server.bus import nats_wire as wire
 from server.bus.bus import ALL, FRAME_LIVES_S, SUMMARY, UNSERVED, Frame, NotServed, Watcher
 from server.bus.log_runs import Resumed
-from server.bus.nats_link import processed
 from server.bus.nats_logs import RemoteLogs
 from server.bus.nats_pulls import Pulls
 from server.bus.nats_questions import GONE_AFTER_S, AgentLiveness, Questions, ReadEvent
@@ -73,7 +72,6 @@ class NatsBus:
         self._questions.client = client
         await client.subscribe(wire.subject("*", "events"), cb=self._on_events)
         await client.subscribe(wire.subject("*", "here"), cb=self._on_here)
-        await processed(client)
         self._look(ALL)
 
     async def stop(self) -> None:

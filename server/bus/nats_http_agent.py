@@ -15,6 +15,7 @@ from nats.errors import Error as NatsError
 
 from server.bus import nats_http as http
 from server.bus import nats_wire as wire
+from server.system.supervision import Supervisor, cancel
 
 log = logging.getLogger("catgraph.bus")
 
@@ -137,6 +138,7 @@ class HttpAgent:
         self._client: Client | None = None
         self._answering: dict[str, Answering] = {}
         self._tasks: set[asyncio.Task[None]] = set()
+        self._supervisor: Supervisor | None = None
         self._subscriptions: list[Subscription] = []
         self.refused = 0  # what could not be read, or was too much
 
@@ -147,8 +149,9 @@ class HttpAgent:
         """Nothing."""
 
     async def start(self, client: Client) -> None:
-        if self._client is None:
-            self._spawn(self._give_up_unasked())
+        if self._supervisor is None:
+            self._supervisor = Supervisor("requests from the broker")
+            self._supervisor.keep("give up", self._give_up_unasked)
         self._client = client
         self._subscriptions.clear()  # of the client before
         for vehicle in self._vehicles():
@@ -160,9 +163,10 @@ class HttpAgent:
             for subscription in self._subscriptions:
                 await subscription.unsubscribe()
         self._subscriptions.clear()
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        if self._supervisor is not None:
+            await self._supervisor.stop()
+            self._supervisor = None
+        await cancel(self._tasks)
         self._answering.clear()
         self._client = None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import secrets
 import ssl
 from collections.abc import Callable
@@ -18,12 +19,14 @@ from nats.errors import NoServersError
 from server.bus import nats_wire as wire
 from server.bus.broker import Broker, BrokerRefused
 from server.bus.nats_spares import Spares
+from server.system.supervision import Supervisor
 
 log = logging.getLogger("catgraph.bus")
 
 SPARES = 2  # of an agent, which a radio may be before
 RETRY_S = 1.0
-MOST_AT_ONCE = 4  # connections in a row that are taken without a pause, though none could be worked by
+MOST_AT_ONCE = 4  # connections in a row that are taken without a pause, though none worked for long
+WORKS_S = 2.0
 AGAIN_S = 0.3  # between the two tries of a dial: a broker may just have started
 TRIES = 1  # of a dial, beside the first
 CONNECTS_WITHIN_S = 3
@@ -78,7 +81,7 @@ class BrokerLink:
         self._spares = Spares(self._dial, broker.address, spares)
         self._client: Client | None = None
         self._pinging: asyncio.Task[Any] | None = None  # by that client
-        self._tasks: list[asyncio.Task[None]] = []
+        self._supervisor: Supervisor | None = None
         self._is_started = False
         self._why = "it was not reached yet"
         self._logged: dict[str, float] = {}  # when each complaint was logged
@@ -115,20 +118,17 @@ class BrokerLink:
         """Begin to connect, in the background, because everything else works without a broker."""
         for part in self._parts:
             part.open()
-        self._tasks = [
-            asyncio.create_task(self._run(), name="broker link"),
-            asyncio.create_task(self._spares.run(), name="spare connections"),
-        ]
+        self._supervisor = Supervisor("broker")
+        self._supervisor.keep("link", self._run)
+        self._supervisor.keep("spare connections", self._spares.run)
 
     async def stop(self) -> None:
-        if not self._tasks:
+        if self._supervisor is None:
             return
         for part in self._parts:
             part.close()
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        self._tasks = []
+        await self._supervisor.stop()
+        self._supervisor = None
         self._is_started = False
         for part in self._parts:
             await part.stop()
@@ -136,15 +136,20 @@ class BrokerLink:
         await self._spares.close()
 
     async def _run(self) -> None:
+        now = asyncio.get_running_loop().time
         failed = 0  # in a row
+        await self._give_up()
         while True:
             self._client = client = await self._spares.take()
+            long_enough_s = math.inf
             self._refused.clear()  # its rights may be others
             try:
                 for part in self._parts:
                     await part.start(client)
                 await self._answers(client)
+                self._spares.works()
                 self._is_started = True
+                long_enough_s = now() + WORKS_S
                 log.info("broker_connected address=%s", self._broker.address)
                 self._pinging = asyncio.create_task(_ping(client), name="ping the broker")
                 while client.is_connected and not self._pinging.done():
@@ -153,10 +158,10 @@ class BrokerLink:
                     await self._on_error(TimeoutError("it does not answer"))
             except Exception as why:  # whatever it was: without a link a car would be lost for good
                 await self._on_error(why)
-            failed = 0 if self._is_started else failed + 1
-            self._is_started = False
+            is_lost, self._is_started = self._is_started, False
+            failed = 0 if now() >= long_enough_s else failed + 1
             await self._give_up()
-            if failed > MOST_AT_ONCE or (failed and not self._spares.is_any):
+            if failed > MOST_AT_ONCE or (failed and not is_lost and not self._spares.is_any):
                 await asyncio.sleep(RETRY_S)
 
     async def _give_up(self) -> None:
@@ -176,8 +181,10 @@ class BrokerLink:
         began_s = now()
         while not self._pinging.done():
             await asyncio.wait({self._pinging}, timeout=LOOKS_EVERY_S)
-            is_late = now() - began_s >= ANSWERS_WITHIN_S and self._spares.is_any
-            if not self._pinging.done() and (is_late or not client.is_connected):
+            is_late = self._spares.is_newer or (now() - began_s >= ANSWERS_WITHIN_S and self._spares.is_any)
+            if not self._pinging.done() and not client.is_connected:
+                raise client.last_error or ConnectionResetError("it ended the connection")
+            if not self._pinging.done() and is_late:
                 raise TimeoutError("it does not answer")
         self._pinging.result()
 

@@ -21,7 +21,7 @@ RETRY_S = 0.5  # after a pull that nobody answered
 EVERY_S = 0.1  # a state is made
 SLOW_S = 0.15  # the round trip from which on several pulls are under way
 SMOOTHING = 0.75
-MOST_UNDER_WAY = 4  # compressed, they are as many bytes as one state is
+MOST_UNDER_WAY = 6  # compressed, they are fewer bytes than one state is
 Keep = Callable[[str, str, str | bytes, float], None]
 Refuse = Callable[[str, str, str], None]
 

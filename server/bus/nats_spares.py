@@ -9,23 +9,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import random
-from collections.abc import Awaitable, Callable, Collection
-from typing import Any
+from collections.abc import Awaitable, Callable
 from urllib.parse import urlsplit
 
 from nats.aio.client import Client
 
+from server.bus.nats_probe import EVERY_S, SLOWLY_AFTER_S, PortProbe
+from server.system.supervision import cancel
+
 PORT = 4222
 RETRY_S = 1.0  # after a dial that the broker refused
 SPARE_RETRY_S = 10.0  # where it is not needed now
-PROBE_EVERY_S = 0.25  # a dial into the last moment of a gap is lost, and the system repeats it after 1 or 3 s
-PROBE_SLOWLY_S = 1.0  # where the broker was away for a minute
-PROBE_SLOWLY_AFTER_S = 60.0
-PROBE_SPREAD = 0.1  # of that time: the agents of a broker that was lost are not to dial it in step
-PROBE_FOR_S = 2.0
-REACHED_FOR_S = 2.0  # so long the answer to a probe counts
-MOST_DIALS = 6  # at once
+MOST_DIALS = 6  # at once, with those that settle, and in RETRY_S
 SETTLES_S = 3.0  # a broker pings a new connection after 2.0 to 2.4 s: lost in a gap, that holds up all that follows
 KEEP_EVERY_S = 20.0  # one is pinged: networks forget silent connections, and the broker would ping after 2 min
 KEPT_WITHIN_S = 5
@@ -40,51 +35,58 @@ class Spares:
         self._dial = dial
         self._count = count
         at = urlsplit(address)
-        self._host, self._port = at.hostname or "", at.port or PORT
+        # Where a connection lives, a refusal shows that the radio is back: new ones may be refused, by whatever it is.
+        self._probe = PortProbe(at.hostname or "", at.port or PORT, lambda: self.is_any)
         self._idle: list[Client] = []  # the one that was silent for longest comes first
         self._dials: set[asyncio.Task[None]] = set()  # those as well that wait until they may be tried again
         self._settling: dict[asyncio.Task[None], Client] = {}  # new ones, and one that is pinged
         self._closing: set[asyncio.Task[None]] = set()
-        self._probing: asyncio.Task[None] | None = None
+        self._begun_s: list[float] = []  # when dials were begun of late
         self._needed = asyncio.Event()  # there is no connection to work by
-        self._changed, self._dialled, self._reached = asyncio.Event(), asyncio.Event(), asyncio.Event()
-        self._reached_s = -REACHED_FOR_S
+        self._is_proven = True  # the one that was taken answers
+        self._unsettled: list[Client] = []
+        self._changed, self._dialled = asyncio.Event(), asyncio.Event()
 
     @property
     def is_any(self) -> bool:
         return any(one.is_connected for one in self._idle)
 
+    @property
+    def is_newer(self) -> bool:
+        """Whether there is one that answered since the last one was taken."""
+        return self._dialled.is_set() and self.is_any
+
     async def run(self) -> None:
         """Dial what is missing, as many at once: over a bad radio a dial takes seconds."""
         now = asyncio.get_running_loop().time
         keep_at_s = now() + KEEP_EVERY_S
-        try:
-            while True:
-                self._changed.clear()
-                self._forget_ended()
-                is_needed = self._needed.is_set()
-                there = len(self._idle) + (0 if is_needed else len(self._settling))
-                self._begin(self._count + is_needed - there - len(self._dials))
-                with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout_at(keep_at_s):
-                        await self._changed.wait()
-                if now() < keep_at_s:
-                    continue
-                keep_at_s = now() + KEEP_EVERY_S
-                if self._idle and not self._needed.is_set():  # while its ping is under way another one is given
-                    self._settle(self._idle.pop(0))
-        finally:
-            await _cancel(self._dials)
+        while True:
+            self._changed.clear()
+            self._forget_ended()
+            is_needed = self._needed.is_set()
+            there = len(self._idle) + (0 if is_needed else len(self._settling))
+            self._begin(self._count + is_needed - there - len(self._dials))
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout_at(keep_at_s):
+                    await self._changed.wait()
+            if now() < keep_at_s:
+                continue
+            keep_at_s = now() + KEEP_EVERY_S
+            if self._idle and not self._needed.is_set():  # while its ping is under way another one is given
+                self._settle(self._idle.pop(0))
 
     async def take(self) -> Client:
         """The next one to work by: an idle one, as soon as the broker's port answers, or else one that is new."""
         self._need()
+        self._is_proven = False
         began_s = asyncio.get_running_loop().time()
-        probing = self._probe_once()
+        probing = self._probe.begin()
         dialled = asyncio.create_task(self._dialled.wait())
         try:
-            await asyncio.wait({probing, dialled}, return_when=asyncio.FIRST_COMPLETED)
-            if probing.done() and asyncio.get_running_loop().time() - began_s > 2 * PROBE_EVERY_S:
+            # In a gap it would be lost as the one before; where no new connection is let through, it is the only one.
+            wait_s = SLOWLY_AFTER_S if self.is_any else None
+            await asyncio.wait({probing, dialled}, timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
+            if probing.done() and asyncio.get_running_loop().time() - began_s > 2 * EVERY_S:
                 self._begin(1 + self._count)  # beside those whose first packet waits to be repeated
             while True:
                 while self._idle:
@@ -95,18 +97,33 @@ class Spares:
                 await self._dialled.wait()
         finally:  # without a pause: cancelled in one, the client that is returned would be lost
             self._needed.clear()
+            self._dialled.clear()
             self._changed.set()  # one is missing now
             dialled.cancel()
-            if self._probing is not None:
-                self._probing.cancel()
-                self._probing = None
+            self._probe.end()
+
+    def works(self) -> None:
+        """The one that was taken last answers."""
+        self._is_proven = True
+        for one in self._unsettled:
+            if one in self._idle:
+                self._idle.remove(one)
+                self._settle(one, SETTLES_S)
+        self._unsettled.clear()
 
     def _begin(self, dials: int) -> None:
-        for _ in range(min(dials, MOST_DIALS - len(self._dials))):
+        loop = asyncio.get_running_loop()
+        self._begun_s = [at_s for at_s in self._begun_s if loop.time() - at_s < RETRY_S]
+        open_ones = len(self._dials) + sum(one.is_connected for one in self._settling.values())
+        most = MOST_DIALS - max(open_ones, len(self._begun_s))
+        for _ in range(min(dials, most)):
+            self._begun_s.append(loop.time())
             task = asyncio.create_task(self._add(), name="spare connection")
             self._dials.add(task)
             task.add_done_callback(self._dials.discard)
             task.add_done_callback(lambda _: self._changed.set())
+        if dials > most:
+            loop.call_later(RETRY_S, self._changed.set)
 
     async def _add(self) -> None:
         try:
@@ -115,8 +132,9 @@ class Spares:
             return
         except Exception:  # `dial` reported it; without another try a car would be lost for good
             return await self._wait_to_dial()
-        if self._needed.is_set() and not (self._dialled.is_set() and self.is_any):
+        if (self._needed.is_set() or not self._is_proven) and not self.is_newer:
             self._idle.insert(0, one)
+            self._unsettled.append(one)
             return self._dialled.set()
         return self._settle(one, SETTLES_S)
 
@@ -129,7 +147,7 @@ class Spares:
             return
         await asyncio.sleep(RETRY_S)
         if self._needed.is_set():  # while the broker is away only its port is dialled
-            await asyncio.wait({self._probe_once()})
+            await asyncio.wait({self._probe.begin()})
 
     def _settle(self, one: Client, after_s: float = 0.0) -> None:
         task = asyncio.create_task(self._put_last(one, after_s), name="spare connection")
@@ -145,7 +163,7 @@ class Spares:
         except Exception:  # whatever it was: it does not answer
             return self._drop(one)
         self._forget_ended()
-        if len(self._idle) >= self._count + self._needed.is_set():  # one more where none works
+        if len(self._idle) >= self._count + (self._needed.is_set() or not self._is_proven):  # one more where none works
             return self._drop(one)
         self._idle.append(one)
         return self._dialled.set()
@@ -155,6 +173,7 @@ class Spares:
             if not one.is_connected:
                 self._drop(one)
         self._idle = [one for one in self._idle if one.is_connected]
+        self._unsettled = [one for one in self._unsettled if one in self._idle]
 
     def _need(self) -> None:
         self._needed.set()
@@ -173,52 +192,18 @@ class Spares:
         await asyncio.sleep(0)
 
     async def close(self) -> None:
+        self._probe.end()
+        await cancel(self._dials)
         clients = [*self._idle, *self._settling.values()]
         self._idle.clear()
-        await _cancel([*self._settling])
+        await cancel(self._settling)
         for one in clients:
             self._drop(one)
         if self._closing:
             await asyncio.wait(self._closing, timeout=CLOSES_WITHIN_S)
-        await _cancel(self._closing)
-
-    def _probe_once(self) -> asyncio.Task[None]:
-        """The probe that is under way, or a new one."""
-        if self._probing is None or self._probing.done():
-            self._probing = asyncio.create_task(self._probe(), name="probe the broker's port")
-        return self._probing
-
-    async def _probe(self) -> None:
-        """Return once the broker's port answers a dial, a new one every moment."""
-        now = asyncio.get_running_loop().time
-        began_s, dials = now(), set[asyncio.Task[None]]()
-        self._reached.clear()
-        try:
-            while now() - self._reached_s >= REACHED_FOR_S:
-                dials.add(asyncio.create_task(self._reach()))
-                wait_s = PROBE_EVERY_S if now() - began_s < PROBE_SLOWLY_AFTER_S else PROBE_SLOWLY_S
-                with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(wait_s * random.uniform(1 - PROBE_SPREAD, 1 + PROBE_SPREAD)):
-                        await self._reached.wait()
-                dials = {dial for dial in dials if not dial.done()}
-        finally:
-            await _cancel(dials)
-
-    async def _reach(self) -> None:
-        with contextlib.suppress(Exception):  # whatever it was: it was not reached
-            async with asyncio.timeout(PROBE_FOR_S):
-                _, writer = await asyncio.open_connection(self._host, self._port)
-            writer.close()
-            self._reached_s = asyncio.get_running_loop().time()
-            self._reached.set()
+        await cancel(self._closing)
 
 
 async def _close(one: Client) -> None:
     with contextlib.suppress(Exception):  # one that never connected cannot be closed
         await one.close()
-
-
-async def _cancel(tasks: Collection[asyncio.Task[Any]]) -> None:
-    for task in tasks:
-        task.cancel()
-    await asyncio.gather(*tasks, return_exceptions=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Collection, Coroutine
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,10 +76,7 @@ class Supervisor:
         tasks = {kept.task for kept in self._kept.values() if kept.task is not None}
         for name in list(self._kept):
             self.end(name)
-        while tasks:
-            _, tasks = await asyncio.wait(tasks, timeout=CANCEL_AGAIN_S)
-            for task in tasks:
-                task.cancel()
+        await cancel(tasks)
 
     def keeps(self, name: str) -> bool:
         """Whether a task of that name is supervised."""
@@ -138,3 +135,12 @@ class Supervisor:
             self._on_restart(name, kept.why)
         except Exception:  # the log of restarts may fail; the restart has happened
             log.exception("task restart not reported: owner=%s task=%s", self._owner, name)
+
+
+async def cancel(tasks: Collection[asyncio.Task[None]]) -> None:
+    """Returns once all of these have ended."""
+    left = set(tasks)
+    while left:
+        for task in left:
+            task.cancel()
+        _, left = await asyncio.wait(left, timeout=CANCEL_AGAIN_S)

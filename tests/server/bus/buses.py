@@ -92,6 +92,7 @@ async def node(address: str, clock: Clock, *, read: Read = as_it_is, **more: Any
     async with connected(address) as client:
         bus = NatsBus(now=clock, read=read, **more)
         await bus.start(client)
+        await processed(client)
         try:
             yield bus
         finally:

@@ -18,6 +18,7 @@ from server.bus.bus import NotServed
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus
 from server.bus.nats_link import BrokerLink
+from server.bus.nats_spares import MOST_DIALS
 from tests.server.bus.broker import running_broker
 from tests.server.bus.buses import local_buses, until
 from tests.server.bus.test_broker_users import fleet, key_file, linked
@@ -66,29 +67,51 @@ def link_to(address: str, *parts: Any, spares: int = 2) -> BrokerLink:
     return BrokerLink(BrokerAddress(address=address), *parts, name="test", spares=spares)
 
 
+class Ends(Idle):
+    """A connection that the broker ends after it has answered so many pings."""
+
+    def __init__(self, answers: int) -> None:
+        super().__init__("x", [])
+        self.is_connected = answers > 0
+        self._left = answers
+
+    async def rtt(self, timeout: float) -> float:
+        await asyncio.sleep(0.001)
+        self._left -= 1
+        asyncio.get_running_loop().call_later(0.01, lambda: setattr(self, "is_connected", self._left > 0))
+        return 0.001
+
+
 @pytest.mark.virtual_time
-async def test_a_broker_that_ends_each_connection_is_dialled_about_once_a_second() -> None:
-    """As one does that allows fewer subscriptions than are needed."""
+@pytest.mark.parametrize("spares", [0, 2])
+@pytest.mark.parametrize("ends_after", ["dial", "start", "ping", "second ping"])
+async def test_a_broker_that_ends_each_connection_is_dialled_a_few_times_a_second(ends_after: str, spares: int) -> None:
+    """As one does that allows fewer subscriptions than are needed, or a proxy whose broker is away."""
     made: list[Idle] = []
+    most = 0
 
     async def dial() -> Client:
+        nonlocal most
         await asyncio.sleep(0.01)
-        made.append(Idle("x", []))
+        made.append(Ends({"dial": 0, "start": 1, "ping": 1, "second ping": 2}[ends_after]))
+        most = max(most, sum(one.is_connected for one in made))
         return cast(Client, made[-1])
 
     async def start(client: Client) -> None:
-        await client.close()
-        raise ConnectionResetError
+        if ends_after == "start":
+            await client.close()
+            raise ConnectionResetError
 
     async def stop() -> None: ...
 
     part = SimpleNamespace(open=lambda: None, close=lambda: None, start=start, stop=stop)
-    link = link_to("nats://127.0.0.1:1", part)
+    link = link_to("nats://127.0.0.1:1", part, spares=spares)
     link._spares._dial = dial
     link.start()
     try:
         await asyncio.sleep(60)
-        assert 30 <= len(made) <= 130
+        assert 20 <= len(made) <= 60 * MOST_DIALS + MOST_DIALS
+        assert most <= 2 * MOST_DIALS + spares, "however long it goes on"
     finally:
         await link.stop()
 

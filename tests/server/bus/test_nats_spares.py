@@ -80,18 +80,23 @@ class Cable:
 def _soon_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(nats_link, "PING_EVERY_S", 0.05)
     monkeypatch.setattr(nats_link, "PING_ANSWERED_WITHIN_S", 1)
-    monkeypatch.setattr(nats_link, "ANSWERS_WITHIN_S", 0.5)
+    monkeypatch.setattr(nats_link, "ANSWERS_WITHIN_S", 1.0)
     monkeypatch.setattr(nats_spares, "SETTLES_S", 0.05)
 
 
 @contextlib.asynccontextmanager
-async def with_spares() -> AsyncIterator[tuple[Cable, BrokerLink, Buses]]:
-    """An agent whose three connections have each a line: the first one works, and two are spare."""
+async def with_spares(*, more: bool = True) -> AsyncIterator[tuple[Cable, BrokerLink, Buses]]:
+    """An agent whose three connections have each a line: the first one works, and two are spare. `more`: it can dial
+    others."""
     turn = asyncio.Lock()
+    made: list[Client] = []
 
     async def dial() -> Client:
         async with turn:  # in the order of the lines
-            return await link._dial()
+            if len(made) == 3 and not more:
+                raise ConnectionRefusedError
+            made.append(await link._dial())
+            return made[-1]
 
     async with running_broker() as broker, local_buses() as both, node(broker.address, both.clock) as page:
         both.page = page
@@ -112,7 +117,7 @@ async def with_spares() -> AsyncIterator[tuple[Cable, BrokerLink, Buses]]:
 @pytest.mark.usefixtures("_soon_lost")
 @pytest.mark.parametrize("lost", [1, 2, 3])
 async def test_the_first_connection_that_answers_takes_the_place_of_a_lost_one(lost: int) -> None:
-    async with with_spares() as (cable, link, both):
+    async with with_spares(more=lost == 3) as (cable, link, both):
         before = link._client
         spares = list(link._spares._idle)
         for line in cable.lines[:lost]:
@@ -123,7 +128,7 @@ async def test_the_first_connection_that_answers_takes_the_place_of_a_lost_one(l
         both.page.watch("ocelot", lambda _: None)
         await until(lambda: (frame := both.page.newest("ocelot", "state")) and frame.payload == "back")
         assert (await both.page.request("ocelot", {"what": 1}))["got"] == 1
-        await until(lambda: len(link._spares._idle) == 2)
+        await until(lambda: len(link._spares._idle) == (2 if lost == 3 else 2 - lost))
         assert both.page.link_trouble("ocelot") is None  # type: ignore[attr-defined]
 
 
@@ -172,7 +177,7 @@ async def test_a_lost_connection_that_comes_to_life_again_answers_and_doubles_no
 @pytest.mark.usefixtures("_soon_lost")
 async def test_a_connection_that_nothing_reads_any_more_is_given_up() -> None:
     """A client whose reading task has ended goes on as connected, and its flush returns at once."""
-    async with with_spares() as (_, link, both):
+    async with with_spares(more=False) as (_, link, both):
         first, spare, other = link._client, *link._spares._idle
         worked: list[Client | None] = []
 
@@ -210,6 +215,19 @@ async def test_the_answer_to_an_order_comes_by_the_connection_that_follows() -> 
         assert len(both.commands) == 1
 
 
+@pytest.mark.usefixtures("_soon_lost")
+async def test_a_new_connection_is_taken_at_once_where_the_idle_ones_are_dead_as_well(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As after a change of this program's address."""
+    monkeypatch.setattr(nats_link, "ANSWERS_WITHIN_S", 60.0)
+    async with with_spares() as (cable, link, _):
+        before = [link._client, *link._spares._idle]
+        for line in cable.lines:
+            line.passes.clear()
+        await until(lambda: link._client not in before and link.complaint is None)
+
+
 async def test_a_broker_that_refuses_spare_connections_is_used_without(tmp_path: Any) -> None:
     (tmp_path / "few.conf").write_text("max_connections: 1\n")
     async with running_broker(include=tmp_path / "few.conf") as broker, local_buses() as both:
@@ -229,6 +247,7 @@ class Idle:
     def __init__(self, name: str, pinged: list[str]) -> None:
         self.name = name
         self.answers = self.is_connected = True
+        self.last_error: Exception | None = None
         self._pinged = pinged
 
     async def rtt(self, timeout: float) -> float:
@@ -259,12 +278,14 @@ async def test_spare_connections_are_pinged_in_turn_and_the_one_that_was_silent_
     running = asyncio.create_task(spares.run())
     try:
         assert cast(Any, await spares.take()).name == "a"
+        spares.works()
         await asyncio.sleep(SETTLES_S - 0.1)
         assert not spares._idle
         await asyncio.sleep(3.5 * KEEP_EVERY_S)
         assert pinged == ["b", "c", "b", "c", "b"], "first once the broker has pinged it, then in turn"
-        spares._reached_s = asyncio.get_running_loop().time()  # the broker's port has just answered
+        spares._probe.reached_s = asyncio.get_running_loop().time()  # the broker's port has just answered
         assert cast(Any, await spares.take()).name == "c"
+        spares.works()
         made[1].answers = False
         await asyncio.sleep(SETTLES_S + KEEP_EVERY_S + KEPT_WITHIN_S + 3)
         assert not made[1].is_connected
@@ -274,6 +295,28 @@ async def test_spare_connections_are_pinged_in_turn_and_the_one_that_was_silent_
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
         await spares.close()
+
+
+@pytest.mark.virtual_time
+async def test_an_agent_goes_on_announcing_itself_whatever_a_client_raises() -> None:
+    sent: list[str] = []
+
+    async def nothing(*_: Any, **__: Any) -> Any: ...
+
+    async def publish(subject: str, body: bytes) -> None:
+        sent.append(subject)
+        if len(sent) == 3:
+            raise RuntimeError("unable to perform operation; the handler is closed")
+
+    async with local_buses() as both:
+        agent = NatsAgent(both.session, run="a", now=both.clock)
+        client = SimpleNamespace(subscribe=nothing, publish=publish, is_connected=True)
+        await agent.start(cast(Client, client))
+        await asyncio.sleep(5)
+        assert len(sent) >= 9
+        agent._client = None
+        agent._subscriptions.clear()
+        await agent.stop()
 
 
 async def test_an_agent_announces_itself_in_one_packet_with_its_subscriptions() -> None:
@@ -315,8 +358,11 @@ async def test_an_agent_offers_a_vehicle_that_came_later_from_its_next_connectio
                 bus.serve(vehicle, both.answer)
             sent.clear()
             await agent.start(client)
-            begun.append(len(agent._tasks))
-        assert begun == [1] * 4, "one task announces it, however many connections there were"
+            begun.append(
+                {task for task in asyncio.all_tasks() if task.get_name() == "agent at the broker announcements"}
+            )
+        assert len(begun[0]) == 1
+        assert begun == [begun[0]] * 4, "one task announces it, however many connections there were"
         assert {subject.split(".")[1] for subject in sent if subject.endswith("here")} == {"ocelot", "margay"}
         agent._client = None
         agent._subscriptions.clear()

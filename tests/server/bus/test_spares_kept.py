@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
+import threading
 from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any, cast
 
 import pytest
 from nats.aio.client import Client
 
-from server.bus import nats_spares
+from server.bus import nats_probe, nats_spares
+from server.bus.nats_probe import SLOWLY_AFTER_S
 from server.bus.nats_spares import KEEP_EVERY_S, RETRY_S, SETTLES_S, Spares
+from tests.server.bus.buses import until
 from tests.server.bus.test_nats_spares import Idle
 
 NOWHERE = "nats://127.0.0.1:1"  # no probe reaches it
@@ -48,6 +52,100 @@ async def kept(dial: Callable[[], Awaitable[Client]], count: int) -> AsyncIterat
 async def taken(spares: Spares, within_s: float) -> Any:
     async with asyncio.timeout(within_s):
         return await spares.take()
+
+
+@pytest.mark.virtual_time
+async def test_what_is_dialled_before_the_taken_connection_answers_is_taken_next_and_else_settles() -> None:
+    dials = Dials(5)
+    async with kept(dials, 1) as spares:
+        assert (await taken(spares, 1)).name == "a"
+        assert not spares.is_newer
+        await asyncio.sleep(0.2)
+        assert spares.is_newer
+        newest = dials.made[-1]
+        assert await taken(spares, 0.1) is newest
+        await asyncio.sleep(0.2)
+        assert spares.is_newer
+        spares.works()
+        assert not spares._idle, "the broker has not pinged it yet"
+        await asyncio.sleep(SETTLES_S + 0.1)
+        assert len(spares._idle) == 1
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize("refuses", [True, False])
+async def test_an_idle_connection_is_taken_where_no_new_one_is_let_through(
+    refuses: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by a firewall."""
+
+    async def open_connection(*_: Any) -> Any:
+        if refuses:
+            raise ConnectionRefusedError
+        await asyncio.sleep(3600)
+
+    monkeypatch.setattr(asyncio, "open_connection", open_connection)
+    async with kept(Dials(2), 1) as spares:
+        assert (await taken(spares, 1)).name == "a"
+        spares.works()
+        await asyncio.sleep(SETTLES_S + 0.3)
+        assert (await taken(spares, 1 if refuses else SLOWLY_AFTER_S + 1)).name == "b"
+
+
+async def test_a_name_is_looked_up_beside_all_other_work_and_its_last_address_is_dialled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In a gap a resolver may be behind the radio."""
+    lookups: list[str] = []
+    goes_on = threading.Event()
+    dialled: list[str] = []
+
+    def getaddrinfo(host: str, *_: Any, **__: Any) -> Any:
+        lookups.append(host)
+        if len(lookups) > 1:
+            goes_on.wait(30)
+        return [(socket.AF_INET, socket.SOCK_STREAM, 6, "", ("192.0.2.1", 4222))]
+
+    async def open_connection(host: str, *_: Any) -> Any:
+        dialled.append(host)
+        raise OSError
+
+    monkeypatch.setattr(socket, "getaddrinfo", getaddrinfo)
+    monkeypatch.setattr(asyncio, "open_connection", open_connection)
+    monkeypatch.setattr(nats_probe, "EVERY_S", 0.01)
+    monkeypatch.setattr(nats_probe, "LOOK_UP_EVERY_S", 0.05)
+    probe = nats_probe.PortProbe("broker.example", 4222, lambda: False)
+    try:
+        probe.begin()
+        await until(lambda: len(lookups) == 2)
+        before = len(dialled)
+        await until(lambda: len(dialled) > before + 20)
+        assert await asyncio.to_thread(lambda: "at once") == "at once"
+        assert len(lookups) == 2
+        assert set(dialled) == {"192.0.2.1"}
+    finally:
+        goes_on.set()
+        probe.end()
+
+
+@pytest.mark.virtual_time
+async def test_a_dial_that_misses_its_cancellation_is_cancelled_again() -> None:
+    """asyncio.wait_for of Python 3.11 loses one that comes with its result."""
+    cancelled = 0
+
+    async def dial() -> Client:
+        nonlocal cancelled
+        while cancelled < 2:
+            try:
+                await asyncio.sleep(3600)
+            except asyncio.CancelledError:
+                cancelled += 1
+        raise asyncio.CancelledError
+
+    async with asyncio.timeout(5):
+        async with kept(dial, 1):
+            await asyncio.sleep(0.1)
+    assert cancelled == 2
 
 
 @pytest.mark.virtual_time
