@@ -35,6 +35,11 @@ class PortProbe:
         self._reached = asyncio.Event()
         self.reached_s = -REACHED_FOR_S
 
+    @property
+    def is_reached(self) -> bool:
+        """Whether it answered of late."""
+        return asyncio.get_running_loop().time() - self.reached_s < REACHED_FOR_S
+
     def begin(self) -> asyncio.Task[None]:
         """Ends once the port answers, or has answered of late: the probe that is under way, or a new one."""
         if self._task is None or self._task.done():
@@ -51,7 +56,7 @@ class PortProbe:
         began_s, dials = now(), set[asyncio.Task[None]]()
         self._reached.clear()
         try:
-            while now() - self.reached_s >= REACHED_FOR_S:
+            while not self.is_reached:
                 self._look_up()
                 dials |= {asyncio.create_task(self._reach(one)) for one in self._addresses[:MOST_ADDRESSES]}
                 wait_s = EVERY_S if now() - began_s < SLOWLY_AFTER_S else SLOWLY_S
@@ -72,9 +77,6 @@ class PortProbe:
                 return
         except Exception:  # whatever it was: it was not reached
             return
-        self._is_reached()
-
-    def _is_reached(self) -> None:
         self.reached_s = asyncio.get_running_loop().time()
         self._reached.set()
 

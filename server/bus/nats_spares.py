@@ -116,6 +116,8 @@ class Spares:
         self._begun_s = [at_s for at_s in self._begun_s if loop.time() - at_s < RETRY_S]
         open_ones = len(self._dials) + sum(one.is_connected for one in self._settling.values())
         most = MOST_DIALS - max(open_ones, len(self._begun_s))
+        if self._needed.is_set() and not self._probe.is_reached:  # each looks the name up in threads that all share
+            most = min(most, 1 - len(self._dials))
         for _ in range(min(dials, most)):
             self._begun_s.append(loop.time())
             task = asyncio.create_task(self._add(), name="spare connection")

@@ -17,7 +17,7 @@ from server.bus.broker import Broker as BrokerAddress
 from server.bus.bus import NotServed
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus
-from server.bus.nats_link import BrokerLink
+from server.bus.nats_link import MOST_AT_ONCE, RETRY_S, BrokerLink
 from server.bus.nats_spares import MOST_DIALS
 from tests.server.bus.broker import running_broker
 from tests.server.bus.buses import local_buses, until
@@ -88,7 +88,7 @@ class Ends(Idle):
 async def test_a_broker_that_ends_each_connection_is_dialled_a_few_times_a_second(ends_after: str, spares: int) -> None:
     """As one does that allows fewer subscriptions than are needed, or a proxy whose broker is away."""
     made: list[Idle] = []
-    most = 0
+    most = starts = 0
 
     async def dial() -> Client:
         nonlocal most
@@ -98,6 +98,8 @@ async def test_a_broker_that_ends_each_connection_is_dialled_a_few_times_a_secon
         return cast(Client, made[-1])
 
     async def start(client: Client) -> None:
+        nonlocal starts
+        starts += 1
         if ends_after == "start":
             await client.close()
             raise ConnectionResetError
@@ -111,6 +113,7 @@ async def test_a_broker_that_ends_each_connection_is_dialled_a_few_times_a_secon
     try:
         await asyncio.sleep(60)
         assert 20 <= len(made) <= 60 * MOST_DIALS + MOST_DIALS
+        assert starts <= 60 / RETRY_S + 2 * MOST_AT_ONCE, "each is logged"
         assert most <= 2 * MOST_DIALS + spares, "however long it goes on"
     finally:
         await link.stop()

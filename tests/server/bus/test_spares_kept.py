@@ -104,6 +104,7 @@ async def test_a_name_is_looked_up_beside_all_other_work_and_its_last_address_is
         lookups.append(host)
         if len(lookups) > 1:
             goes_on.wait(30)
+            raise socket.gaierror
         return [(socket.AF_INET, socket.SOCK_STREAM, 6, "", ("192.0.2.1", 4222))]
 
     async def open_connection(host: str, *_: Any) -> Any:
@@ -122,6 +123,10 @@ async def test_a_name_is_looked_up_beside_all_other_work_and_its_last_address_is
         await until(lambda: len(dialled) > before + 20)
         assert await asyncio.to_thread(lambda: "at once") == "at once"
         assert len(lookups) == 2
+        goes_on.set()
+        await until(lambda: len(lookups) == 4)
+        before = len(dialled)
+        await until(lambda: len(dialled) > before)
         assert set(dialled) == {"192.0.2.1"}
     finally:
         goes_on.set()
@@ -204,6 +209,7 @@ async def test_a_spare_connection_is_pinged_while_another_one_is_refused() -> No
     dials = Dials(2)
     async with kept(dials, 2) as spares:
         await taken(spares, 1)
+        spares.works()
         await asyncio.sleep(3.5 * KEEP_EVERY_S)
         assert dials.pinged == ["b"] * 4
 
