@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 from monitor.alarm import Alarm
 from monitor.check import Verdict
 
 GRACE_S = 3.0  # for the alarms which explain that messages are missing: the messages need a moment to come again
 UNSEEN_S = 3.0  # beyond its on-delay an alarm that is not announced explains others for so long
+
+
+@dataclass(slots=True)
+class _Hidden:
+    """How long an alarm's fault has lasted since something that is not announced began to hide it."""
+
+    faulty_s: float = 0.0
+    at_s: float | None = None  # of the newest judgement, if that found the fault
+    gone_at_s: float | None = None  # since when its condition is absent
 
 
 class CauseTable:
@@ -25,6 +35,9 @@ class CauseTable:
     While its alarm is not announced, an inhibitor holds for its on-delay and `UNSEEN_S` at most: a condition that comes
     and goes faster than the on-delay would hide all that it explains, and nobody would be informed of anything. That
     time begins anew only after a pause in which all that it explains could be announced.
+
+    Several such conditions in turn hide an alarm no longer than the slowest one of them alone: once its fault has
+    lasted for their longest on-delay and `UNSEEN_S`, only announced alarms suppress it.
     """
 
     def __init__(
@@ -42,15 +55,21 @@ class CauseTable:
             self._visit(alarm_id, inhibited_by, ())
         self.inhibitors = frozenset(name for names in self._closure.values() for name in names)
         self._over_s = self._pauses()
+        self._most_hidden_s = {alarm_id: self._longest(names) for alarm_id, names in self._closure.items()}
         self._gone_at_s: dict[str, float | None] = {}  # when each inhibitor's condition went; None: it is there
         self._unseen_s: dict[str, float | None] = {}  # since when each holds unannounced; None: it is announced
+        self._announced: set[str] = set()  # the inhibitors that are
+        self._hidden: dict[str, _Hidden] = {}  # by the id of what is explained
         self._held: frozenset[str] = frozenset()  # the inhibitors that hold at `_held_s`
         self._held_s: float | None = None  # None: they are to be found anew
 
     def note(self, alarm: Alarm, now_s: float) -> None:
         """Store whether this alarm's condition holds; called after each of its evaluations."""
+        if alarm.id in self._hidden or (alarm.suppressed_by and alarm.condition):
+            self._note_hidden(alarm, now_s)
         if alarm.id not in self.inhibitors:
             return
+        (self._announced.add if alarm.active else self._announced.discard)(alarm.id)
         self._note_unseen(alarm, now_s)
         if alarm.condition:
             if self._gone_at_s.get(alarm.id, now_s) is not None:
@@ -71,6 +90,23 @@ class CauseTable:
         if unseen_s is None or unseen_s > now_s or (alarm.condition and is_over):
             self._unseen_s[alarm.id] = now_s
 
+    def _note_hidden(self, alarm: Alarm, now_s: float) -> None:
+        if not self._announced.isdisjoint(alarm.suppressed_by):
+            self._hidden.pop(alarm.id, None)
+            return
+        hidden = self._hidden.setdefault(alarm.id, _Hidden())
+        gone_at_s, at_s = hidden.gone_at_s, hidden.at_s
+        hidden.at_s = None
+        if not alarm.condition:
+            hidden.gone_at_s = now_s if gone_at_s is None else min(gone_at_s, now_s)
+            return
+        hidden.gone_at_s = None
+        if gone_at_s is not None and now_s - gone_at_s >= UNSEEN_S + GRACE_S:
+            hidden.faulty_s = 0.0
+        if alarm.finding is not None and alarm.finding.verdict is Verdict.FAULT:  # UNKNOWN pauses, as it does the delay
+            hidden.faulty_s += 0.0 if at_s is None else max(0.0, now_s - at_s)
+            hidden.at_s = now_s
+
     def holding(self, alarm_id: str, now_s: float) -> tuple[str, ...]:
         """The alarms that suppress this one now."""
         if not self._gone_at_s:
@@ -78,10 +114,17 @@ class CauseTable:
         if self._held_s != now_s:  # it is called for all alarms at each moment
             self._held_s = now_s
             self._held = frozenset(name for name in self._gone_at_s if self._holds(name, now_s))
-        held = self._held
-        return tuple(name for name in self._closure[alarm_id] if name in held) if held else ()
+        if not self._held:
+            return ()
+        by = tuple(name for name in self._closure[alarm_id] if name in self._held)
+        hidden = self._hidden.get(alarm_id)
+        if hidden is None or hidden.faulty_s <= self._most_hidden_s[alarm_id] or not self._announced.isdisjoint(by):
+            return by
+        return ()
 
     def clear(self) -> None:
+        self._announced.clear()
+        self._hidden.clear()
         self._gone_at_s.clear()
         self._unseen_s.clear()
         self._held_s = None
@@ -94,6 +137,10 @@ class CauseTable:
             for name in names:
                 longest[name] = max(longest[name], self._on_delay_s.get(alarm_id, 0.0))
         return {name: UNSEEN_S + self._grace_s.get(name, 0.0) + delay_s for name, delay_s in longest.items()}
+
+    def _longest(self, names: Iterable[str]) -> float:
+        """How long all of these may hide an alarm while none of them is announced."""
+        return UNSEEN_S + max((self._on_delay_s.get(name, 0.0) for name in names), default=0.0)
 
     def _holds(self, name: str, now_s: float) -> bool:
         gone_at_s, unseen_s = self._gone_at_s[name], self._unseen_s[name]
