@@ -25,7 +25,7 @@ _CHANGES_NOTHING = ("GET", "HEAD")
 
 
 class _Refused(Exception):
-    """Access denied; `answer` has the reason for a request, and a socket gets none."""
+    """Access denied; `answer` has the reason, also for a WebSocket."""
 
     def __init__(self, answer: Response) -> None:
         super().__init__()
@@ -122,8 +122,8 @@ class Guard:
     async def _socket(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
             known = self._let_socket_in(scope)
-        except _Refused:
-            await send({"type": "websocket.close", "code": 1008, "reason": ""})
+        except _Refused as refused:
+            await refused.answer(scope, receive, send)
             return
         scope[SCOPE_KEY] = known.who
         with self._access.visits.of(known.who.id, is_socket=True) as visit:
@@ -141,7 +141,9 @@ class Guard:
         self._check_names(headers, scheme)
         known = self._access.known(headers, scheme=scheme)
         if known is None:
-            raise _Refused(problem(401, "This device is not paired with the server."))
+            answer = problem(401, "This device is not paired with the server.")
+            answer.headers["WWW-Authenticate"] = "Bearer"
+            raise _Refused(answer)
         if known.by == "cookie":
             is_used = [self._access.use_ticket(ticket, known.who) for ticket in _tickets(scope)]
             if is_used != [True] or "origin" not in headers:

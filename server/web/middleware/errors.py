@@ -11,6 +11,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from starlette.exceptions import HTTPException
+from starlette.types import Receive, Scope, Send
 
 from server.bus.bus import NotServed
 from server.web.interface import PROBLEM_TYPE
@@ -39,16 +40,22 @@ def problem(status: int, detail: str, **more: Any) -> JSONResponse:
     return _Document(body, status_code=status, media_type=PROBLEM_TYPE)
 
 
+def problem_of(error: HTTPException) -> JSONResponse:
+    """The same of an error that was raised."""
+    answer = problem(error.status_code, str(error.detail), **getattr(error, "more", {}))
+    answer.headers.update(error.headers or {})
+    return answer
+
+
 def install(app: FastAPI) -> None:
-    """Lets the app answer all its errors this way."""
+    """Lets the app answer all its errors this way, also those of a WebSocket's handshake."""
+    app.router.default = _not_found
 
     @app.exception_handler(HTTPException)
     async def of_http(request: Request, error: HTTPException) -> Response:
         if error.status_code == 405:
             return _of_method(request)
-        answer = problem(error.status_code, str(error.detail), **getattr(error, "more", {}))
-        answer.headers.update(error.headers or {})
-        return answer
+        return problem_of(error)
 
     @app.exception_handler(NotServed)
     async def of_agent(_: Request, error: NotServed) -> JSONResponse:
@@ -67,6 +74,11 @@ def install(app: FastAPI) -> None:
     async def of_bug(_: Request, error: Exception) -> JSONResponse:
         log.error("a request failed", exc_info=error)
         return problem(500, "Internal server error; the server's log has the details.")
+
+
+async def _not_found(_scope: Scope, _receive: Receive, _send: Send) -> None:
+    """Raise the error of an unknown address; the router's own closes a WebSocket without a reason."""
+    raise HTTPException(404)
 
 
 def _of_method(request: Request) -> Response:

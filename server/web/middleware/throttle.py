@@ -12,7 +12,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.access.identity import LOCAL, SCOPE_KEY, Principal
 from server.protocol.rate_limit import Allowance, Limits, Rate
-from server.web.middleware.errors import problem
+from server.web.middleware.errors import problem, problem_of
 
 SLOW_DOWN_PATH = "/api/slow-down/"
 _UPLOAD = re.compile(r"(/agents/[^/]+)?/api/marks/[^/]+/(voice|photo)")
@@ -48,11 +48,21 @@ class Throttle:
                 await _too_long(most)(scope, receive, send)
                 return
             receive = self._bounded(receive, most, within_s)
+            if _has_body(scope) and not _is_upload_request(scope):
+                # A route without a body of its own would act before the rest of the request has come, or failed to.
+                try:
+                    whole = await _whole(receive)
+                except HTTPException as why:
+                    await problem_of(why)(scope, receive, send)
+                    return
+                if whole is None:
+                    return
+                receive = whole
         await self._app(scope, receive, send)
 
     def _room(self, scope: Scope) -> tuple[int, float]:
         """How long a body may be [B], and how long it may take [s]."""
-        if scope["method"] == "POST" and is_upload(scope["path"]):
+        if _is_upload_request(scope):
             return self._limits.upload_bytes, self._limits.upload_s
         return self._limits.body_bytes, self._limits.body_s
 
@@ -112,6 +122,35 @@ def _length(scope: Scope) -> int | None:
         if name == b"content-length":
             return int(value) if value.isdigit() and len(value) < 19 else None
     return 0
+
+
+def _has_body(scope: Scope) -> bool:
+    return any(
+        name == b"transfer-encoding" or (name == b"content-length" and value != b"0")
+        for name, value in scope["headers"]
+    )
+
+
+async def _whole(receive: Receive) -> Receive | None:
+    """Return what hands out the body in one piece once it has come; None: the client left before."""
+    body = bytearray()
+    while True:
+        message = await receive()
+        if message["type"] != "http.request":
+            return None
+        body += message.get("body", b"")
+        if not message.get("more_body", False):
+            break
+    kept: list[Message] = [{"type": "http.request", "body": bytes(body), "more_body": False}]
+
+    async def receive_whole() -> Message:
+        return kept.pop() if kept else await receive()
+
+    return receive_whole
+
+
+def _is_upload_request(scope: Scope) -> bool:
+    return scope["method"] == "POST" and is_upload(scope["path"])
 
 
 def is_upload(path: str) -> bool:

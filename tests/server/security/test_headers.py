@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import re
 from pathlib import Path
 
@@ -102,7 +103,29 @@ async def test_a_socket_that_is_refused_is_refused_with_them() -> None:
     async with serving(Config()) as base:
         with pytest.raises(websockets.InvalidStatus) as refused:
             await websockets.connect(f"{base.replace('http', 'ws')}/ws", origin="http://evil.example")  # type: ignore[arg-type]
-        assert refused.value.response.status_code == 403
+        _has_all(httpx.Headers(list(refused.value.response.headers.raw_items())), POLICY)
+
+
+@pytest.mark.parametrize(
+    ("path", "origin", "status", "detail"),
+    [
+        ("/ws", "http://evil.example", 403, "This request comes from another server's page."),
+        ("/wss", None, 404, "Not Found"),
+        ("/api/health", None, 404, "Not Found"),
+        ("/ws?vehicle=nobody", None, 404, "No vehicle is named nobody."),
+    ],
+)
+async def test_a_refused_socket_gets_the_same_document_as_a_request(
+    path: str, origin: str | None, status: int, detail: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with serving(Config()) as base:
+        with pytest.raises(websockets.InvalidStatus) as refused:
+            await websockets.connect(f"{base.replace('http', 'ws')}{path}", origin=origin)  # type: ignore[arg-type]
+        response = refused.value.response
+        assert response.headers["content-type"] == "application/problem+json"
+        document = json.loads(response.body)
+        assert (response.status_code, document["status"], document["detail"]) == (status, status, detail)
+    assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 
 def _has_all(headers: httpx.Headers, its_policy: str) -> None:

@@ -76,7 +76,7 @@ async def test_no_route_takes_a_body_without_end() -> None:
     """Declared in its head, and found while it comes."""
 
     async def endless() -> AsyncIterator[bytes]:
-        for _ in range(40):
+        for _ in range(20):
             yield b"[" * 16_384
 
     async with serving(Config()) as base, httpx.AsyncClient(base_url=base, timeout=20) as client:
@@ -85,10 +85,34 @@ async def test_no_route_takes_a_body_without_end() -> None:
             answer = await client.request(method, path, content=b" " * (most + 1), headers=JSON)
             assert answer.status_code == 413, (method, path)
             assert answer.json()["detail"] == f"At most {words} are taken."
-        for method, path in (("POST", "/api/connect"), ("PATCH", "/api/settings"), ("PUT", "/api/settings.toml")):
+        for method, path in routes_with_bodies():
+            if is_upload(path):
+                continue
             found_out = await client.request(method, path, content=endless(), headers=JSON)
             assert found_out.status_code == 413, (method, path)
         assert (await client.get("/api/health")).status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("sent", "status", "is_paused"),
+    [
+        (b"3\r\n{}\n\r\n0\r\n\r\n", 200, True),
+        (b"3\r\n{}\n\r\n", 408, False),
+        (b"3\r\n{}\n\r\nnonsense\r\n", 400, False),
+    ],
+    ids=["whole", "unfinished", "broken"],
+)
+async def test_a_command_without_a_body_is_carried_out_once_its_request_is_whole(
+    sent: bytes, status: int, is_paused: bool
+) -> None:
+    async with serving(Config(limits=Limits(body_s=0.3))) as base, http_client(base_url=base) as client:
+        async with plugged(base) as (reader, writer):
+            writer.write(b"POST /api/pause HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\n")
+            await asyncio.sleep(0.05)
+            writer.write(sent)
+            async with asyncio.timeout(5):
+                assert (await reader.readline()).startswith(b"HTTP/1.1 %d" % status)
+        assert (await client.get("/api/state")).json()["session"]["paused"] is is_paused
 
 
 @pytest.mark.parametrize("opening", [b"[", b'{"a":', b'{"address":[', b'{"values":{"a":'])

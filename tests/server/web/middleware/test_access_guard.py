@@ -48,7 +48,7 @@ async def refused(served: Served, **how: str) -> bool:
             await open_socket.recv()
             return False
     except websockets.InvalidStatus as why:
-        return why.response.status_code == 403
+        return why.response.status_code in (401, 403) and "problem" in why.response.headers["content-type"]
 
 
 async def closed(page: websockets.ClientConnection) -> tuple[int, str]:
