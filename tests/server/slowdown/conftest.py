@@ -5,30 +5,35 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import httpx
 
+from server.app.app import create_app
 from server.app.config import Config
 from server.simulator.service import CarService
 from server.vehicle.vehicle import Vehicle
 from tests.http import http_client
-from tests.server.conftest import serving
+from tests.server.conftest import serving_app
 
 PATIENCE_S = 20.0
 SPEEDS_BEFORE = 20  # that the server has received before an order; the car reports 20 a second
 ASK_S = 0.1  # interval of requests to the server
 LOOK_S = 0.02  # interval of reading the car itself, which costs nothing
+EventReader = Callable[..., Awaitable[list[dict[str, Any]]]]  # newest first
 
 
 class Field:
     """One car, one server, one client of its API."""
 
-    def __init__(self, service: CarService, client: httpx.AsyncClient) -> None:
+    def __init__(self, service: CarService, client: httpx.AsyncClient, log: EventReader | None = None) -> None:
+        """`log`: of a server in this process; None: the events are those that its API has released."""
         self.service = service
         self.client = client
+        self._log = log
         self.published: list[tuple[float, str, dict[str, Any]]] = []  # what any client published, and when it arrived
         self.driven: list[float] = []  # how fast the car was then
         service.bridge.on_publish.append(self._note_published)
@@ -90,6 +95,9 @@ class Field:
         assert (await self.post("arm")).status_code == 200
 
     async def events(self, change: str = "slow_down") -> list[dict[str, Any]]:
+        """Oldest first. A state may be a moment ahead of what the API releases of the log: what the disk has."""
+        if self._log is not None:
+            return (await self._log(change=change, limit=1000))[::-1]
         found = (await self.client.get("/api/events", params={"limit": 1000})).json()["events"]
         return [event for event in found if event["change"] == change]
 
@@ -114,8 +122,9 @@ async def watching(
 ) -> AsyncIterator[Field]:
     """A server that watches it."""
     config = Config(vehicles=(Vehicle(name=name, address=address),), data=data)
-    async with serving(config) as base, http_client(base_url=base, timeout=10.0) as client:
-        yield Field(service, client)
+    app = create_app(config, now=time.monotonic)
+    async with serving_app(app, config) as base, http_client(base_url=base, timeout=10.0) as client:
+        yield Field(service, client, partial(app.state.services.bus.find_events, name))
 
 
 @contextlib.asynccontextmanager
