@@ -1,11 +1,11 @@
 """Messages that a bridge sends again after another subscription: a sample that it kept, or one message twice.
 
 A real bridge gives the latched sample of a topic to each new subscription, also where its throttle was changed. A
-bridge of ROS 2 sends the first message after a second subscription of one connection twice. Neither is new: it must not
-make an old value look fresh. Only a message like one that came before can be a repeat, and of each only as many as
-there were subscriptions. With a stamp, this is certain. Without one, a publisher may have sent the same value anew:
-then only the first message after a subscription counts as a repeat, which costs at most one period of its age. Its age
-alone is in doubt: whether it is recorded, `doubtful.py` decides.
+bridge of ROS 2 sends the first message after a second subscription of one connection twice; messages that were on
+their way come before it. Neither is new: it must not make an old value look fresh. Only a message like one that came
+before can be a repeat, and of each only as many as there were subscriptions. With a stamp, this is certain. Without
+one, a publisher may have sent the same value anew: then only the first message after a subscription counts as a repeat,
+which costs at most one period of its age. Its age alone is in doubt: whether it is recorded, `doubtful.py` decides.
 
 Pure: time is an argument, on a monotonic clock in seconds.
 """
@@ -45,6 +45,7 @@ class Sample:
     first_s: float
     part: object = None  # of the recording, that holds it
     expected: int = 0  # repeats of it that may come
+    is_later: bool = False  # not the first one after a subscription: only its stamp shows a repeat
 
 
 @dataclass(slots=True)
@@ -52,11 +53,19 @@ class _Topic:
     samples: deque[Sample] = field(default_factory=lambda: deque(maxlen=KEPT))  # the newest last
     subscribed_s: float | None = None  # the newest subscription
     is_first: bool = True  # nothing new came after it yet
+    may_come_twice: bool = False  # the first message that the bridge sends after it may still come
     was_given: bool = False  # a repeat came after it
     newest_s: float = -math.inf
     period_s: float | None = None
     steady: int = 0  # gaps in a row of about this period
     is_kept: bool = False  # its publisher gave the newest sample to each subscription, and nothing new came since
+
+    def twice_is_over(self) -> None:
+        """The message that was to come twice after the subscription did, or none will."""
+        self.may_come_twice = False
+        for sample in self.samples:
+            if sample.is_later:
+                sample.expected = 0
 
     def came(self, at_s: float) -> None:
         gap_s = at_s - self.newest_s
@@ -99,8 +108,10 @@ class SentAgain:
         if not known.was_given:
             known.is_kept = False
         known.subscribed_s, known.is_first, known.was_given = at_s, True, False
+        known.twice_is_over()
+        known.may_come_twice = bool(known.samples)
         for sample in known.samples:
-            sample.expected = min(sample.expected + 1, MOST_SUBSCRIBED)
+            sample.expected, sample.is_later = min(sample.expected + 1, MOST_SUBSCRIBED), False
 
     def is_kept(self, topic: str) -> None:
         """The publisher of a topic gives the newest sample to each subscription: what comes first is not new."""
@@ -113,6 +124,7 @@ class SentAgain:
         if found is not None:
             known.was_given = True
             found.sample.expected -= 1
+            known.twice_is_over()
             for other in known.samples:
                 if other is not found.sample and other.expected and is_same(other.content, found.sample.content):
                     other.expected = 0  # one message that was sent many times is kept once by its publisher
@@ -121,8 +133,10 @@ class SentAgain:
             for one in known.samples:
                 one.expected = 0
         sample = Sample(_content(message, size), size, at_s)
-        if known.is_first and known.samples and not known.was_given:
-            sample.expected = 1  # it may come twice
+        if known.may_come_twice and self._is_over(known, at_s):
+            known.twice_is_over()
+        if known.may_come_twice:
+            sample.expected, sample.is_later = 1, not known.is_first
         known.is_first = known.is_kept = False
         known.came(at_s)
         self._keep(known, sample)
@@ -136,10 +150,18 @@ class SentAgain:
             if sample.expected and is_same(sample.content, content):
                 if _is_stamped(message, size):
                     return Arrival(sample, is_repeat=True)
+                if sample.is_later:
+                    return None
                 if sample is known.samples[-1] and self._may_be_given(known, sample, at_s):
                     return _unstamped(known, sample, at_s)
                 return None
         return None
+
+    def _is_over(self, known: _Topic, at_s: float) -> bool:
+        """Whether a message that the bridge sends twice would have come: those before it read the subscription were
+        on their way, and do not."""
+        read_s = self._read_s(known.subscribed_s) if known.subscribed_s is not None else None
+        return read_s is not None and at_s - read_s > GIVEN_WITHIN_S
 
     def _may_be_given(self, known: _Topic, newest: Sample, at_s: float) -> bool:
         if known.is_first and known.subscribed_s is not None:

@@ -157,6 +157,26 @@ def test_a_message_that_the_bridge_sends_twice_is_one(made: Any) -> None:
     assert not bridge.repeats(made(82.0), 11.5)
 
 
+def test_a_message_that_the_bridge_sends_twice_may_come_after_those_that_were_on_their_way() -> None:
+    bridge = Bridge(reads_after_s=0.3)
+    bridge.repeats(stamped(80.0), 9.95)
+    bridge.subscribe(10.0)
+    assert not any(bridge.repeats(stamped(number), 10.0 + number / 1000) for number in (81.0, 82.0, 83.0))
+    assert not bridge.repeats(stamped(84.0), 10.4)
+    assert [bridge.repeats(stamped(number), 10.5) for number in (83.5, 84.0, 84.0, 83.5)] == [False, True, False, False]
+    bridge.subscribe(20.0)
+    assert not bridge.repeats(stamped(85.0), 20.1)
+    assert not bridge.repeats(stamped(86.0), 20.3 + GIVEN_WITHIN_S + 0.1)
+    assert not bridge.repeats(stamped(86.0), 20.3 + GIVEN_WITHIN_S + 0.2)
+
+
+def test_without_a_stamp_only_the_first_message_after_a_subscription_may_come_twice() -> None:
+    bridge = Bridge(reads_after_s=0.3)
+    bridge.repeats(level(80.0), 9.95)
+    bridge.subscribe(10.0)
+    assert not any(bridge.repeats(level(number), at_s) for number, at_s in ((81.0, 10.1), (82.0, 10.4), (82.0, 10.41)))
+
+
 def test_the_samples_of_several_publishers_are_given_again_in_any_order() -> None:
     bridge = Bridge()
     bridge.subscribe(0.0)
