@@ -51,6 +51,8 @@ class RosLink:
     `now` is the session's monotonic clock in seconds. All methods are called on the loop it was made on.
     """
 
+    keeps_types = True
+
     def __init__(
         self,
         address: Address,

@@ -104,6 +104,10 @@ class LiveSource(CommandChannel, Protocol):
         """The name of the other side's software; "" if unknown."""
 
     @property
+    def keeps_types(self) -> bool:
+        """Whether a subscription goes on with its type where its topic is offered with another one."""
+
+    @property
     def command_problem(self) -> str | None:
         """Why no command can be sent over it, as a sentence; None: it can, or it is not known."""
 

@@ -81,6 +81,10 @@ class _Row:
         due_s = max(STOPPED_AFTER_S, STOPPED_PERIODS * self.gaps_s / self.gaps) if self.gaps else ONCE_AFTER_S
         return now_s - self.last_s >= due_s
 
+    def flows(self, now_s: float) -> bool:
+        usual_s = self.gaps_s / self.gaps if self.gaps else 0.0
+        return self.newest_s is not None and now_s - self.newest_s <= max(FLOWS_S, SLOW_PERIODS * usual_s)
+
     def came_once(self, now_s: float) -> bool:
         """Whether each subscription gives one message, and the topic is not merely slow: then its next message comes by
         itself before the third subscription, and after about the interval of those before."""
@@ -162,6 +166,11 @@ class Delivery:
             for topic, row in self._rows.items()
             if row.is_judged and row.came and (row.newest_s is None or now_s - row.newest_s >= QUIET_S)
         ]
+
+    def flows(self, topic: str, now_s: float) -> bool:
+        """Whether messages of a topic come, at its usual interval or about it."""
+        row = self._rows.get(topic)
+        return row is not None and row.flows(now_s)
 
     def has_its_time(self, topic: str, now_s: float) -> bool:
         """Whether a topic's publisher has only just come, so that no message yet is no silence."""

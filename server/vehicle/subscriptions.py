@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
@@ -14,6 +15,7 @@ from server.rosbridge.connection_errors import Problem
 from server.rosbridge.live_source import LinkDown, LiveSource
 from server.rosbridge.rosapi_client import ServiceCaller
 from server.vehicle import car_marks, discovery
+from server.vehicle.delivery import Delivery
 from server.vehicle.rosapi_watch import MissingWatch, RosWatch
 from server.vehicle.signal_map import SignalMap
 from server.vehicle.subscription_table import SubscriptionTable
@@ -21,6 +23,41 @@ from server.vehicle.type_definitions import TypeDefinitions
 from server.vehicle.undelivered import CLIENT_COUNT
 
 LOOK_AGAIN_S = 5.0  # the car's software may start after its bridge
+
+
+class TypesInUse:
+    """Types of topics of which messages come, where rosapi names another one.
+
+    rosapi names one type of a topic, also where a second node publishes or subscribes to it with a wrong one. A
+    subscription with that type would end the one that delivers.
+    """
+
+    def __init__(self, delivery: Delivery, noted: Callable[[str], None], now: Callable[[], float]) -> None:
+        self._delivery = delivery
+        self._noted = noted
+        self._now = now
+        self._others: dict[str, str] = {}  # topic → the type that rosapi names
+
+    def is_due(self) -> bool:
+        """Whether the messages of such a topic ended: it has the other type then."""
+        return any(not self._delivery.flows(topic, self._now()) for topic in self._others)
+
+    def kept(self, offer: discovery.Offer, *, before: Mapping[str, str], link: LiveSource) -> discovery.Offer:
+        """The offer with these types; `before`: topic → type of the offer before it."""
+        if not link.keeps_types:
+            return offer
+        now_s = self._now()
+        kept = {
+            topic: before[topic]
+            for topic in {row.topic for row in link.subscriptions if row.type and row.type == before.get(row.topic)}
+            if offer.topics.get(topic) not in (None, before[topic]) and self._delivery.flows(topic, now_s)
+        }
+        others = {topic: offer.topics[topic] for topic in kept}
+        for topic, kind in others.items():
+            if self._others.get(topic) != kind:
+                self._noted(f"{topic} is still received as {kept[topic]}: another node has it as {kind or 'no type'}.")
+        self._others = others
+        return replace(offer, topics={**offer.topics, **kept})
 
 
 class Subscriptions:
@@ -62,6 +99,7 @@ class Subscriptions:
             noted=noted,
             type_of=self.type_of,
         )
+        self._types = TypesInUse(self._missing.delivery, noted, now)
         self.table = SubscriptionTable(link, self._definitions, self._missing.delivery, now=now)
         self.signals = SignalMap(place)
         self.by_topic: Mapping[str, tuple[Source, ...]] = {}
@@ -77,7 +115,7 @@ class Subscriptions:
         self.table.opened()
         while link is not None and rosapi is not None and link is self._link and link.is_open:
             try:
-                self._look_soon |= self.signals.is_due(self._now())
+                self._look_soon |= self.signals.is_due(self._now()) or self._types.is_due()
                 if self._look_soon or self._now() - looked_s >= (LOOK_AGAIN_S if self.signals.sources else 1.0):
                     looked_s, self._look_soon = self._now(), False
                     await self._look(link, rosapi)
@@ -237,7 +275,7 @@ class Subscriptions:
         self.signals.by_name = None
         self._proved()
         self.ros_version = offer.ros or self.ros_version
-        self._offer = offer
+        self._offer = offer = self._types.kept(offer, before=self.offered or {}, link=link)
         if self._tuning.recognise(offer.topics, offer.ros):
             self._recognised(self._tuning.profile.title)
         self._map()

@@ -31,6 +31,8 @@ class FoxgloveSource:
     that of a subscription is not used: all that comes is given.
     """
 
+    keeps_types = False  # of a topic with several types, that of its newest channel is received
+
     def __init__(
         self,
         address: Address,

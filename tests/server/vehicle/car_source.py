@@ -22,6 +22,7 @@ class CarSource:
     frame_bytes, junk_count, unanswered, attempts = 100, 0, 0, 0
     server_software = ""
     command_problem: str | None = None
+    keeps_types = True
 
     def __init__(self, car: SimulatedCar, others: Mapping[str, str] = {}) -> None:
         self.car = car

@@ -45,6 +45,7 @@ class KeepingBridge:
     frame_bytes, junk_count, unanswered, attempts = 100, 0, 0, 0
     server_software = ""
     command_problem: str | None = None
+    keeps_types = True
 
     def __init__(self, topics: Mapping[str, Topic], *, clients: int = 0, has_rosapi: bool = True) -> None:
         self.topics = dict(topics)

@@ -200,3 +200,27 @@ async def test_a_source_that_dies_is_not_swapped_for_another_that_lives() -> Non
         state = await one.state(lambda s: any(alarm["id"] == "signal_stale.speed" for alarm in s["alarms"]))
         assert state["signals"]["speed"]["topic"] == "/odom"
         assert state["signals"]["speed"]["freshness"] != "fresh"
+
+
+@pytest.mark.virtual_time
+async def test_a_topic_of_which_messages_come_keeps_its_type_beside_a_node_with_another() -> None:
+    """rosapi names one type of a topic, which may be that of the other node."""
+
+    def publish(bridge: RosBridge, at_s: float) -> None:
+        if at_s < 30.0:
+            bridge.publish("/vel", twist(2.0))
+            return
+        bridge.advertise("/vel", STAMPED)  # the car's node is another version from now on
+        header = {"seq": 1, "stamp": {"secs": 0, "nsecs": 0}, "frame_id": "base_link"}
+        bridge.publish("/vel", {"header": header, "twist": twist(3.0)})
+
+    async with car({"/vel": "geometry_msgs/Twist"}, publish) as (bridge, base), viewer(base) as one:
+        await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
+        bridge.add_service("/rosapi/topics", "rosapi/Topics", lambda _: {"topics": ["/vel"], "types": [STAMPED]})
+        await asyncio.sleep(12.0)
+        state = await one.state(lambda s: True)
+        assert (state["signals"]["speed"]["type"], state["signals"]["speed"]["freshness"]) == (
+            "geometry_msgs/Twist",
+            "fresh",
+        )
+        await one.state(lambda s: (s["signals"]["speed"]["value"] or {}).get("speed_mps") == 3.0, within_s=60.0)
