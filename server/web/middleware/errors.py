@@ -19,6 +19,9 @@ from server.web.middleware.methods import allowed
 
 log = logging.getLogger("catgraph.web")
 
+# Of RFC 9110, where Python before 3.13 has those of older RFCs.
+PHRASES = {413: "Content Too Large", 414: "URI Too Long", 416: "Range Not Satisfiable", 422: "Unprocessable Content"}
+
 
 class _Document(JSONResponse):
     def render(self, content: Any) -> bytes:
@@ -36,7 +39,8 @@ class Problem(HTTPException):
 
 def problem(status: int, detail: str, **more: Any) -> JSONResponse:
     """A problem document; `type` is about:blank, so `title` is the status as text."""
-    body = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": detail, **more}
+    title = PHRASES.get(status) or HTTPStatus(status).phrase
+    body = {"type": "about:blank", "title": title, "status": status, "detail": detail, **more}
     return _Document(body, status_code=status, media_type=PROBLEM_TYPE)
 
 
