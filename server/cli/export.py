@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--compression",
         choices=COMPRESSIONS,
         default="none",
-        help="compression compression of a bag's chunks (default: none)",
+        help="compression of the chunks of a bag (default: none)",
     )
     parser.add_argument(
         "--without-own", action="store_true", help="leave catgraph's own channels (/catgraph/*) out of a bag"
