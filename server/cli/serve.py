@@ -18,6 +18,7 @@ from server.app.process import CannotServe, add_common_arguments, serve
 from server.app.process import run as run_server
 from server.bus.broker import Broker
 from server.cli import logging
+from server.rosbridge.address import BadAddress, demand_allowed, parse
 from server.vehicle.vehicle import Vehicle, vehicle_from_text
 from server.web.maps import map_options
 
@@ -52,7 +53,20 @@ def vehicles_of(args: argparse.Namespace) -> tuple[Vehicle, ...]:
     vehicles = tuple(vehicle_from_text(text, index=i) for i, text in enumerate(args.vehicle))
     if len({vehicle.name for vehicle in vehicles}) < len(vehicles):
         raise ValueError("Two vehicles have the same name.")
+    for vehicle in vehicles:
+        _demand_address(vehicle, args.only)
     return vehicles or (Vehicle(name="car"),)
+
+
+def _demand_address(vehicle: Vehicle, only: list[str]) -> None:
+    """Raises ValueError with one sentence where the address of a vehicle is none that can be dialled."""
+    if not vehicle.address:
+        return
+    try:
+        demand_allowed(parse(vehicle.address), only)
+    except BadAddress as why:
+        hint = "Name its host with --only too." if why.code == "not_allowed" else why.hint
+        raise ValueError(f"--vehicle {vehicle.name}: {why} {hint}".rstrip()) from None
 
 
 def common_config(args: argparse.Namespace) -> Config:

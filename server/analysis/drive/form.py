@@ -8,15 +8,17 @@ import os
 import re
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from server.analysis.drive.drive_report import DriveReport
 from server.bus.event_table import safe_cell
+from server.recording.drive.modes import Intervention
 from server.recording.export.export_format import ExportRefused, Outcome
 from server.recording.read.read import Recording
 from server.storage import bounded_toml
@@ -25,6 +27,16 @@ FOLDER = "CATGRAPH_FORMS"  # environment: a folder with further templates
 MAX_BYTES = 128 * 1024
 MOST_FILES = 50
 Text = Annotated[str, Field(max_length=300)]
+
+
+_FIGURES = ("distance_m", "driven_s", "alarms", "interventions", "marks")
+_OF_DRIVE = ("vehicle", "session", "weather", "remarks", "title")
+_MODES = tuple(f"{mode}_{unit}" for mode in ("autonomous", "manual", "unknown") for unit in ("m", "s"))
+# What a column may have of a row.
+FIELDS = {
+    "drive": frozenset({"time", *_FIGURES, *_OF_DRIVE, *_MODES}),
+    "interventions": frozenset({"time", "description", "at_s", *(field.name for field in fields(Intervention))}),
+}
 
 
 class Column(BaseModel):
@@ -49,6 +61,13 @@ class Table(BaseModel):
     rows: Literal["interventions", "drive"]
     columns: Annotated[list[Column], Field(min_length=1, max_length=100)]
 
+    @model_validator(mode="after")
+    def _has_these_fields(self) -> Self:
+        for column in self.columns:
+            if column.value and column.value not in FIELDS[self.rows]:
+                raise ValueError(f"{column.title}: there is no field {column.value} of {self.rows}")
+        return self
+
 
 class Form(BaseModel):
     """One template file."""
@@ -64,8 +83,8 @@ def read_form(text: bytes, name: str) -> Form:
         return Form.model_validate(bounded_toml.loads(text, max_bytes=MAX_BYTES))
     except ValidationError as why:
         first = why.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        raise ExportRefused(f"The template {name} cannot be used: {place}: {first['msg']}.") from None
+        place, why_not = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        raise ExportRefused(f"The template {name} cannot be used: {place}: {why_not}.") from None
     except ValueError as why:
         raise ExportRefused(f"The template {name} cannot be used: {why}") from None
 
@@ -129,8 +148,8 @@ def _drive(found: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "time": found["start_ms"],
         **{key: value if is_known or key.startswith("unknown") else None for key, value in modes.items()},
-        **{name: figures[name] for name in ("distance_m", "driven_s", "alarms", "interventions", "marks")},
-        **{name: found[name] for name in ("vehicle", "session", "weather", "remarks", "title")},
+        **{name: figures[name] for name in _FIGURES},
+        **{name: found[name] for name in _OF_DRIVE},
     }
 
 

@@ -27,6 +27,7 @@ from server.recording.marks.media import MediaName
 from server.recording.read.read import open_recording
 from tests.server.recording.drive.story import EVIL, PHOTO, in_two_parts, logged, recorded
 from tests.server.recording.drive.test_facts import BEGIN_MS
+from tests.tree import PROJECT
 
 
 @pytest.fixture(scope="module")
@@ -280,6 +281,15 @@ def test_a_template_beside_it(folder: Path, tmp_path: Path, monkeypatch: pytest.
         assert packed.read("mine.csv").decode() == "'=cmd\r\n2\r\n"
 
 
+def test_a_template_may_have_each_field_that_the_guide_names() -> None:
+    guide = (PROJECT / "docs" / "guide" / "report.md").read_text()
+    for rows, line in (("interventions", "Fields of an intervention: "), ("drive", "Fields of a drive: ")):
+        listed = re.findall(r"`(\w+)`", next(one for one in guide.splitlines() if one.startswith(line)))
+        columns = ", ".join(f'{{ title = "{name}", value = "{name}" }}' for name in listed)
+        text = f'title = "T"\n[[table]]\nfile = "x"\nrows = "{rows}"\ncolumns = [{columns}]'
+        assert len(form.read_form(text.encode(), "all.toml").table[0].columns) == len(listed) > 10
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -289,6 +299,15 @@ def test_a_template_beside_it(folder: Path, tmp_path: Path, monkeypatch: pytest.
             b'title = "T"\n[[table]]\nfile = "../x"\nrows = "drive"\ncolumns = [{ title = "a" }]', id="a way out"
         ),
         pytest.param(b'title = "T"\n[[table]]\nfile = "x"\nrows = "all"\ncolumns = [{ title = "a" }]', id="other rows"),
+        pytest.param(
+            b'title = "T"\n[[table]]\nfile = "x"\nrows = "drive"\ncolumns = [{ title = "km", value = "distance_x" }]',
+            id="no such field of a drive",
+        ),
+        pytest.param(
+            b'title = "T"\n[[table]]\nfile = "x"\nrows = "interventions"\n'
+            b'columns = [{ title = "km", value = "distance_m" }]',
+            id="a field of other rows",
+        ),
         pytest.param(b"#" * (form.MAX_BYTES + 1), id="too long"),
     ],
 )
