@@ -164,12 +164,15 @@ def _listen(host: str, port: int) -> socket.socket:
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         listening = socket.socket(family, socket.SOCK_STREAM)
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind((host, port))
-        listening.listen(256)
-        listening.setblocking(False)
+        with contextlib.ExitStack() as unless_bound:
+            unless_bound.callback(listening.close)
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listening.bind((host, port))
+            listening.listen(256)
+            listening.setblocking(False)
+            unless_bound.pop_all()
     except (OSError, OverflowError) as why:
-        reason = getattr(why, "strerror", None) or str(why)
+        reason = (getattr(why, "strerror", None) or str(why)).rstrip(".")
         raise CannotServe(f"Nothing can listen on {host}:{port}: {reason}.") from None
     return listening
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from server.app.process import add_common_arguments
 from server.cli import logging, serve
+from server.vehicle.vehicle import named
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
             vehicles=(),
             broker=serve.read_broker(args),
             is_node=True,
-            expected=tuple(args.expect),
+            expected=tuple(one.name for one in serve.ascii_names(tuple(named(name) for name in args.expect))),
             forgotten=tuple(args.forget),
         )
     )

@@ -23,6 +23,11 @@ def vehicle_from_text(text: str, *, index: int) -> Vehicle:
     name, separator, address = text.partition("=")
     if not separator or "://" in name:
         name, address = ("car" if index == 0 else f"car{index + 1}"), text
+    return named(name, address)
+
+
+def named(name: str, address: str | None = None) -> Vehicle:
+    """A vehicle of this name. Raises ValueError with one sentence where it is none."""
     if not is_name(name):
         raise ValueError(f"“{name[:40]}” is no name for a vehicle: use letters, digits, - and _.")
     return Vehicle(name=name, address=address)

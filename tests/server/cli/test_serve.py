@@ -30,3 +30,17 @@ def test_an_address_that_cannot_be_dialled_is_refused_with_a_sentence(
 ) -> None:
     assert main(["serve", "--port", "0", "--data", str(tmp_path), *options]) == 2
     assert capsys.readouterr().err.startswith(f"catgraph: {why}")
+
+
+@pytest.mark.parametrize("name", ["a/b", "", "öl"])
+def test_a_web_node_expects_no_car_whose_name_no_agent_can_have(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    node = ["web", "--broker", "nats://127.0.0.1:1", "--port", "0", "--data", str(tmp_path)]
+    assert main([*node, "--expect", "ocelot", "--expect", name]) == 2
+    assert "name" in capsys.readouterr().err
+
+
+def test_a_port_that_is_none_is_refused_with_one_full_stop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["serve", "--port", "99999", "--data", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == "catgraph: Nothing can listen on 127.0.0.1:99999: bind(): port must be 0-65535.\n"
