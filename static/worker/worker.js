@@ -4,17 +4,17 @@
 // address holds the hash of their content come from here: another content has another address, so none can be old or mixed.
 
 /**
- * @typedef {{version: string, build: string, named: string[], plain: string[], offline: string}} Kept
+ * @typedef {{version: string, build: string, named: string[], offline: string}} Kept
  * @typedef {Event & {waitUntil(work: Promise<unknown>): void}} Lasting
  * @typedef {Event & {request: Request, respondWith(answer: Promise<Response>): void}} FetchEvent
  * @typedef {{postMessage(what: unknown, ports: MessagePort[]): void}} Client
  * @typedef {{SHELL: Kept, skipWaiting(): Promise<void>, clients: {claim(): Promise<void>, matchAll(of: object): Promise<Client[]>}}} Scope
  */
 const scope = /** @type {Scope & EventTarget} */ (/** @type {unknown} */ (globalThis));
-const { version, build, named, plain, offline } = scope.SHELL;
+const { version, build, named, offline } = scope.SHELL;
 const OURS = 'catgraph-shell-';
 const CACHE = `${OURS}${version}`;
-const FILES = new Set([...named, ...plain]);
+const FILES = new Set(named);
 /** A page that has not begun to come by then does not come: a phone out of range would wait for minutes [ms]. */
 const ANSWERS_MS = 8000;
 /** So long another page may take to say which build it is [ms]. */
@@ -40,7 +40,7 @@ scope.addEventListener('fetch', (event) => {
 async function keep() {
   const cache = await caches.open(CACHE);
   try {
-    await cache.addAll([...named.map((address) => new Request(address)), ...[...plain, offline].map((address) => new Request(address, { cache: 'reload' }))]);
+    await cache.addAll([...named, new Request(offline, { cache: 'reload' })]);
   } catch (error) {
     await caches.delete(CACHE);
     throw error;

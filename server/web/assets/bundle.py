@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 FOLDER = "built"  # in static/, beside js/ and css/, so that what they name by ../ is found from here too
+FONTS = "fonts"  # in static/
 STYLES = (
     "tokens",
     "frame",
@@ -38,6 +39,7 @@ FLEET_STYLES = ("tokens", "frame", "topbar", "sheets", "fleet")
 FLEET_ENTRY = "shell/fleet.js"  # joined for itself, so that the page of one car is no larger by it
 EARLY = "boot/early.js"  # inline in the page
 THREADS = ("scan/scan-painter",)  # scripts of threads, each joined for itself
+_FOLDERS = ("js", "css", FONTS, "vendor")  # in static/, with all that the joined files are made of or name
 _LIST = "built.json"  # written last
 _TARGET = "es2022"  # private fields and top-level await: every browser of 2022 and later
 _CONFIG = Path(__file__).with_name("rollup.config.mjs")
@@ -57,6 +59,7 @@ class Built(Entry):
     """Those of the page of one car, and what all pages share."""
 
     early: str  # the text of the script that runs before all others
+    fonts: tuple[str, ...]  # that the styles name, as paths within static/
     name: str  # of this build: other sources have another
     fleet: Entry  # the page of all cars
 
@@ -75,11 +78,28 @@ def join(tools: Path, static: Path) -> None:
         esbuild, small = str(tools / "esbuild"), _small(into)
         threads = [str(static / "js" / f"{name}.js") for name in THREADS]
         _run([esbuild, *threads, *_OWN, "--format=esm", *small])
+        _run([esbuild, *(str(static / "css" / f"{name}.css") for name in _later_styles(static)), *_OWN, *small])
         page = _join_entry(tools, static, ENTRY, STYLES, Path(folder, "page"))
         fleet = _join_entry(tools, static, FLEET_ENTRY, FLEET_STYLES, Path(folder, "fleet"))
         early = _run([esbuild, str(static / "js" / EARLY), "--minify", f"--target={_TARGET}"])
-    listed = {"sources": sources, **asdict(page), "early": early.strip(), "fleet": asdict(fleet)}
+    fonts = [f"{FOLDER}/{path.name}" for path in sorted(into.glob("*.woff2"))]
+    listed = {"sources": sources, **asdict(page), "early": early.strip(), "fonts": fonts, "fleet": asdict(fleet)}
     (into / _LIST).write_text(json.dumps(listed), encoding="utf-8")
+
+
+def _later_styles(static: Path) -> list[str]:
+    """Those that the page fetches with the part that needs them."""
+    return sorted(path.stem for path in (static / "css").glob("*.css") if path.stem not in {*STYLES, *FLEET_STYLES})
+
+
+def _vendor(static: Path) -> list[Path]:
+    return sorted(path for path in (static / "vendor").glob("*") if path.suffix in (".js", ".css"))
+
+
+def _hashed(into: Path, name: str) -> str:
+    """The name that esbuild gave to a file of its own: with the hash of what is in it."""
+    plain = Path(name)
+    return next(path.name for path in into.glob(f"{plain.stem}-????????{plain.suffix}"))
 
 
 _OWN = ("--bundle", "--entry-names=[name]-[hash]")
@@ -93,11 +113,15 @@ def _join_entry(tools: Path, static: Path, script: str, styles: tuple[str, ...],
     """Join the modules and styles of one page; `folder` has its name, and is made."""
     into, esbuild = static / FOLDER, str(tools / "esbuild")
     folder.mkdir()
-    threads = {f"../{name}.js": next(path.name for path in into.glob(f"{Path(name).name}-*.js")) for name in THREADS}
+    threads = {f"../{name}.js": _hashed(into, f"{Path(name).name}.js") for name in THREADS}
+    later = {name: _hashed(into, f"{name}.css").removesuffix(".css") for name in _later_styles(static)}
+    vendor = {path.name: hashlib.sha256(path.read_bytes()).hexdigest()[:12] for path in _vendor(static)}
     entry = {
         "CATGRAPH_ENTRY": str(static / "js" / script),
         "CATGRAPH_INTO": str(folder / "joined"),
         "CATGRAPH_THREADS": json.dumps(threads),
+        "CATGRAPH_STYLES": json.dumps(later),
+        "CATGRAPH_VENDOR": json.dumps(vendor),
     }
     _run([str(tools / "rollup"), "--config", str(_CONFIG), "--silent"], {**os.environ, **entry})
     joined = json.loads((folder / "joined" / "joined.json").read_text(encoding="utf-8"))
@@ -106,10 +130,10 @@ def _join_entry(tools: Path, static: Path, script: str, styles: tuple[str, ...],
     style.write_text(
         "\n".join(f"@import {json.dumps(str(static / 'css' / f'{name}.css'))};" for name in styles), encoding="utf-8"
     )
-    _run([esbuild, str(style), *_OWN, "--external:../fonts/*", *_small(into)])
+    _run([esbuild, str(style), *_OWN, "--loader:.woff2=file", *_small(into)])
     return Entry(
         script=f"{FOLDER}/{joined['script']}",
-        style=f"{FOLDER}/{next(path.name for path in into.glob(f'{folder.name}-*.css'))}",
+        style=f"{FOLDER}/{_hashed(into, f'{folder.name}.css')}",
         needed=tuple(f"{FOLDER}/{name}" for name in joined["needed"]),
     )
 
@@ -117,7 +141,7 @@ def _join_entry(tools: Path, static: Path, script: str, styles: tuple[str, ...],
 def find(static: Path) -> Built | None:
     """The bundles, or None if they are not of the current sources."""
     try:
-        stamps = tuple(sorted([*_stamps(f"{static}/js"), *_stamps(f"{static}/css")]))
+        stamps = tuple(sorted(stamp for folder in _FOLDERS for stamp in _stamps(f"{static}/{folder}")))
         listed_ns = (static / FOLDER / _LIST).stat().st_mtime_ns
     except OSError:
         return None
@@ -140,8 +164,9 @@ def _find(static: Path, stamps: tuple[tuple[str, int], ...], listed_ns: int) -> 
     try:
         listed = json.loads((static / FOLDER / _LIST).read_text(encoding="utf-8"))
         page, fleet = _entry_of(listed), _entry_of(listed["fleet"])
-        found = Built(**asdict(page), early=listed["early"], name=listed["sources"][:12], fleet=fleet)
-        files = [name for one in (page, fleet) for name in (one.script, one.style, *one.needed)]
+        fonts, name = tuple(listed["fonts"]), listed["sources"][:12]
+        found = Built(**asdict(page), early=listed["early"], fonts=fonts, name=name, fleet=fleet)
+        files = [*fonts, *(name for one in (page, fleet) for name in (one.script, one.style, *one.needed))]
         is_whole = all((static / name).is_file() for name in files)
         return found if is_whole and listed["sources"] == digest_of_sources(static) else None
     except (OSError, ValueError, KeyError, TypeError):
@@ -158,12 +183,13 @@ def _stamps(folder: str) -> Iterator[tuple[str, int]]:
         for one in entries:
             if one.is_dir():
                 yield from _stamps(one.path)
-            elif one.name.endswith((".js", ".css")):
+            elif one.name.endswith((".js", ".css", ".woff2")):
                 yield one.path, one.stat().st_mtime_ns
 
 
 def _sources(static: Path) -> list[Path]:
-    return sorted([*(static / "js").rglob("*.js"), *(static / "css").glob("*.css")])
+    fonts = (static / FONTS).glob("*.woff2")
+    return sorted([*(static / "js").rglob("*.js"), *(static / "css").glob("*.css"), *fonts, *_vendor(static)])
 
 
 def _run(command: list[str], environment: dict[str, str] | None = None) -> str:

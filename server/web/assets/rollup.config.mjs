@@ -23,8 +23,20 @@ const threads = {
     for (const [plain, hashed] of Object.entries(JSON.parse(env.CATGRAPH_THREADS))) code = code.replaceAll(`'${plain}'`, `'./${hashed}'`);
     return { code, map: null };
   },
+};
+
+/** The addresses of what is fetched later and not joined: they hold a hash, so that it may be kept and is never mixed with another build. */
+const later = {
+  name: 'later',
+  transform(code) {
+    for (const [plain, hashed] of Object.entries(JSON.parse(env.CATGRAPH_STYLES))) {
+      code = code.replaceAll(`styled('${plain}')`, `styled('${hashed}')`).replaceAll(`'/static/css/${plain}.css'`, `'/static/built/${hashed}.css'`);
+    }
+    return { code: code.replaceAll('`/static/css/${', '`/static/built/${'), map: null };
+  },
   renderChunk(code) {
-    return { code: code.replaceAll("'../../vendor/", "'../vendor/"), map: null }; // joined files stand one folder higher
+    const vendor = JSON.parse(env.CATGRAPH_VENDOR);
+    return { code: code.replaceAll(/'(?:\.\.\/)+vendor\/([\w.-]+)'/g, (_, name) => `'../vendor/${name}?v=${vendor[name]}'`), map: null }; // joined files stand one folder higher
   },
 };
 
@@ -32,7 +44,7 @@ export default {
   input: env.CATGRAPH_ENTRY,
   external: /\.\.\/vendor\//,
   makeAbsoluteExternalsRelative: false,
-  plugins: [threads, list],
+  plugins: [threads, later, list],
   output: {
     dir: env.CATGRAPH_INTO,
     format: 'es',

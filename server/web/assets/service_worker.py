@@ -1,6 +1,6 @@
 """The page's shell in a phone's cache: its files, its name, and the service worker.
 
-Cached are only files whose address contains a hash of their content, the page for an unreachable server, and its fonts.
+Cached are only files whose address contains a hash of their content, and the page for an unreachable server.
 Live data is never cached. With single modules, as during development, there is no worker, and an installed one removes
 itself.
 """
@@ -17,7 +17,6 @@ from server.version import catgraph_version
 from server.web.assets.bundle import FOLDER, Built
 
 WORKER, OFFLINE = "/worker.js", "/offline"
-FONTS = tuple(f"/static/fonts/catgraph-numerals-{weight}.woff2" for weight in (500, 700))
 _MARKS = ("", "-critical", "-warning", "-lost", "-replay")
 OF_OFFLINE = ("js/boot/offline.js",)
 _SOURCES = "worker"  # in static/
@@ -30,7 +29,6 @@ class Shell:
     version: str  # another content has another version
     build: str  # of the page it belongs to
     named: tuple[str, ...]  # addresses that hold the hash of what is behind them
-    plain: tuple[str, ...]  # fonts: no code, and counted in the version
 
     def worker(self, static: Path) -> str:
         """The script of the worker."""
@@ -38,7 +36,6 @@ class Shell:
             "version": self.version,
             "build": self.build,
             "named": self.named,
-            "plain": self.plain,
             "offline": f"{OFFLINE}?v={self.version}",
         }
         return f"self.SHELL = {json.dumps(shell)};\n{_script(static, 'worker')}"
@@ -51,17 +48,15 @@ def build_of(built: Built | None) -> str:
 
 def shell_of(static: Path, built: Built, asset: Callable[[str], str], offline: bytes) -> Shell:
     """What to keep of the page `built`; `offline` is the page for when the server does not answer, as it is sent."""
-    joined = sorted(path for path in (static / FOLDER).iterdir() if path.suffix in (".js", ".css"))
+    joined = sorted(path for path in (static / FOLDER).iterdir() if path.suffix in (".js", ".css", ".woff2"))
     named = (
         *(f"/static/{FOLDER}/{path.name}" for path in joined),
         *(asset(name) for name in OF_OFFLINE),
         *(asset(f"icons/catgraph{mark}.svg") for mark in _MARKS),
     )
-    digest = hashlib.sha256(repr((named, FONTS, build_of(built))).encode() + offline)
+    digest = hashlib.sha256(repr((named, build_of(built))).encode() + offline)
     digest.update(_script(static, "worker").encode())
-    for address in FONTS:
-        digest.update((static / address.removeprefix("/static/")).read_bytes())
-    return Shell(version=digest.hexdigest()[:12], build=build_of(built), named=named, plain=FONTS)
+    return Shell(version=digest.hexdigest()[:12], build=build_of(built), named=named)
 
 
 def withdrawn(static: Path) -> str:

@@ -20,7 +20,7 @@ from server.access.identity import is_known, principal_of
 from server.protocol import page_messages
 from server.protocol.messages import Hello, Identity, RoleName
 from server.system.page_files import check_vendor, static_dir, templates_dir
-from server.web.assets.bundle import EARLY, ENTRY, FLEET_ENTRY, FLEET_STYLES, STYLES, Built, find
+from server.web.assets.bundle import EARLY, ENTRY, FLEET_ENTRY, FLEET_STYLES, FONTS, STYLES, Built, find
 from server.web.assets.icons import FOLDER as DRAWN
 from server.web.assets.icons import WITHOUT, are_drawn
 from server.web.assets.icons import manifest as manifest_of
@@ -34,6 +34,7 @@ log = logging.getLogger("catgraph.page")
 
 _HTML = "text/html; charset=utf-8"
 FLEET = "fleet.html"
+_FONTS = [f"/static/{FONTS}/catgraph-numerals-{weight}.woff2" for weight in (500, 700)]  # as single styles name them
 
 
 def parts_of(built: Built | None, asset: Callable[[str], str], *, is_fleet: bool = False) -> dict[str, object]:
@@ -41,10 +42,11 @@ def parts_of(built: Built | None, asset: Callable[[str], str], *, is_fleet: bool
     if built is None:
         styles = [asset(f"css/{name}.css") for name in (FLEET_STYLES if is_fleet else STYLES)]
         script = asset(f"js/{FLEET_ENTRY if is_fleet else ENTRY}")
-        return {"tabs": TABS, "styles": styles, "script": script, "needed": []}
+        return {"tabs": TABS, "styles": styles, "script": script, "needed": [], "fonts": _FONTS}
     entry = built.fleet if is_fleet else built
     style, script, *needed = (f"/static/{name}" for name in (entry.style, entry.script, *entry.needed))
-    return {"tabs": TABS, "styles": [style], "script": script, "needed": needed}
+    fonts = [f"/static/{name}" for name in built.fonts]
+    return {"tabs": TABS, "styles": [style], "script": script, "needed": needed, "fonts": fonts}
 
 
 def early_of(built: Built | None, static: Path) -> str:

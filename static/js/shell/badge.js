@@ -27,7 +27,7 @@ export function badgeOf(frame, { isSilent, isMonitoring, state }) {
 /** @param {import('../core/store.js').Store} store */
 export function mount(store) {
   const link = /** @type {HTMLLinkElement} */ (need(document, 'link[rel="icon"]'));
-  const icons = { plain: link.getAttribute('href'), critical: link.dataset['critical'], warning: link.dataset['warning'], lost: link.dataset['lost'], replay: '/static/icons/catgraph-replay.svg' };
+  const icons = { plain: link.getAttribute('href'), critical: link.dataset['critical'], warning: link.dataset['warning'], lost: link.dataset['lost'], replay: link.dataset['replay'] };
   /** @type {number | null | undefined} */
   let shown;
 

@@ -32,6 +32,8 @@ def static(tmp_path: Path) -> Path:
     (tmp_path / "js" / "main.js").write_text(
         "import { greeting } from './core/format.js';\nconsole.log(greeting);\n"
         "globalThis.later = () => import('./later.js');\nglobalThis.theirs = () => import('../vendor/theirs.js');\n"
+        "const styled = (name) => `/static/css/${name}.css`;\n"
+        "globalThis.styles = [styled('menu'), '/static/css/map-drawn.css'];\n"
         "import './boot/threads.js';\n"
     )
     (tmp_path / "js" / "boot" / "threads.js").write_text(
@@ -52,6 +54,12 @@ def static(tmp_path: Path) -> Path:
     )
     for name in {*STYLES, *FLEET_STYLES}:
         (tmp_path / "css" / f"{name}.css").write_text(f".{name} {{ color: red; }}\n")
+    (tmp_path / "css" / "menu.css").write_text(".menu { color: red; }\n")
+    (tmp_path / "css" / "map-drawn.css").write_text(".map-drawn { color: red; }\n")
+    (tmp_path / "vendor").mkdir()
+    (tmp_path / "vendor" / "theirs.js").write_text("export const theirs = 'not joined';\n")
+    (tmp_path / "fonts").mkdir()
+    (tmp_path / "fonts" / "n.woff2").write_bytes(b"a font")
     (tmp_path / "css" / "tokens.css").write_text("@font-face { font-family: n; src: url('../fonts/n.woff2'); }\n")
     join(TOOLS, tmp_path)
     return tmp_path
@@ -74,16 +82,18 @@ def test_the_joined_script_says_what_the_many_said_and_the_rest_comes_later(stat
     assert built is not None
     program = (
         f"await import({json.dumps(str(static / built.script))}); console.log((await later()).later);"
-        "theirs().catch((why) => console.log(why.message));"
+        "console.log((await theirs()).theirs);"
     )
     done = subprocess.run([NODE, "--input-type=module", "-e", program], capture_output=True, text=True, check=True)
     first, second, third = done.stdout.splitlines()
     assert (first, second) == ("hello", "hello later")
-    assert str(static / "vendor" / "theirs.js") in third, "others' files are not joined, and are found from here too"
+    assert third == "not joined", "others' files are found from here too"
     assert " later" not in (static / built.script).read_text() + "".join((static / n).read_text() for n in built.needed)
     style = (static / built.style).read_text()
     assert re.findall(r"\.(\w+)\{", style) == list(STYLES[1:]), "in their order"
-    assert "../fonts/n.woff2" in style
+    (font,) = built.fonts
+    assert f'"./{font.removeprefix("built/")}"' in style
+    assert (static / font).read_bytes() == b"a font"
     assert "first" in built.early
     assert "before" not in built.early, "without comments"
     assert "\n" not in built.early
@@ -99,6 +109,39 @@ def test_the_page_of_all_cars_is_joined_for_itself(static: Path) -> None:
     assert re.findall(r"\.(\w+)\{", style) == list(FLEET_STYLES[1:])
     assert "all cars" not in "".join((static / name).read_text() for name in (built.script, *built.needed))
     assert parts_of(built, str, is_fleet=True)["script"] == f"/static/{built.fleet.script}"
+
+
+def test_what_is_fetched_later_has_the_hash_of_its_content_in_its_address(static: Path) -> None:
+    def addresses() -> list[str]:
+        built = find(static)
+        assert built is not None
+        program = f"await import({json.dumps(str(static / built.script))}); console.log(JSON.stringify(styles));"
+        done = subprocess.run([NODE, "--input-type=module", "-e", program], capture_output=True, text=True, check=True)
+        scripts = "".join(path.read_text() for path in (static / "built").glob("*.js"))
+        styles: list[str] = json.loads(done.stdout.splitlines()[-1])
+        return [*styles, *re.findall(r"vendor/theirs\.js\?v=[0-9a-f]{12}", scripts)]
+
+    menu, drawn, theirs = addresses()
+    assert (static / menu.removeprefix("/static/")).read_text() == ".menu{color:red}\n"
+    assert (static / drawn.removeprefix("/static/")).read_text() == ".map-drawn{color:red}\n"
+    (static / "css" / "menu.css").write_text(".menu { color: blue; }\n")
+    (static / "vendor" / "theirs.js").write_text("export const theirs = 'another';\n")
+    join(TOOLS, static)
+    renewed = addresses()
+    assert renewed[0] != menu
+    assert renewed[1] == drawn
+    assert renewed[2] != theirs
+
+
+def test_the_page_fetches_only_what_may_be_kept_for_ever() -> None:
+    built = static_dir() / "built"
+    scripts = "".join(path.read_text() for path in built.glob("*.js"))
+    plain = re.findall(r"/static/(?!built/)[^\"'`]+", scripts)
+    assert set(plain) == {"/static/license.txt"}, "shown on request only"
+    vendor = re.findall(r"vendor/[^\"'`]+", scripts)
+    assert [address for address in vendor if not re.fullmatch(r"vendor/[\w.]+\?v=[0-9a-f]{12}", address)] == []
+    sources = "".join(path.read_text() for path in (static_dir() / "js").rglob("*.js"))
+    assert re.findall(r"(?<!function )\bstyled\([^')][^)]*\)", sources) == [], "an address is found by its text"
 
 
 @pytest.mark.field
@@ -127,7 +170,9 @@ def test_the_script_of_a_thread_is_whole_in_itself_and_named_by_its_content(stat
 
 
 @pytest.mark.field
-@pytest.mark.parametrize("changed", ["js/core/format.js", "js/later.js", "css/wide.css"])
+@pytest.mark.parametrize(
+    "changed", ["js/core/format.js", "js/later.js", "css/wide.css", "fonts/n.woff2", "vendor/theirs.js"]
+)
 def test_after_a_change_the_joined_files_are_not_used(static: Path, changed: str) -> None:
     assert find(static) is not None
     before = (static / changed).read_text()
@@ -140,7 +185,7 @@ def test_after_a_change_the_joined_files_are_not_used(static: Path, changed: str
 
 
 @pytest.mark.field
-@pytest.mark.parametrize("what", ["absent", "torn", "foreign", "lost"])
+@pytest.mark.parametrize("what", ["absent", "torn", "foreign", "lost", "without its font"])
 def test_a_damaged_folder_is_no_folder(static: Path, what: str) -> None:
     listed = static / "built" / "built.json"
     match what:
@@ -152,6 +197,8 @@ def test_a_damaged_folder_is_no_folder(static: Path, what: str) -> None:
             listed.write_text('["built"]')
         case "lost":
             next((static / "built").glob("main-*.js")).unlink()
+        case "without its font":
+            next((static / "built").glob("*.woff2")).unlink()
     assert find(static) is None
 
 
@@ -170,6 +217,10 @@ async def test_the_page_begins_with_few_files_that_may_be_kept_for_ever(page: st
         text = served.text
         named = re.findall(r'(?:src|href)="(/static/built/[^"]+)"', text)
         assert 2 <= len(named) <= 20
+        assert "/static/fonts/" not in text
+        style = (await client.get(re.findall(r'rel="stylesheet" href="([^"]+)"', text)[0])).text
+        fonts = {f"/static/built/{name}" for name in re.findall(r'url\("\./([^"]+\.woff2)"\)', style)}
+        assert fonts == set(re.findall(r'rel="preload" href="([^"]+)"', text)), "each is loaded once"
         for path in named:
             answer = await client.get(path, headers={"Accept-Encoding": "gzip"})
             assert answer.status_code == 200
@@ -181,3 +232,5 @@ def test_without_joined_files_all_are_named_and_none_may_be_kept_unasked() -> No
     assert parts["script"] == "/static/js/main.js?v=1"
     assert parts["styles"] == [f"/static/css/{name}.css?v=1" for name in STYLES]
     assert parts["needed"] == []
+    tokens = (static_dir() / "css" / "tokens.css").read_text()
+    assert parts["fonts"] == [f"/static/{font}" for font in re.findall(r'url\("\.\./([^"]+)"\)', tokens)]

@@ -41,13 +41,15 @@ def static(tmp_path: Path) -> Path:
     folder = tmp_path / "static"
     shutil.copytree(static_dir(), folder, ignore=shutil.ignore_patterns("built", "drawn", "vendor"))
     (folder / "built").mkdir()
-    for name in ("app-AAAAAAAA.js", "log-BBBBBBBB.js", "page-CCCCCCCC.css", "built.json"):
+    for name in ("app-AAAAAAAA.js", "log-BBBBBBBB.js", "page-CCCCCCCC.css", "numerals-EEEEEEEE.woff2", "built.json"):
         (folder / "built" / name).write_text(name)
     return folder
 
 
 ENTRY = Entry(script="built/app-AAAAAAAA.js", style="built/page-CCCCCCCC.css", needed=())
-BUILT = Built(script=ENTRY.script, style=ENTRY.style, needed=ENTRY.needed, early="", name="0123456789ab", fleet=ENTRY)
+BUILT = Built(
+    script=ENTRY.script, style=ENTRY.style, needed=ENTRY.needed, early="", fonts=(), name="0123456789ab", fleet=ENTRY
+)
 
 
 def asset(name: str) -> str:
@@ -130,26 +132,22 @@ def test_another_content_is_another_version_and_the_same_is_the_same(static: Pat
     first = version()
     assert version() == first
     seen = {first, version(offline=b"<html>2"), version(asset=lambda name: f"/static/{name}?v=2")}
-    other = Built(script="", style="", needed=(), early="", name="ba9876543210", fleet=ENTRY)
+    other = Built(script="", style="", needed=(), early="", fonts=(), name="ba9876543210", fleet=ENTRY)
     seen.add(version(built=other))
-    font = static / "fonts" / "catgraph-numerals-500.woff2"
-    font.write_bytes(font.read_bytes() + b"0")
-    seen.add(version())
     worker = static / "worker" / "worker.js"
     worker.write_text(worker.read_text() + "\n// 2\n")
     seen.add(version())
     (static / "built" / "more-DDDDDDDD.js").write_text("")
     seen.add(version())
-    assert len(seen) == 7
+    assert len(seen) == 6
 
 
 def test_the_worker_has_every_joined_file_and_nothing_that_is_live(static: Path) -> None:
     script = shell_of(static, BUILT, asset, b"").worker(static)
     found = json.loads(script.partition("\n")[0].removeprefix("self.SHELL = ").removesuffix(";"))
-    assert {f"/static/built/{name}" for name in ("app-AAAAAAAA.js", "log-BBBBBBBB.js", "page-CCCCCCCC.css")} <= set(
-        found["named"]
-    )
-    addresses = [*found["named"], *found["plain"], found["offline"]]
+    joined = ("app-AAAAAAAA.js", "log-BBBBBBBB.js", "page-CCCCCCCC.css", "numerals-EEEEEEEE.woff2")
+    assert {f"/static/built/{name}" for name in joined} <= set(found["named"])
+    addresses = [*found["named"], found["offline"]]
     assert all(address.startswith(("/static/", "/offline?v=")) for address in addresses)
     assert found["build"] == build_of(BUILT)
     assert build_of(None) == ""
@@ -183,4 +181,8 @@ async def test_the_page_for_no_server_belongs_to_its_shell(static: Path, monkeyp
         named = re.findall(r'(?:src|href)="(/static/[^"]+)"', answer.text)
         assert [address for address in named if address not in script] == [], "all that it needs is kept with it"
         assert (await client.get("/offline?v=000000000000")).status_code == 404
-        assert "data-worker" in (await client.get("/")).text
+        page = (await client.get("/")).text
+        assert "data-worker" in page
+        icons = set(re.findall(r'"(/static/icons/[^"]+)"', page))
+        assert len(icons) == 5
+        assert all(f'"{address}"' in script for address in icons)
