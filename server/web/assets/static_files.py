@@ -77,6 +77,8 @@ class StaticText(StaticFiles):
                 return answer(text, Headers(scope=scope), media_type, keep)
         response = await super().get_response(path, scope)
         response.headers["Cache-Control"] = keep
+        if is_named:  # never revalidated
+            del response.headers["ETag"], response.headers["Last-Modified"]
         return response
 
     def _text(self, path: str) -> Packed | None:

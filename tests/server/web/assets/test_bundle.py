@@ -225,6 +225,7 @@ async def test_the_page_begins_with_few_files_that_may_be_kept_for_ever(page: st
             answer = await client.get(path, headers={"Accept-Encoding": "gzip"})
             assert answer.status_code == 200
             assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
+            assert not (path in fonts and answer.headers.keys() & {"etag", "last-modified"}), "without a use"
 
 
 def test_without_joined_files_all_are_named_and_none_may_be_kept_unasked() -> None:
