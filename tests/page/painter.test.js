@@ -91,3 +91,29 @@ test('a picture that never came holds up nothing once the failure was noticed', 
   picture();
   assert.equal(times, 1);
 });
+
+test('a page that has just begun waits a moment for its first frame before it draws without one', (context) => {
+  let now_ms = 1000;
+  context.mock.method(performance, 'now', () => now_ms);
+  const { painter, due, picture } = studio();
+  let drawn = 0;
+  painter.draw = () => { drawn += 1; };
+  for (now_ms of [1200, 1350]) {
+    painter.keepUp(now_ms, -Infinity);
+    assert.equal(due.length, 0);
+  }
+  now_ms = 1400;
+  painter.keepUp(now_ms, -Infinity);
+  picture();
+  assert.equal(drawn, 1, 'no frame came');
+});
+
+test('the first frame of a page that has just begun is drawn at once', () => {
+  const { painter, due } = studio();
+  let drawn = 0;
+  painter.draw = () => { drawn += 1; };
+  const frame = { session: { phase: 'live', paused: false }, link: { cut: null }, alarms: [], decelerate: { state: 'off', order: null, countdown: null } };
+  painter.frame(/** @type {any} */ (frame), performance.now(), true);
+  assert.equal(drawn, 1);
+  assert.equal(due.length, 0);
+});

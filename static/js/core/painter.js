@@ -8,6 +8,8 @@ export const DRAW_EVERY_MS = 200;
 const MOVE_EVERY_MS = 95;
 /** What is drawn in turn takes no longer of one picture, but for the last of it: each picture has its own costs of style, layout and layers [ms]. */
 const TURNS_MS = 4;
+/** A page that has just begun draws without a frame only after so long: that would take the time of the first values, which mostly come before [ms]. */
+const AWAITS_MS = 400;
 /** While frames come so close after each other they set the pace of drawing, after that a timer does [ms]. */
 const FED_MS = 300;
 
@@ -18,7 +20,7 @@ export class Painter {
   /** Something failed since the last drawing. */
   #hasFailed = false;
   #complained = '';
-  #drew_ms = -Infinity;
+  #drew_ms = performance.now() + AWAITS_MS - DRAW_EVERY_MS;
   #moved_ms = -Infinity;
   #isMoved = false;
   #urgent = '';
