@@ -217,6 +217,7 @@ test('what is lost is named, the server or what is beyond it', () => {
   const lost = { silence_s: 9.4, heard_ms: NOW, cars: 5, unserved: '' };
   assert.deepEqual(lostChain({ ...lost, lost: 'server' }).nodes.map(({ mark }) => mark), ['here', 'silent 9.4 s', 'unknown', 'unknown']);
   assert.equal(lostChain({ ...lost, lost: 'cars' }).cut, 1);
+  assert.equal(lostChain({ ...lost, lost: 'cars' }).nodes[0]?.name, 'This device'); // as on the page of one car
   assert.match(lostWords({ ...lost, lost: 'server' })[0], /^The server stopped answering\. Last data at/);
   assert.match(lostWords({ ...lost, lost: 'cars', unserved: 'The broker is not connected.' }).join(' '), /broker is not connected.*alarms of 5 cars do not arrive/);
 });

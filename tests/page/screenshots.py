@@ -83,6 +83,8 @@ WATCH: dict[str, tuple[str, int, int, str]] = {
     "watch-phone-check": ("check", 412, 915, "dark"),
     "watch-phone-check-unknown": ("check-unknown", 412, 915, "light"),
 }
+# The Mark key and the head of sheets come seconds after the page.
+COMPLETE = "() => !document.querySelector('#monitor:not([hidden])') || document.querySelector('.ledge > .mark-key')"
 Scene = Callable[[Canned, Page], Awaitable[None]]
 SCENES: dict[str, Scene] = {**WORK_SCENES}
 # Roboto as on a phone: text takes the room it takes there.
@@ -737,6 +739,16 @@ async def connect_saved(server: Canned, page: Page) -> None:
     await page.wait_for_selector(".saved-board .file:not([hidden])")
 
 
+@scene("connect-recent")
+async def connect_recent(server: Canned, page: Page) -> None:
+    """The cars that were dialled from this device."""
+    await connect(server, page)
+    dialled = ["192.168.4.1:9090", "ocelot:9090"]
+    await page.evaluate("(all) => localStorage.setItem('catgraph.addresses', JSON.stringify(all))", dialled)
+    await page.tap("#connect [data-f=history]")
+    await page.wait_for_selector("#sheet-history[open] li")
+
+
 @scene("connect-failed")
 async def connect_failed(server: Canned, page: Page) -> None:
     await connect(server, page)
@@ -986,6 +998,7 @@ async def take(browser: Browser, name: str, theme: str, size: dict[str, int] | N
         page.on("console", lambda message: print(name, "console:", message.text) if message.type != "log" else None)
         page.on("pageerror", lambda error: print(name, "error:", error))
         await show(server, page, name)
+        await page.wait_for_function(COMPLETE)
         await page.wait_for_timeout(700)
         path = OUT / (f"{name}-{theme}.png" if size is None else f"{name}-{theme}-{size['width']}.png")
         await page.screenshot(path=path)

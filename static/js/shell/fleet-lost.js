@@ -12,7 +12,7 @@ import { age, counted, timeOfDay } from '../core/format.js';
  * @typedef {{lost: Lost, silence_s: number, heard_ms: number | null, cars: number, unserved: string}} LostView
  */
 
-const NAMES = ['Page', 'Server', 'Links', 'Cars'];
+const NAMES = ['This device', 'Server', 'Links', 'Cars'];
 
 /** @param {LostView} view @returns {import('../core/link.js').ChainView} */
 export function lostChain({ lost, silence_s, cars }) {

@@ -21,7 +21,7 @@ function isCramped(monitor, store) {
   if (!document.body.hasAttribute('data-snack')) return false;
   const state = store.frame?.decelerate?.state;
   const isSlowing = state === 'ordered' || state === 'holding';
-  return is(NARROW) ? is(isSlowing ? LOW : LEAST) : isSlowing && is(LEAST);
+  return is(LEAST) || (isSlowing && is(NARROW) && is(LOW));
 }
 
 /** What is marked is the live drive: in a replay there is no such place. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */

@@ -1,0 +1,81 @@
+"""What a person needs of a scene is in sight, whole and without scrolling, on the window where that is hardest."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.page.canned import Canned
+from tests.page.conftest import Phone
+from tests.page.screenshots import COMPLETE, show
+
+RECT = "const at = (one) => document.querySelector(one).getBoundingClientRect();"
+#: Scene, window, what holds there.
+ROOM = {
+    "the counts of a recording stand beside its length": (
+        "files", 360, 740, "() => document.querySelector('.file:not([data-live]) .facts-line').clientHeight < 25",
+    ),
+    "the search stands beside what is stored": (
+        "files", 740, 360, f"() => {{ {RECT} return at('.files-find').top < at('.files .sec').bottom - 8 }}",
+    ),
+    "two actions of a recording are in sight, beside what it is": (
+        "files-menu", 740, 360,
+        f"() => {{ {RECT} return at('[data-f=file-actions] li:nth-child(2)').bottom <= at('#monitor > .rail').top"
+        " && at('#sheet-file').width === innerWidth"
+        " && at('#sheet-file .bd').right <= at('#sheet-file .what').left }",
+    ),
+    "the recipients of a mail are in sight on a phone on its side": (
+        "mail", 740, 360, f"() => {{ {RECT} return at('#mail-to').bottom <= at('#sheet-mail .keys').top + 1 }}",
+    ),
+    "recipients and subject of a mail are in sight on a low phone": (
+        "mail", 360, 640, f"() => {{ {RECT} return at('#mail-subject').bottom <= at('#sheet-mail .keys').top }}",
+    ),
+    "the line to be read back is in sight": (
+        "handover", 360, 740, f"() => {{ {RECT} return at('.tick[data-next]').bottom <= at('.duty-keys').top }}",
+    ),
+    "an intervention is described without scrolling": (
+        "take-over", 412, 915,
+        "() => { const body = document.querySelector('.mark-body'); return body.scrollHeight <= body.clientHeight }",
+    ),
+    "a planned stop is shown above a notice, which covers no distance": (
+        "planned-stop", 740, 360,
+        f"() => {{ {RECT} return at('.planned-stop').height > 20"
+        " && at('.snack').height > 0 && at('.near').bottom <= at('.snack').top }",
+    ),
+    "a notice covers no distance on a phone on its side": (
+        "home-warning", 740, 360, f"() => {{ {RECT} return at('.near').bottom <= at('.snack').top }}",
+    ),
+    "the order of a slow-down that fails is whole": (
+        "slow-down-not-confirmed", 412, 360,
+        "() => { const text = document.querySelector('#sheet-alarm .slide .tx');"
+        " return text.checkVisibility() && text.scrollHeight <= text.clientHeight }",
+    ),
+    "what is known of the beams is in sight beneath the scan": (
+        "scan", 360, 740,
+        f"() => {{ {RECT} return at('#panel-scan [data-f=beams]').bottom <= at('.ledge').top + 1 }}",
+    ),
+    "every choice of the preferences is in sight in a tablet's drawer": (
+        "preferences", 820, 1180,
+        f"() => {{ {RECT} return at('[data-sound-key=low]').bottom <= at('#sheet-preferences .keys').top }}",
+    ),
+    "no check stands alone in a row of a tablet": (
+        "home", 820, 1180,
+        "() => new Set([...document.querySelectorAll('.pane .checks li')].map((one) => one.offsetTop)).size === 2",
+    ),
+    "what arms is at the foot of a tablet's drawer": (
+        "slow-down-arm", 820, 1180,
+        f"() => {{ {RECT} return at('#sheet-slow').bottom - at('#sheet-slow [data-act=arm]').bottom < 20 }}",
+    ),
+    "a failed connection is explained in the column of the connect screen": (
+        "connect-failed", 820, 1180,
+        f"() => {{ {RECT} return Math.abs(at('#sheet-failed').left - at('#connect .view > *').left) < 2 }}",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", ROOM)
+async def test_it_is_in_sight(phone: Phone, canned: Canned, what: str) -> None:
+    name, width, height, holds = ROOM[what]
+    await phone.page.set_viewport_size({"width": width, "height": height})
+    await show(canned, phone.page, name)
+    await phone.page.wait_for_function(COMPLETE)
+    await phone.page.wait_for_function(holds)
