@@ -57,6 +57,40 @@ ROOM = {
         "preferences", 820, 1180,
         f"() => {{ {RECT} return at('[data-sound-key=low]').bottom <= at('#sheet-preferences .keys').top }}",
     ),
+    "the Mark key gives way to the list of alarms on a phone on its side": (
+        "alarms",
+        740,
+        360,
+        "() => document.querySelector('.ledge').hidden",
+    ),
+    "the slide of a car that is slowed is read whole on a phone on its side": (
+        "slow-down-ordered",
+        740,
+        360,
+        "() => { const text = document.querySelector('#monitor > .rail .slide .tx');"
+        " return text.clientWidth > 60 && text.scrollHeight <= text.clientHeight }",
+    ),
+    "the slide that slows the car is read whole on a phone on its side": (
+        "slow-down-armed",
+        740,
+        360,
+        "() => { const text = document.querySelector('#monitor > .rail .slide .tx');"
+        " return text.textContent.length > 10 && text.scrollHeight <= text.clientHeight }",
+    ),
+    "so it is under the left thumb": (
+        "slow-down-armed",
+        740,
+        360,
+        "() => { document.documentElement.dataset.hand = 'left';"
+        " const text = document.querySelector('#monitor > .rail .slide .tx');"
+        " return text.textContent.length > 10 && text.scrollHeight <= text.clientHeight }",
+    ),
+    "a topic to choose is in sight on a phone on its side": (
+        "topic",
+        740,
+        360,
+        f"() => {{ {RECT} return at('#sheet-topic li').bottom <= at('#sheet-topic .keys').top + 1 }}",
+    ),
     "no check stands alone in a row of a tablet": (
         "home", 820, 1180,
         "() => new Set([...document.querySelectorAll('.pane .checks li')].map((one) => one.offsetTop)).size === 2",

@@ -17,7 +17,8 @@ const is = (size) => matchMedia(`(${size})`).matches;
 
 /** On a low phone the steps of a slow-down and a warning leave no room: they come first; on its side a warning alone does. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */
 function isCramped(monitor, store) {
-  if ((monitor.dataset['sheet'] !== undefined || (monitor.dataset['over'] === 'headed' && is(SHORT))) && is(NARROW)) return true;
+  if (monitor.dataset['over'] === 'headed' && is(is(NARROW) ? SHORT : LEAST)) return true;
+  if (monitor.dataset['sheet'] !== undefined && is(NARROW)) return true;
   if (!document.body.hasAttribute('data-snack')) return false;
   const state = store.frame?.decelerate?.state;
   const isSlowing = state === 'ordered' || state === 'holding';
