@@ -91,10 +91,6 @@ ROOM = {
         360,
         f"() => {{ {RECT} return at('#sheet-topic li').bottom <= at('#sheet-topic .keys').top + 1 }}",
     ),
-    "no check stands alone in a row of a tablet": (
-        "home", 820, 1180,
-        "() => new Set([...document.querySelectorAll('.pane .checks li')].map((one) => one.offsetTop)).size === 2",
-    ),
     "what arms is at the foot of a tablet's drawer": (
         "slow-down-arm", 820, 1180,
         f"() => {{ {RECT} return at('#sheet-slow').bottom - at('#sheet-slow [data-act=arm]').bottom < 20 }}",
