@@ -171,8 +171,6 @@ class StampedDelay:
         """How old a message was when it came; None: its stamps are not known to be of that clock."""
         if stamp_s < self._stamp_s:
             self._stepped_s = at_s
-            if stamp_s < self._stamp_s - JUMP_S:
-                self._least_s = float("inf")  # no link does that to a topic: what was in time was of another clock
         self._stamp_s = stamp_s
         if clock.ahead_s is None or clock.requested_s is None or clock.requested_s <= self._stepped_s:
             return None
