@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import struct
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -23,7 +23,6 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from server.recording.export.from_json import encoder_of_json
 from server.recording.read.code_writer import PRIMITIVES
 from server.recording.read.definitions import MAX_FIELDS, definitions_of, times, types_of_msg
 from server.recording.read.errors import Undecodable
@@ -132,15 +131,11 @@ def ros1_form(channel: Channel, source: FileSource) -> Ros1Form:
         case "cdr":
             return _from_cdr(channel, source)
         case "json":
-            return _from_json(channel, source)
+            raise Undecodable(
+                "it was recorded as JSON: its type's definition was unknown, or it did not match its type"
+            )
         case other:
             raise Undecodable(why_not_decoded(other))
-
-
-def _from_json(channel: Channel, source: FileSource) -> Ros1Form:
-    encoded = encoder_of_json(channel, source)
-    form = _as_it_is(channel) if source.ros_version == 1 else _from_cdr(channel, source)
-    return replace(form, convert=lambda raw: form.convert(encoded(raw)), body=encoded)
 
 
 def _as_it_is(channel: Channel) -> Ros1Form:

@@ -11,7 +11,7 @@ import struct
 import tempfile
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,7 +20,6 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_typestore
 
 from server.recording.export.export_format import ExportFormat, ExportRefused, Outcome, Progress, nothing
-from server.recording.export.from_json import encoder_of_json
 from server.recording.export.raw import OWN, Raw, explain, in_time, later_messages, raw_messages
 from server.recording.read.definitions import definitions_of, distribution, times
 from server.recording.read.errors import Undecodable
@@ -87,7 +86,6 @@ def write_ros2_bag(
 
 def _copy(recording: Recording, messages: Iterable[Raw], writer: Writer, outcome: Outcome, *, with_own: bool) -> None:
     connections: dict[tuple[int, int], Any] = {}  # file and channel → its connection; None: left out
-    encoders: dict[tuple[int, int], Callable[[bytes], bytes]] = {}  # of what was recorded as JSON
     by_topic: dict[str, tuple[str, Any]] = {}  # a topic has one type in a bag of ROS 2
     left_out: Counter[tuple[str, str]] = Counter()
 
@@ -117,21 +115,17 @@ def _copy(recording: Recording, messages: Iterable[Raw], writer: Writer, outcome
                 if not is_own and channel.encoding not in ("cdr", "json"):
                     raise Undecodable(why_not_decoded(channel.encoding))
                 if not is_own and channel.encoding == "json":
-                    encoders[place] = encoder_of_json(channel, recording.files[raw.file])
+                    raise Undecodable(
+                        "it was recorded as JSON: its type's definition was unknown, or it did not match it"
+                    )
                 connections[place] = connection_of(channel, recording.files[raw.file])
             except Undecodable as why:
                 connections[place] = None
                 left_out[channel.topic, str(why)] += channel.count
-        connection, encoded = connections[place], encoders.get(place)
-        if connection is None:
-            continue
-        try:
-            data = _text(raw.data) if is_own else raw.data if encoded is None else encoded(raw.data)
-        except Undecodable as why:
-            left_out[channel.topic, str(why)] += 1
-            continue
-        writer.write(connection, raw.time_ns, data)
-        outcome.entries += 1
+        connection = connections[place]
+        if connection is not None:
+            writer.write(connection, raw.time_ns, _text(raw.data) if is_own else raw.data)
+            outcome.entries += 1
     outcome.notes += [
         f"{topic} ({count} messages) is left out: {why}." for (topic, why), count in sorted(left_out.items())
     ]

@@ -210,25 +210,6 @@ def test_what_ros_1_has_no_place_for_is_named(tmp_path: Path) -> None:
     assert "1 messages on /n are left out: its 5 bytes do not fit its type." in notes
 
 
-@pytest.mark.parametrize("version", [1, 2])
-def test_what_was_recorded_as_json_of_a_known_type_is_in_it(tmp_path: Path, version: int) -> None:
-    made = OurFile(tmp_path / "ours.mcap", profile=f"ros{version}")
-    stamp = {"secs": 7, "nsecs": 8} if version == 1 else {"sec": 7, "nanosec": 8}
-    header = {"seq": 5} if version == 1 else {}
-    stamped = {"header": header | {"stamp": stamp, "frame_id": "laser"}, "point": {"x": 1.5, "y": 2.5, "z": 0}}
-    made.write(BEGIN_S * 10**9, "/p", "geometry_msgs/msg/PointStamped", "", "json", json.dumps(stamped).encode())
-    made.write(BEGIN_S * 10**9 + 1, "/p", "geometry_msgs/msg/PointStamped", "", "json", b"{}")
-    outcome = export(made.close(), tmp_path / "out.bag")
-    assert outcome.notes == ["1 messages on /p are left out: it was recorded as JSON that does not match its type."]
-    with open_recording([tmp_path / "out.bag"]) as bag:
-        (row,) = bag.messages()
-    assert (row.type, row.message["header"]["stamp"]["nsecs"], row.message["point"]["y"]) == (
-        "geometry_msgs/PointStamped",
-        8,
-        2.5,
-    )
-
-
 @pytest.mark.parametrize("behind", [b"\0" * 4, b"\xff" * 8])
 @pytest.mark.parametrize("type", ["std_msgs/msg/Int32", "my_msgs/msg/Number"])
 @pytest.mark.parametrize("order", ["little", "big"])
