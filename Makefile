@@ -121,6 +121,6 @@ $(VENV)/.ready-test: $(GROUND) $(LOST) | $(VENV)/pyvenv.cfg
 	@touch $(VENV)/.ready $@
 
 # The page's own files joined, its icons drawn. Where they cannot be, they are served one by one: slower, and never yesterday's.
-static/built/built.json: $(wildcard static/js/*.js static/js/*/*.js static/css/*.css static/icons/*.svg) server/web/assets/bundle.py server/web/assets/rollup.config.mjs server/web/assets/icons.py | $(VENV)/.ready
+static/built/built.json: $(wildcard static/js/*.js static/js/*/*.js static/css/*.css static/fonts/*.woff2 static/icons/*.svg) server/web/assets/bundle.py server/web/assets/rollup.config.mjs server/web/assets/icons.py | $(VENV)/.ready
 	@if [ -x node_modules/.bin/rollup ]; then $(PY) -m server.web.assets.bundle node_modules/.bin && $(PY) -m server.web.assets.icons node_modules; \
 	  else $(PY) -m pip install --quiet -c constraints.txt -e .; fi && touch -c $@ || echo "The page's files are served one by one."

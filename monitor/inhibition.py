@@ -37,7 +37,8 @@ class CauseTable:
     time begins anew only after a pause in which all that it explains could be announced.
 
     Several such conditions in turn hide an alarm no longer than the slowest one of them alone: once its fault has
-    lasted for their longest on-delay and `UNSEEN_S`, only announced alarms suppress it.
+    lasted for their longest on-delay and `UNSEEN_S`, and as long again for what hides those, only announced alarms
+    suppress it.
     """
 
     def __init__(
@@ -139,8 +140,13 @@ class CauseTable:
         return {name: UNSEEN_S + self._grace_s.get(name, 0.0) + delay_s for name, delay_s in longest.items()}
 
     def _longest(self, names: Iterable[str]) -> float:
-        """How long all of these may hide an alarm while none of them is announced."""
-        return UNSEEN_S + max((self._on_delay_s.get(name, 0.0) for name in names), default=0.0)
+        """How long all of these may hide an alarm while none of them is announced: one that is itself hidden so is
+        announced later."""
+        return self._alone(names) + max((self._alone(self._closure[name]) for name in names), default=0.0)
+
+    def _alone(self, names: Iterable[str]) -> float:
+        delays_s = [self._on_delay_s.get(name, 0.0) for name in names]
+        return UNSEEN_S + max(delays_s) if delays_s else 0.0
 
     def _holds(self, name: str, now_s: float) -> bool:
         gone_at_s, unseen_s = self._gone_at_s[name], self._unseen_s[name]

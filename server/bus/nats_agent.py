@@ -154,18 +154,18 @@ class NatsAgent:
         await self._announce()
 
     async def stop(self) -> None:
-        client = self._client
         with contextlib.suppress(NatsError, TimeoutError):  # without a broker nothing is routed to it
             for subscription in self._subscriptions:
                 await subscription.unsubscribe()
-            if client is not None:
-                await processed(client, within_s=1)  # from now on no request arrives
+            if self._client is not None:
+                await processed(self._client, within_s=1)  # from now on no request arrives
         self._subscriptions.clear()
         self._published.clear()
         while self._stops:
             self._stops.pop()()
         self._client = None
-        self._supervisor.end("announcements")
+        await self._supervisor.stop()
+        self._supervisor = Supervisor("agent at the broker")
         await cancel(self._tasks)
         for looked in self._looked.values():
             looked.close()

@@ -19,7 +19,6 @@ SPREAD = 0.1  # of that time: the agents of a broker that was lost are not to di
 FOR_S = 2.0
 REACHED_FOR_S = 2.0  # so long an answer counts
 LOOK_UP_EVERY_S = 1.0
-MOST_ADDRESSES = 2  # of one name: an old and a new kind
 
 
 class PortProbe:
@@ -28,7 +27,7 @@ class PortProbe:
     def __init__(self, host: str, port: int, refusal_counts: Callable[[], bool]) -> None:
         self._host, self._port = host, port
         self._refusal_counts = refusal_counts
-        self._addresses = [host] if _is_address(host) else []  # the last known ones: a name may be unknown in a gap
+        self._addresses = [host] if _is_address(host) else []  # the last known ones, one of each family
         self._is_looking_up = False
         self._looked_up_s = -LOOK_UP_EVERY_S
         self._task: asyncio.Task[None] | None = None
@@ -58,7 +57,7 @@ class PortProbe:
         try:
             while not self.is_reached:
                 self._look_up()
-                dials |= {asyncio.create_task(self._reach(one)) for one in self._addresses[:MOST_ADDRESSES]}
+                dials |= {asyncio.create_task(self._reach(one)) for one in self._addresses}
                 wait_s = EVERY_S if now() - began_s < SLOWLY_AFTER_S else SLOWLY_S
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(wait_s * random.uniform(1 - SPREAD, 1 + SPREAD)):
@@ -86,16 +85,17 @@ class PortProbe:
         loop = asyncio.get_running_loop()
         if self._is_looking_up or _is_address(self._host) or loop.time() - self._looked_up_s < LOOK_UP_EVERY_S:
             return
-        self._is_looking_up = True
 
         def look_up() -> None:
             found: list[str] = []
             with contextlib.suppress(OSError, UnicodeError):
-                found = [str(row[4][0]) for row in socket.getaddrinfo(self._host, self._port, type=socket.SOCK_STREAM)]
+                rows = socket.getaddrinfo(self._host, self._port, type=socket.SOCK_STREAM)
+                found = list({row[0]: str(row[4][0]) for row in reversed(rows)}.values())
             with contextlib.suppress(RuntimeError):  # the process ends
                 loop.call_soon_threadsafe(self._looked_up, found)
 
         threading.Thread(target=look_up, name="look up the broker", daemon=True).start()
+        self._is_looking_up = True  # no sooner: a thread may not be had
 
     def _looked_up(self, found: list[str]) -> None:
         self._is_looking_up, self._looked_up_s = False, asyncio.get_running_loop().time()

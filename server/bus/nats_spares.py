@@ -14,12 +14,14 @@ from urllib.parse import urlsplit
 
 from nats.aio.client import Client
 
-from server.bus.nats_probe import EVERY_S, SLOWLY_AFTER_S, PortProbe
+from server.bus.nats_probe import EVERY_S, PortProbe
 from server.system.supervision import cancel
 
 PORT = 4222
 RETRY_S = 1.0  # after a dial that the broker refused
 SPARE_RETRY_S = 10.0  # where it is not needed now
+PROBED_FOR_S = 60.0  # then a dial is tried as well
+TRIED_ANYWAY_S = 600.0  # in a gap an idle connection that is tried is lost
 MOST_DIALS = 6  # at once, with those that settle, and in RETRY_S
 SETTLES_S = 3.0  # a broker pings a new connection after 2.0 to 2.4 s: lost in a gap, that holds up all that follows
 KEEP_EVERY_S = 20.0  # one is pinged: networks forget silent connections, and the broker would ping after 2 min
@@ -42,6 +44,7 @@ class Spares:
         self._settling: dict[asyncio.Task[None], Client] = {}  # new ones, and one that is pinged
         self._closing: set[asyncio.Task[None]] = set()
         self._begun_s: list[float] = []  # when dials were begun of late
+        self._again: asyncio.TimerHandle | None = None  # then more may be
         self._needed = asyncio.Event()  # there is no connection to work by
         self._is_proven = True  # the one that was taken answers
         self._unsettled: list[Client] = []
@@ -84,7 +87,7 @@ class Spares:
         dialled = asyncio.create_task(self._dialled.wait())
         try:
             # In a gap it would be lost as the one before; where no new connection is let through, it is the only one.
-            wait_s = SLOWLY_AFTER_S if self.is_any else None
+            wait_s = TRIED_ANYWAY_S if self.is_any else None
             await asyncio.wait({probing, dialled}, timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
             if probing.done() and asyncio.get_running_loop().time() - began_s > 2 * EVERY_S:
                 self._begin(1 + self._count)  # beside those whose first packet waits to be repeated
@@ -125,7 +128,9 @@ class Spares:
             task.add_done_callback(self._dials.discard)
             task.add_done_callback(lambda _: self._changed.set())
         if dials > most:
-            loop.call_later(RETRY_S, self._changed.set)
+            if self._again is not None:
+                self._again.cancel()
+            self._again = loop.call_later(RETRY_S, self._changed.set)
 
     async def _add(self) -> None:
         try:
@@ -149,7 +154,7 @@ class Spares:
             return
         await asyncio.sleep(RETRY_S)
         if self._needed.is_set():  # while the broker is away only its port is dialled
-            await asyncio.wait({self._probe.begin()})
+            await asyncio.wait({self._probe.begin()}, timeout=PROBED_FOR_S)
 
     def _settle(self, one: Client, after_s: float = 0.0) -> None:
         task = asyncio.create_task(self._put_last(one, after_s), name="spare connection")

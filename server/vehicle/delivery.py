@@ -24,6 +24,7 @@ SILENT_AGAIN_S = 10.0  # the same for a topic that is published and not received
 RECORDED_AGAIN_S = (10.0, 30.0, 60.0, 120.0, 300.0)  # the same for a recorded topic, which may have few messages
 FIRST_WITHIN_S = 5.0  # the first message of a publisher that came later
 QUIET_S = 2.0  # a signal's topic without a message for so long, when a recording begins
+FLOWS_AT_MOST_S = 30.0  # of a slow topic, or one that had pauses
 FLOWS_S = 2.0  # anything within so long: the bridge delivers, so it is this topic and not all of them
 AT_ONCE = 8  # topics per round
 LEAST_GAPS = 3  # that show how fast a topic is
@@ -83,7 +84,8 @@ class _Row:
 
     def flows(self, now_s: float) -> bool:
         usual_s = self.gaps_s / self.gaps if self.gaps else 0.0
-        return self.newest_s is not None and now_s - self.newest_s <= max(FLOWS_S, SLOW_PERIODS * usual_s)
+        due_s = min(FLOWS_AT_MOST_S, max(FLOWS_S, SLOW_PERIODS * usual_s))
+        return self.newest_s is not None and now_s - self.newest_s <= due_s
 
     def came_once(self, now_s: float) -> bool:
         """Whether each subscription gives one message, and the topic is not merely slow: then its next message comes by

@@ -26,6 +26,7 @@ from server.rosbridge.raw_frame import RawFrame
 
 GIVEN_WITHIN_S = 5.0  # after it has read a subscription, a bridge of ROS 2 needs some time to get the kept sample
 TWICE_WITHIN_S = 0.1  # a message that a bridge sends twice
+LATER_TWICE_WITHIN_S = 0.5  # so does one behind those that were on their way
 EXPECTED_S = 30.0  # a topic that continues for so long after a subscription has been given what was kept
 IN_TIME = 0.25  # a message that comes when its period has passed, give or take so much of it, may be a new one
 PERIOD_WEIGHT = 0.2
@@ -148,6 +149,8 @@ class SentAgain:
         content = _content(message, size)
         for sample in reversed(known.samples):
             if sample.expected and is_same(sample.content, content):
+                if sample.is_later and at_s - sample.first_s > LATER_TWICE_WITHIN_S:
+                    return None
                 if _is_stamped(message, size):
                     return Arrival(sample, is_repeat=True)
                 if sample.is_later:

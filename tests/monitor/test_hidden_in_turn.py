@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -24,8 +25,9 @@ EXPLAIN: dict[str, AlarmSpec] = {
     "overload": replace(SPEC, on_delay_s=5.0, off_delay_s=1.0),
 }
 SLOW = replace(SPEC, on_delay_s=5.0, off_delay_s=2.0, inhibited_by=("silent", "overload"))
-# It may be hidden first at the end of its own delay, then for the longest of theirs, and begins its delay once more.
-WITHIN_S = 2.0 * SLOW.on_delay_s + 5.0 + UNSEEN_S + 4 * TICK_S
+# It may be hidden first at the end of its own delay, then for the longest of theirs, and as long as what explains these
+# hides them (the late link hides the silent car), and begins its delay once more.
+WITHIN_S = 2.0 * SLOW.on_delay_s + (5.0 + UNSEEN_S) + (1.0 + UNSEEN_S) + 4 * TICK_S
 
 
 class Car:
@@ -116,3 +118,46 @@ def test_a_fault_that_comes_and_goes_begins_anew_after_a_long_absence_only(
         in_turn(car, absent_s, absence)
     in_turn(car, SLOW.on_delay_s + 2 * TICK_S, BAD)
     assert [name for _, name in car.announced] == announced
+
+
+OF_MESSAGES = ("link_lost", "link_late_moving", "link_late", "car_silent", "no_message")
+
+
+def announced_of_link(seconds: float, found: Callable[[float], dict[str, Finding]]) -> list[str]:
+    """What the alarms of catgraph itself announce; `stale` is of each signal."""
+    specs = {name: alarm.spec for name, alarm in Monitor().alarms.items()}
+    stale = [name for name in specs if name.startswith("signal_stale.")]
+    scripts = {name: Script() for name in (*OF_MESSAGES, *stale)}
+    monitor = Monitor([check(name, script, alarm=specs[name]) for name, script in scripts.items()])
+    announced = []
+    for tick in range(round(seconds / TICK_S)):
+        now = found(tick * TICK_S)
+        for name, script in scripts.items():
+            script.finding = now.get("stale" if name in stale else name, OK)
+        happened = monitor.step(at((tick + 1) * TICK_S))
+        announced += [transition.alarm_id for transition in happened if transition.announces]
+    return announced
+
+
+@pytest.mark.parametrize(
+    ("found", "announced"),
+    [
+        (lambda t: {"link_late_moving": BAD if t < 0.3 else OK, "link_late": BAD, "stale": BAD}, "link_late"),
+        (lambda t: {"link_late_moving": BAD if t < 0.3 else UNKNOWN, "link_late": BAD, "stale": BAD}, "link_late"),
+        (lambda t: {"link_late_moving": BAD if t % 1 < 0.3 else OK, "link_late": BAD, "stale": BAD}, "link_late"),
+        (
+            lambda t: {
+                "link_late_moving": BAD if t < 0.3 else OK,
+                "link_late": BAD if t % 1.5 < 0.75 else OK,
+                "car_silent": BAD if t >= 1.95 else OK,
+                "stale": BAD,
+            },
+            "car_silent",
+        ),
+    ],
+    ids=["moved for a moment", "whether it moves is not known", "moves for moments", "late for moments, then silent"],
+)
+def test_what_explains_all_signals_is_announced_alone_also_where_something_hides_it_for_a_while(
+    found: Callable[[float], dict[str, Finding]], announced: str
+) -> None:
+    assert announced_of_link(20.0, found) == [announced]

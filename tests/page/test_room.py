@@ -8,7 +8,11 @@ from tests.page.canned import Canned
 from tests.page.conftest import Phone
 from tests.page.screenshots import COMPLETE, show
 
-RECT = "const at = (one) => document.querySelector(one).getBoundingClientRect();"
+#: Of what is hidden there is none, and no comparison with it holds.
+RECT = (
+    "const at = (one) => { const box = document.querySelector(one).getBoundingClientRect();"
+    " return box.width && box.height ? box : {} };"
+)
 #: Scene, window, what holds there.
 ROOM = {
     "the counts of a recording stand beside its length": (
@@ -56,6 +60,20 @@ ROOM = {
     "every choice of the preferences is in sight in a tablet's drawer": (
         "preferences", 820, 1180,
         f"() => {{ {RECT} return at('[data-sound-key=low]').bottom <= at('#sheet-preferences .keys').top }}",
+    ),
+    "the distance ahead is read whole beside a slow-down that fails, on a phone on its side": (
+        "slow-down-not-confirmed-seen",
+        740,
+        360,
+        f"() => {{ {RECT} const end = at('.near').bottom;"
+        " return document.querySelector('.ledge').hidden && end <= at('#monitor > .rail').top }",
+    ),
+    "no car in alarm is behind the edge of the list of cars": (
+        "cars",
+        1024,
+        768,
+        "() => { const list = document.querySelector('#sheet-cars > .cars');"
+        " return list.clientHeight > 0 && list.scrollHeight <= list.clientHeight + 1 }",
     ),
     "the Mark key gives way to the list of alarms on a phone on its side": (
         "alarms",

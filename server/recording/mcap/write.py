@@ -120,7 +120,7 @@ class PartFile:
         """`path`: what it is called when it is closed. Raises FileExistsError where anything has that name."""
         self.path = path
         self._metadata = dict(metadata)
-        self._channels: dict[tuple[str, str, str], int] = {}  # topic, encoding, type → number
+        self._channels: dict[tuple[str | bytes, ...], int] = {}  # topic, encoding, schema → number
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._sequence: dict[int, int] = {}
         self._newest_ns = 0
@@ -162,10 +162,10 @@ class PartFile:
 
     def channel(self, topic: str, schema: Schema, metadata: Mapping[str, str] | None = None) -> int:
         """The number of a topic's channel; the same for the same schema."""
-        key = (topic, schema.message_encoding, schema.name)
+        declared = (schema.name, schema.encoding, schema.data)
+        key = (topic, schema.message_encoding, *declared)
         number = self._channels.get(key)
         if number is None:
-            declared = (schema.name, schema.encoding, schema.data)
             if declared not in self._schemas:
                 self._schemas[declared] = self._writer.register_schema(*declared)
             number = self._channels[key] = self._writer.register_channel(

@@ -24,6 +24,7 @@ from starlette.types import Scope
 from server.web.assets.bundle import FOLDER
 
 _LONGEST_NAME = 120
+_HASH_LEAST = 12  # digits of a hash in an address
 _YEAR = "public, max-age=31536000, immutable"
 _TYPES = {
     ".js": "text/javascript; charset=utf-8",
@@ -66,24 +67,42 @@ class StaticText(StaticFiles):
     """Static files; texts among them small."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        is_named = path.startswith(f"{FOLDER}/") or scope.get("query_string", b"").startswith(b"v=")
-        keep = _YEAR if is_named else "no-cache"
         media_type = _TYPES.get(os.path.splitext(path)[1])
         if "\0" in path or any(len(part) > _LONGEST_NAME for part in path.split(os.sep)):
             raise HTTPException(404)  # no file is called so, and asking for it is an error of its own kind
         if media_type is not None and scope["method"] == "GET":
             text = await run_in_threadpool(self._text, path)
             if text is not None:
-                return answer(text, Headers(scope=scope), media_type, keep)
+                is_kept = _is_named(path, scope, text.etag)
+                return answer(text, Headers(scope=scope), media_type, _YEAR if is_kept else "no-cache")
+        is_kept = _is_named(path, scope, await run_in_threadpool(self._hash, path))
+        if is_kept:  # without the two below Starlette cannot judge a condition of a range
+            scope = {**scope, "headers": [row for row in scope["headers"] if row[0] != b"if-range"]}
         response = await super().get_response(path, scope)
-        response.headers["Cache-Control"] = keep
-        if is_named:  # never revalidated
+        response.headers["Cache-Control"] = _YEAR if is_kept else "no-cache"
+        if is_kept:  # never revalidated
             del response.headers["ETag"], response.headers["Last-Modified"]
         return response
 
     def _text(self, path: str) -> Packed | None:
         full, stat = self.lookup_path(path)
         return _read(Path(full), stat.st_mtime_ns) if stat is not None and S_ISREG(stat.st_mode) else None
+
+    def _hash(self, path: str) -> str:
+        full, stat = self.lookup_path(path)
+        return hash_of(Path(full), stat.st_mtime_ns) if stat is not None and S_ISREG(stat.st_mode) else ""
+
+
+def _is_named(path: str, scope: Scope, digest: str) -> bool:
+    """Whether the address has the hash of what is there: that of another build names another content."""
+    version = bytes(scope.get("query_string", b"")).removeprefix(b"v=").decode("latin-1")
+    return path.startswith(f"{FOLDER}/") or (len(version) >= _HASH_LEAST and digest.startswith(version))
+
+
+@lru_cache(maxsize=512)
+def hash_of(path: Path, changed_ns: int) -> str:
+    """Of a file's content; `changed_ns` makes a changed file another one for the cache."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 @lru_cache(maxsize=512)

@@ -208,7 +208,9 @@ async def page_socket(
     role: RoleName = "operator" if principal.is_operator else "viewer"
     name = vehicle if vehicle is not None else next(iter(app.vehicles), None)
     if fleet != "1" and (name is None or not app.may_be(name)):
-        raise HTTPException(404, f"No vehicle is named {name[:40]}." if name else "There is no vehicle yet.")
+        raise HTTPException(
+            404, f"No vehicle is named {name[:40]}." if name is not None else "There is no vehicle yet."
+        )
     with app.access.next_ticket(principal) as ticket:
 
         def hello(name: str) -> Hello:

@@ -10,19 +10,23 @@ const LOW = 'height < 43.75em';
 const SHORT = 'height < 50em';
 /** On a phone on its side, or over its keyboard, a notice needs it. */
 const LEAST = 'height < 32.5em';
+const WIDE = 'width >= 62.5em';
 const NARROW = 'width < 43.75em';
 
 /** Measured in this way it costs no layout of the page, which innerWidth and innerHeight do. @param {string} size */
 const is = (size) => matchMedia(`(${size})`).matches;
 
-/** On a low phone the steps of a slow-down and a warning leave no room: they come first; on its side a warning alone does. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */
+/** On a low phone the steps of a slow-down and a warning leave no room: they come first; on its side a warning alone does, or a slow-down that is not confirmed. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */
 function isCramped(monitor, store) {
+  if (monitor.querySelector(':scope > .ledge :is([data-held], .fresh:not([hidden]))')) return false; // what a person is at stays
   if (monitor.dataset['over'] === 'headed' && is(is(NARROW) ? SHORT : LEAST)) return true;
   if (monitor.dataset['sheet'] !== undefined && is(NARROW)) return true;
-  if (!document.body.hasAttribute('data-snack')) return false;
-  const state = store.frame?.decelerate?.state;
+  const isLeast = is(LEAST) && !is(WIDE);
+  const { state, order } = store.frame?.decelerate ?? {};
   const isSlowing = state === 'ordered' || state === 'holding';
-  return is(LEAST) || (isSlowing && is(NARROW) && is(LOW));
+  if (isSlowing && order?.confirmed === false && isLeast) return true; // the distance to what is ahead needs the room
+  if (!document.body.hasAttribute('data-snack')) return false;
+  return isLeast || (isSlowing && is(NARROW) && is(LOW));
 }
 
 /** What is marked is the live drive: in a replay there is no such place. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */

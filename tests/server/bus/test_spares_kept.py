@@ -13,8 +13,7 @@ import pytest
 from nats.aio.client import Client
 
 from server.bus import nats_probe, nats_spares
-from server.bus.nats_probe import SLOWLY_AFTER_S
-from server.bus.nats_spares import KEEP_EVERY_S, RETRY_S, SETTLES_S, Spares
+from server.bus.nats_spares import KEEP_EVERY_S, RETRY_S, SETTLES_S, TRIED_ANYWAY_S, Spares
 from tests.server.bus.buses import until
 from tests.server.bus.test_nats_spares import Idle
 
@@ -89,7 +88,32 @@ async def test_an_idle_connection_is_taken_where_no_new_one_is_let_through(
         assert (await taken(spares, 1)).name == "a"
         spares.works()
         await asyncio.sleep(SETTLES_S + 0.3)
-        assert (await taken(spares, 1 if refuses else SLOWLY_AFTER_S + 1)).name == "b"
+        assert (await taken(spares, 1 if refuses else TRIED_ANYWAY_S + 1)).name == "b"
+
+
+@pytest.mark.virtual_time
+async def test_what_accepts_and_stays_silent_does_not_keep_this_program_ever_busier(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As a frozen broker, or a proxy of a network."""
+    passes: list[float] = []
+    begin = Spares._begin
+
+    def counted(self: Spares, dials: int) -> None:
+        passes.append(asyncio.get_running_loop().time())
+        begin(self, dials)
+
+    monkeypatch.setattr(Spares, "_begin", counted)
+
+    async def dial() -> Client:
+        await asyncio.sleep(6)
+        raise TimeoutError
+
+    async with kept(dial, 2) as spares:
+        taking = asyncio.create_task(spares.take())
+        await asyncio.sleep(600)
+        assert len(passes) < 3 * 600
+        taking.cancel()
 
 
 async def test_a_name_is_looked_up_beside_all_other_work_and_its_last_address_is_dialled(
