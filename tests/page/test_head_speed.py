@@ -62,7 +62,7 @@ async def test_a_screen_shows_the_speed_on_a_tablet_and_a_desktop_too(phone: Pho
     await page.set_viewport_size({"width": 820, "height": 1180})
     await phone.open(canned.address)
     await phone.live()
-    await expect(page.locator("link[href$='drawers.css']")).to_be_attached()
+    await expect(page.locator("link[href*='drawers']")).to_be_attached()
     for name in TITLED:
         await page.evaluate(OPEN, name)
         await expect(page.locator("#monitor > .titlebar .head-speed")).to_have_text("4.2m/s")

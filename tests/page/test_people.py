@@ -196,7 +196,7 @@ async def test_what_opens_by_itself_covers_neither_an_alarm_nor_a_finger(
             await loads.wait()
             await route.continue_()
 
-        await late.page.route("**/people.css*", hold)
+        await late.page.route("**/people*.css*", hold)
         await late.page.add_init_script(SLIDING)
         await late.open(one.ann.page.url)
         await late.live()

@@ -157,7 +157,7 @@ async def test_a_critical_alarm_leaves_the_list_a_row_and_its_foot(phone: Phone,
     await page.set_viewport_size({"width": 1200, "height": 700})
     await phone.open(f"{canned.address}/#home")
     await expect(page.locator(".alarms-pane #sheet-alarm .versus")).to_be_visible()
-    await expect(page.locator("link[href$='drawers.css']")).to_be_attached()
+    await expect(page.locator("link[href*='drawers']")).to_be_attached()
     await expect(page.locator(".alarms-pane .alarms > li").first).to_be_attached()
     for width, height in ((1200, 700), (1200, 610), (1000, 640), (1180, 768), (1366, 768), (1440, 900)):
         await page.set_viewport_size({"width": width, "height": height})
@@ -249,8 +249,8 @@ async def test_the_gauge_of_a_phone_on_its_side_stays_whole_at_the_end_of_home(p
     await page.set_viewport_size({"width": 740, "height": 360})
     await phone.open(f"{canned.address}/#home")
     await phone.live()
-    await expect(page.locator("link[href$='drawers.css']")).to_be_attached()
-    await page.wait_for_function("() => document.querySelector('link[href$=\"drawers.css\"]').sheet")
+    await expect(page.locator("link[href*='drawers']")).to_be_attached()
+    await page.wait_for_function("() => document.querySelector('link[href*=\"drawers\"]').sheet")
     home = page.locator("[data-panel=home]")
     assert await home.evaluate("one => { one.scrollTo(0, 9999); return one.scrollTop; }") > 100
     await page.evaluate(DRAWN)

@@ -307,3 +307,16 @@ def test_a_topic_whose_name_is_not_sent_to_a_bridge_is_named_as_left_out() -> No
     others, left_out = choose(offered, without=(), also="all", requested={*offered.values()})
     assert set(others) == {"/good"}
     assert left_out == ("/a b", "/wrong", "relative")
+
+
+@pytest.mark.world(n=4)
+@pytest.mark.parametrize(("period_s", "flows_s"), [(0.1, 2.0), (5.0, 10.0), (600.0, 30.0)])
+def test_a_topic_flows_for_two_of_its_intervals_and_for_half_a_minute_at_most(period_s: float, flows_s: float) -> None:
+    delivery = Delivery()
+    delivery.opened(0.0)
+    delivery.follow(["/vel"], [], 0.0)
+    for n in range(20):
+        delivery.received("/vel", n * period_s)
+    newest_s = 19 * period_s
+    assert delivery.flows("/vel", newest_s + flows_s - 0.1)
+    assert not delivery.flows("/vel", newest_s + flows_s + 0.1)

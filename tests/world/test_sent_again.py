@@ -170,6 +170,16 @@ def test_a_message_that_the_bridge_sends_twice_may_come_after_those_that_were_on
     assert not bridge.repeats(stamped(86.0), 20.3 + GIVEN_WITHIN_S + 0.2)
 
 
+def test_what_comes_again_seconds_later_is_another_message() -> None:
+    """Of a sensor that is frozen, or that publishes what it has again."""
+    bridge = Bridge(reads_after_s=0.3)
+    bridge.repeats(stamped(80.0), 9.95)
+    bridge.subscribe(10.0)
+    assert not bridge.repeats(stamped(81.0), 10.1)
+    assert not bridge.repeats(stamped(82.0), 12.3)
+    assert not bridge.repeats(stamped(82.0), 14.9)
+
+
 def test_without_a_stamp_only_the_first_message_after_a_subscription_may_come_twice() -> None:
     bridge = Bridge(reads_after_s=0.3)
     bridge.repeats(level(80.0), 9.95)

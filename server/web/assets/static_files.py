@@ -76,11 +76,9 @@ class StaticText(StaticFiles):
                 is_kept = _is_named(path, scope, text.etag)
                 return answer(text, Headers(scope=scope), media_type, _YEAR if is_kept else "no-cache")
         is_kept = _is_named(path, scope, await run_in_threadpool(self._hash, path))
-        if is_kept:  # without the two below Starlette cannot judge a condition of a range
-            scope = {**scope, "headers": [row for row in scope["headers"] if row[0] != b"if-range"]}
         response = await super().get_response(path, scope)
         response.headers["Cache-Control"] = _YEAR if is_kept else "no-cache"
-        if is_kept:  # never revalidated
+        if is_kept and "if-range" not in Headers(scope=scope):  # never revalidated; such a condition is judged by them
             del response.headers["ETag"], response.headers["Last-Modified"]
         return response
 

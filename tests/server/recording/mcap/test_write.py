@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -167,6 +168,21 @@ def test_a_topic_that_changes_its_type_has_a_channel_of_each(tmp_path: Path) -> 
     assert file.channel("/d", f32) != file.channel("/e", f32)
     assert file.channel("/d", book.loose("std_msgs/Float32")) not in (file.channel("/d", f32), file.channel("/d", f64))
     file.abandon()
+
+
+def test_a_type_whose_definition_became_known_has_a_channel_of_each(tmp_path: Path) -> None:
+    """Bytes that another definition describes could not be read."""
+    file = PartFile(tmp_path / "a.mcap", profile="ros1", metadata={"vehicle": "car", "part": "1"})
+    other = replace(SCHEMA, data=b"float32 data\nfloat32 more\n")
+    first, second = file.channel("/level", SCHEMA), file.channel("/level", other)
+    assert (file.channel("/level", SCHEMA), file.channel("/level", other)) == (first, second)
+    assert first != second
+    file.add(first, AT_NS, b"1234")
+    file.add(second, AT_NS, b"12345678")
+    path = file.close(ended="closed", why="")
+    with path.open("rb") as stream:
+        read = {message.data: schema.data for schema, _, message in make_reader(stream).iter_messages() if schema}
+    assert read == {b"1234": SCHEMA.data, b"12345678": other.data}
 
 
 @pytest.mark.parametrize("version", [1, 2])

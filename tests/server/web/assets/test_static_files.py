@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import hashlib
 from pathlib import Path
 from unittest.mock import patch
 
@@ -10,6 +11,7 @@ from server.app.config import Config
 from server.web.assets.static_files import _read, packed
 from tests.http import http_client
 from tests.server.conftest import serving
+from tests.tree import PROJECT
 
 
 async def test_a_text_comes_small_to_whoever_can_unpack_it_and_is_asked_about_each_time() -> None:
@@ -45,6 +47,21 @@ async def test_a_text_comes_small_to_whoever_can_unpack_it_and_is_asked_about_ea
             assert (await client.get(path)).status_code == 404
         font = await client.get("/static/fonts/catgraph-numerals-500.woff2", headers={"Accept-Encoding": "gzip"})
         assert "content-encoding" not in font.headers  # it is compressed already
+
+
+async def test_only_what_its_address_has_the_hash_of_is_kept_for_ever() -> None:
+    """Of a page whose server was upgraded meanwhile, an address names another content than there is now."""
+    names = ("js/core/store.js", "fonts/catgraph-numerals-500.woff2")
+    async with serving(Config()) as base, http_client(base_url=base) as client:
+        for name in names:
+            digest = hashlib.sha256((PROJECT / "static" / name).read_bytes()).hexdigest()[:12]
+            kept = await client.get(f"/static/{name}?v={digest}")
+            assert "immutable" in kept.headers["cache-control"]
+            for version in ("0" * 12, digest[:6], "", "1"):
+                other = await client.get(f"/static/{name}?v={version}")
+                assert (other.status_code, other.headers["cache-control"]) == (200, "no-cache"), version
+        part = {"Range": "bytes=0-9", "If-Range": '"a"'}
+        assert (await client.get(f"/static/{name}?v={digest}", headers=part)).status_code in (200, 206)
 
 
 def test_a_changed_file_goes_out_changed(tmp_path: Path) -> None:
