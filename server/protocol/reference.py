@@ -31,7 +31,7 @@ Each check answers *OK*, *FAULT* or *not checked* (why). A fault that lasts for 
 that lasts for the *off* delay clears it; *not checked* does neither. While an alarm of the column *explained by*
 stands, this one is not announced; a condition that comes and goes within its *on* delay explains it for that delay and
 3 s at most, and again only after a pause in which this one could be announced; several in turn explain it for the
-longest of their *on* delays and 3 s.
+longest of their *on* delays and 3 s, and as long again for what explains those.
 *Ack*: it stays, although its condition has gone, until somebody has acknowledged it.
 *Repeats after*: within this time what was announced is not announced again; it stands in the list as it was left.
 `<signal>` stands for each of: {signals}.
