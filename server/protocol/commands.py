@@ -61,8 +61,10 @@ class Pause(Prompt):
     kind: Literal["pause"]
 
 
-class Resume(BaseCommand):
+class Resume(Prompt):
     """Ends the pause."""
+
+    acts_within_s: ClassVar[float] = 3.0  # nothing moves by it
 
     http: ClassVar[str] = "Monitor again"
     kind: Literal["resume"]

@@ -37,8 +37,13 @@ PAGE_ONLY = {"announces", "id", "kind"}  # of a status: not for the cars
 class FleetCommands(CommandsOfPage):
     """Has each command of one page carried out by the session of the car that it names."""
 
-    async def command(self, message: dict[str, Any]) -> None:
-        """Have the session of the car carry out a command, and reply."""
+    async def add(self, message: dict[str, Any]) -> None:
+        """Have a command carried out after those to the same car before it."""
+        vehicle = message.get("vehicle")
+        await self._orders.add(message, vehicle if isinstance(vehicle, str) and vehicle in self._bus.vehicles else "")
+
+    async def carry_out(self, message: dict[str, Any], waited_s: float = 0.0) -> None:
+        """Have the session of the car carry out a command that came `waited_s` ago, and reply."""
         id = self._id_of(message)
         if id is None:
             return
@@ -48,7 +53,7 @@ class FleetCommands(CommandsOfPage):
             self._send(messages.refusal(id, reason or UNNAMED))
             return
         order = message | self._sender.as_json()
-        self._send(messages.reply(id, await passed_on(self._bus, vehicle, order, fleet=True)))
+        self._send(messages.reply(id, await passed_on(self._bus, vehicle, order, fleet=True, waited_s=waited_s)))
 
     def _refusal(self, kind: object, vehicle: object) -> str | None:
         """Why a command does not reach a session; None: it does."""
@@ -59,7 +64,7 @@ class FleetCommands(CommandsOfPage):
         command = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
         if command is None:
             return commands.NO_SUCH
-        if not self._orders.takes(self._now()):
+        if not self._allowed.takes(self._now()):
             return TOO_MANY
         if not command.from_fleet:
             return NOT_FROM_HERE
@@ -69,19 +74,11 @@ class FleetCommands(CommandsOfPage):
             return f"No car is named {display_name.clean(vehicle)}."
         return None
 
-    async def present(self, message: Mapping[str, Any]) -> None:
-        """Pass on the page's status, once a second, to every car: without a reply, not of a viewer's page, and not
-        before its hello: it would be counted under another id."""
-        if not self._sender.is_operator or not self._sender.has_begun:
-            return
-        self._sender.note_key(message)
-        try:
-            command = commands.read(message)
-        except commands.NotUnderstood as why:
-            self._complain(str(why))
-            return
-        status = command.model_dump(exclude=PAGE_ONLY)
-        self._announcements.forward(status, self._sender.as_json(), () if status["leaves"] else self._bus.vehicles)
+    async def pass_on(self, status: Mapping[str, Any]) -> None:
+        """Pass on the page's status to every car."""
+        command = commands.read(status)
+        to_car = command.model_dump(exclude=PAGE_ONLY)
+        self._announcements.forward(to_car, self._sender.as_json(), () if to_car["leaves"] else self._bus.vehicles)
 
 
 class FleetWriter:
@@ -228,8 +225,8 @@ class FleetPage:
 
     @property
     def quiet_s(self) -> float:
-        """How long the page has sent nothing, while a message of it is waited for."""
-        return self._inbox.quiet_s
+        """How long the page has sent nothing; 0 while a command of it is carried out."""
+        return 0.0 if self._commands.are_unfinished else self._inbox.quiet_s
 
     async def serve(self) -> None:
         """Runs until the page leaves."""
@@ -244,10 +241,20 @@ class FleetPage:
             await self._commands.close()
 
         read = self._inbox.serve(
-            self._socket, self._handle, is_full=lambda: self._writer.is_full, on_leave=self._commands.leave
+            self._socket,
+            self._handle,
+            is_full=lambda: self._writer.is_full,
+            finished=self._commands.finished,
+            on_leave=self._commands.leave,
         )
         try:
-            await page_inbox.run_tasks(self._socket, read=read, write=self._writer.run(self._hello), leave=leave)
+            await page_inbox.run_tasks(
+                self._socket,
+                read=read,
+                write=self._writer.run(self._hello),
+                work=self._commands.run(),
+                leave=leave,
+            )
         finally:
             self._writer.close()
 
@@ -259,6 +266,6 @@ class FleetPage:
                 self._commands.begin(message)
                 self.on_hello()
             case "present":
-                await self._commands.present(message)
+                self._commands.present(message)
             case _:
-                await self._commands.command(message)
+                await self._commands.add(message)

@@ -16,6 +16,7 @@ from server.protocol.rate_limit import Allowance, Limits
 from server.replay.manager import NoReplay
 from server.replay.view_source import ViewSource
 from server.system import log_context
+from server.web.page_orders import PageOrders
 from server.web.page_sender import PageSender
 
 log = logging.getLogger("catgraph.web")
@@ -24,15 +25,24 @@ TOO_MANY = "Too many commands at once from this page: wait a second."
 NOT_A_VIEWERS = "This device is paired as a viewer and cannot make changes."
 NO_HELLO = "Not carried out: this page has not sent its hello yet."
 NOT_FROM_A_REPLAY = "This page shows a replay and cannot send commands. Return to live first."
+ANSWERED_WITHIN_S = 3.0  # a session carries out what reaches it until then
+WAITED = "it waited {waited_s:.1f} s for earlier commands of this page, and was not sent any more"
 
 
 async def passed_on(
-    bus: PageBus, vehicle: str, message: Mapping[str, Any], *, fleet: bool = False
+    bus: PageBus, vehicle: str, message: Mapping[str, Any], *, fleet: bool = False, waited_s: float = 0.0
 ) -> Mapping[str, Any]:
-    """The answer of the vehicle's session to a command of a page, under the command's id in all logs."""
+    """The answer of the vehicle's session to a command of a page, under the command's id in all logs.
+
+    `waited_s`: how long ago it came; its time to reach the session counts from then.
+    """
     with log_context.tracing(message.get("id")):
+        within_s = commands.comes_within_s(message)
+        left_s = (ANSWERED_WITHIN_S if within_s is None else within_s) - waited_s
         try:
-            answer = await bus.request(vehicle, message, comes_within_s=commands.comes_within_s(message))
+            if left_s <= 0:
+                raise NotServed(WAITED.format(waited_s=waited_s))
+            answer = await bus.request(vehicle, message, deadline_s=ANSWERED_WITHIN_S, comes_within_s=left_s)
         except NotServed as why:
             answer = messages.not_served(why, bus.trouble(vehicle) if fleet else None)
         if bus.grows:  # else the session has logged it
@@ -44,7 +54,8 @@ async def passed_on(
 class CommandsOfPage:
     """What a page of one car and a page of all cars have in common: who sends its commands, and how it leaves.
 
-    `send` queues a reply; `complain` counts a message that is invalid, and answers why.
+    `send` queues a reply; `complain` counts a message that is invalid, and answers why. `add` and `present` only note
+    what the page sent: `run` carries it out.
     """
 
     def __init__(
@@ -63,7 +74,8 @@ class CommandsOfPage:
         self._send = send
         self._complain = complain
         self._sender = PageSender(principal, people, signs=bus.grows)
-        self._orders = Allowance(limits.commands, now())
+        self._allowed = Allowance(limits.commands, now())
+        self._orders = PageOrders(now)
         self._announcements = Announcements(bus)
 
     @property
@@ -80,15 +92,51 @@ class CommandsOfPage:
         if self._sender.has_begun:
             self._send(self._sender.duty)
 
-    async def present(self, message: Mapping[str, Any]) -> None:
-        """Pass on the page's status, once a second: without a reply."""
+    @property
+    def are_unfinished(self) -> bool:
+        """Whether a command waits or is being carried out."""
+        return self._orders.are_unfinished
+
+    async def run(self) -> None:
+        """Carries out the page's commands and passes on its statuses, without end."""
+        await self._orders.run(self.carry_out, self.pass_on)
+
+    async def add(self, message: dict[str, Any]) -> None:
+        """Have a command carried out after those before it."""
+        await self._orders.add(message)
+
+    async def carry_out(self, message: dict[str, Any], waited_s: float = 0.0) -> None:
+        """Carry out a command that came `waited_s` ago, and reply."""
+        raise NotImplementedError
+
+    def present(self, message: Mapping[str, Any]) -> None:
+        """The page's status, once a second: without a reply, not of a viewer's page, and not before its hello: it would
+        be counted under another id."""
+        if not self._sender.is_operator or not self._sender.has_begun:
+            return
+        self._sender.note_key(message)
+        try:
+            commands.read(message)  # also where the page's own car is not served, and nobody else reads it
+        except commands.NotUnderstood as why:
+            self._complain(str(why))
+            return
+        self._orders.add_status(message)
+
+    async def pass_on(self, status: Mapping[str, Any]) -> None:
+        """Pass on the page's status."""
         raise NotImplementedError
 
     async def leave(self) -> None:
         """The page is closed: it is not counted on to announce alarms any more."""
+        await self._orders.finished()
         await self._announcements.forwarded()
-        await self.present(LEAVES)
+        self.present(LEAVES)
+        await self._orders.finished()
         await self._announcements.forwarded()
+
+    async def finished(self) -> None:
+        """Wait until all that the page sent was carried out."""
+        await self._orders.finished()
 
     async def close(self) -> None:
         """End what is being forwarded to other cars."""
@@ -126,8 +174,15 @@ class PageCommands(CommandsOfPage):
         self._slow_downs = Allowance(limits.slow_down, now())
         self._opening: asyncio.Task[None] | None = None
 
-    async def command(self, message: dict[str, Any]) -> None:
-        """Have the session carry out a command, and reply."""
+    async def carry_out(self, message: dict[str, Any], waited_s: float = 0.0) -> None:
+        """Have the session carry out a command, or the page's own replay, and reply."""
+        if message.get("kind") == "replay":
+            await self.replay(message)
+        else:
+            await self.command(message, waited_s)
+
+    async def command(self, message: dict[str, Any], waited_s: float = 0.0) -> None:
+        """Have the session carry out a command that came `waited_s` ago, and reply."""
         id = self._id_of(message)
         if id is None:
             return
@@ -138,7 +193,7 @@ class PageCommands(CommandsOfPage):
         if reason is not None:
             self._send(messages.refusal(id, reason))
             return
-        answer = await passed_on(self._bus, self._vehicle, message | self._who)
+        answer = await passed_on(self._bus, self._vehicle, message | self._who, waited_s=waited_s)
         self._send(messages.reply(id, await self._sender.end_handed_over(kind, answer)))
 
     def _refusal(self, kind: object) -> str | None:
@@ -150,40 +205,31 @@ class PageCommands(CommandsOfPage):
         command = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
         if command is None:  # commands of the server to a session are not allowed for a page
             return commands.NO_SUCH
-        allowance = self._slow_downs if kind in commands.SLOW_DOWN else self._orders
+        allowance = self._slow_downs if kind in commands.SLOW_DOWN else self._allowed
         if not allowance.takes(self._now()):
             return TOO_MANY
         if self._view.is_replaying and not command.passes_replay:
             return NOT_FROM_A_REPLAY
         return None
 
-    async def present(self, message: Mapping[str, Any]) -> None:
-        """Pass on the page's status, once a second: without a reply, not of a viewer's page, and not before its hello:
-        it would be counted under another id."""
-        if not self._sender.is_operator or not self._sender.has_begun:
-            return
-        self._sender.note_key(message)
-        try:
-            commands.read(message)  # also where the page's own car is not served, and nobody else reads it
-        except commands.NotUnderstood as why:
-            self._complain(str(why))
-            return
+    async def pass_on(self, status: Mapping[str, Any]) -> None:
+        """Pass on the page's status to its car, and to those that it announces."""
         answer: Mapping[str, Any] = {"ok": True}
         with contextlib.suppress(NotServed):  # the other cars may be served
-            answer = await self._bus.request(self._vehicle, {**message, **self._who})
+            answer = await self._bus.request(self._vehicle, {**status, **self._who})
         if answer.get("ok") is not True:
             self._complain(str(answer.get("reason")))
             return
-        named = () if message.get("leaves") else message.get("announces", ())
+        named = () if status.get("leaves") else status.get("announces", ())
         cars = set(self._bus.vehicles).intersection(named) - {self._vehicle}
-        self._announcements.forward(message, self._who, cars)
+        self._announcements.forward(status, self._who, cars)
 
     async def replay(self, message: Mapping[str, Any]) -> None:
         """Have the page's own replay carry out an order, and reply."""
         id = self._id_of(message)
         if id is None:
             return
-        if not self._orders.takes(self._now()):
+        if not self._allowed.takes(self._now()):
             self._send(messages.refusal(id, TOO_MANY))
             return
         try:

@@ -43,7 +43,7 @@ class PageInbox:
 
     @property
     def quiet_s(self) -> float:
-        """How long the page has sent nothing; 0 while a message of it is carried out, and once its connection ends."""
+        """How long the page has sent nothing; 0 while a message of it is handled, and once its connection ends."""
         return 0.0 if self._waits_s is None else self._now() - self._waits_s
 
     async def receive(self, socket: WebSocket) -> Message:
@@ -60,22 +60,25 @@ class PageInbox:
         handle: Callable[[dict[str, Any]], Awaitable[None]],
         *,
         is_full: Callable[[], bool],
+        finished: Callable[[], Awaitable[None]],
         on_leave: Callable[[], Awaitable[None]],
     ) -> None:
         """Hand each message of the page to `handle` until its connection ends.
 
         Closed is a page that sends too many invalid messages, or requests without reading replies (`is_full`).
-        `on_leave` is called where the browser closed the page.
+        What came before the end is carried out (`finished`); `on_leave` is called where the browser closed the page.
         """
         while not self.is_hopeless and not is_full():
             received = await self.receive(socket)
             if received["type"] == "websocket.disconnect":
+                await finished()
                 if received.get("code") == GOING_AWAY:
                     await on_leave()
                 return
             message = self.read(received.get("text"))
             if message is not None:
                 await handle(message)
+        await finished()
         await socket.close(code=1008, reason="too many invalid messages")
 
     def complain(self, reason: str) -> None:
@@ -119,36 +122,39 @@ async def run_tasks(
     *,
     read: Coroutine[Any, Any, None],
     write: Coroutine[Any, Any, None],
+    work: Coroutine[Any, Any, None],
     leave: Callable[[], Awaitable[None]],
 ) -> None:
-    """Runs until `read` ends; `leave` is called before the writer ends.
+    """Runs until `read` ends; `leave` is called before the writer ends, and before the carrying out of its commands.
 
-    A page whose writer failed gets nothing any more: it is closed, so that it connects again.
+    A page whose writer or whose `work` failed is closed, so that it connects again.
     """
     is_leaving = False
-    writer = asyncio.create_task(write, name="page writer")
+    others = (asyncio.create_task(write, name="page writer"), asyncio.create_task(work, name="page commands"))
     reader = asyncio.create_task(read, name="page reader")
 
-    def writer_ended(task: asyncio.Task[None]) -> None:
+    def ended(task: asyncio.Task[None]) -> None:
         if not is_leaving and (task.cancelled() or task.exception() is not None):
             error = None if task.cancelled() else task.exception()
-            log.error("the writer of a page ended: %s", error or "it was cancelled", exc_info=error)
+            log.error("the %s ended: %s", task.get_name(), error or "it was cancelled", exc_info=error)
             reader.cancel()
 
-    writer.add_done_callback(writer_ended)
+    for task in others:
+        task.add_done_callback(ended)
     try:
         await reader
     except (WebSocketDisconnect, RuntimeError):
         pass
     except asyncio.CancelledError:
-        if not writer.done():
-            raise  # the server ends; else the writer failed, and the page shall connect again
+        if not any(task.done() for task in others):
+            raise  # the server ends; else one of them failed, and the page shall connect again
         with contextlib.suppress(*_GONE):
             await socket.close(code=1011, reason="the server failed to send")
     finally:
         is_leaving = True
         reader.cancel()
         await leave()
-        writer.cancel()
-        with contextlib.suppress(asyncio.CancelledError, *_GONE):
-            await writer
+        for task in others:
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError, *_GONE):
+                await task

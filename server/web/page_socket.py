@@ -89,8 +89,8 @@ class Page:
 
     @property
     def quiet_s(self) -> float:
-        """How long the page has sent nothing, while a message of it is waited for."""
-        return self._inbox.quiet_s
+        """How long the page has sent nothing; 0 while a command of it is carried out."""
+        return 0.0 if self._commands.are_unfinished else self._inbox.quiet_s
 
     async def serve(self) -> None:
         """Runs until the page leaves."""
@@ -107,10 +107,20 @@ class Page:
             await self._commands.close()
 
         read = self._inbox.serve(
-            self._socket, self._handle, is_full=lambda: self._writer.is_full, on_leave=self._commands.leave
+            self._socket,
+            self._handle,
+            is_full=lambda: self._writer.is_full,
+            finished=self._commands.finished,
+            on_leave=self._commands.leave,
         )
         try:
-            await page_inbox.run_tasks(self._socket, read=read, write=self._writer.run(self._hello), leave=leave)
+            await page_inbox.run_tasks(
+                self._socket,
+                read=read,
+                write=self._writer.run(self._hello),
+                work=self._commands.run(),
+                leave=leave,
+            )
         finally:
             self._writer.close()
             await self._view.leave()
@@ -129,8 +139,6 @@ class Page:
                 is_former = "page" in message and "build" not in message  # a page of before the builds were named
                 self._writer.begin(message.get("have_event"), message.get("boot"), is_former=is_former)
             case "present":
-                await self._commands.present(message)
-            case "replay":
-                await self._commands.replay(message)
+                self._commands.present(message)
             case _:
-                await self._commands.command(message)
+                await self._commands.add(message)

@@ -2065,6 +2065,10 @@ export interface Reply {
 /** Ends the pause. */
 export interface ResumeCommand {
   id?: string | null;
+  /** since the finger let go, when it was sent */
+  pressed_ago_s?: number;
+  heard_ms?: number | null;
+  held_s?: number;
   kind: "resume";
 }
 

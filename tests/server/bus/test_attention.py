@@ -121,7 +121,7 @@ async def test_a_car_whose_agent_is_gone_cannot_be_taken() -> None:
         page.begin({"kind": "hello", "page": "page-ann"})
 
         async def why() -> str:
-            await page.command({"kind": "take_item", "vehicle": "ocelot", "id": "1"})
+            await page.carry_out({"kind": "take_item", "vehicle": "ocelot", "id": "1"})
             assert replies[-1]["ok"] is False
             return str(replies[-1]["reason"])
 

@@ -74,15 +74,15 @@ class Socket:
 
 
 class Pages:
-    """The pages of one hub, and its car, which takes long to carry out a pause."""
+    """The pages of one hub, and its car, which takes long to carry out a pause, and to answer a status."""
 
     def __init__(self) -> None:
         self.tapes = Tapes(lambda _: None, now=time.monotonic)
         self.paused = 0
-        bus = LocalBus(Journal(None), now=time.monotonic)
-        bus.serve("car", self._car)
+        self.bus = LocalBus(Journal(None), now=time.monotonic)
+        self.bus.serve("car", self._car)
         self._hub = Hub(
-            bus,
+            self.bus,
             replays=self.tapes,
             server=lambda: cast(ServerState, {}),
             limits=Limits(),
@@ -92,9 +92,9 @@ class Pages:
         self.tasks: list[asyncio.Task[None]] = []
 
     async def _car(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        if message["kind"] == "pause":
+        if message["kind"] in ("pause", "present"):
             await asyncio.sleep(LONG_S)
-            self.paused += 1
+            self.paused += message["kind"] == "pause"
         return {"ok": True}
 
     def connect(self) -> Socket:
@@ -154,3 +154,17 @@ async def test_a_command_that_takes_long_is_carried_out_and_answered_over_the_co
         pages.connect()
         await asyncio.sleep(0.1)
         assert pages.count == 1, "those that wait for the page"
+
+
+async def test_states_go_on_while_neither_a_status_nor_a_command_is_answered() -> None:
+    async with serving_pages() as pages:
+        page = pages.connect()
+        await asyncio.sleep(0.1)
+        page.sends(kind="present", visible=True, sound="ready", awake="ready")
+        page.sends(kind="pause", id="1")
+        for number in range(5):
+            pages.bus.put("car", "state", f'{{"kind":"state","number":{number}}}')
+            await asyncio.sleep(0.1)
+            page.sends(kind="take", seq=number + 1)
+            await asyncio.sleep(0.1)
+        assert [message["number"] for message in page.got if message["kind"] == "state"] == [0, 1, 2, 3, 4]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+import contextlib
+from collections.abc import AsyncIterator, Callable, Mapping
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -20,6 +21,8 @@ from server.web.page_commands import PageCommands
 
 pytestmark = pytest.mark.virtual_time
 
+PRESENT = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready"}
+
 
 def page_of(
     bus: LocalBus,
@@ -27,14 +30,23 @@ def page_of(
     is_fleet: bool = False,
     send: Callable[[Any], None] = lambda _: None,
     complain: Callable[[str], None] = print,
+    now: Callable[[], float] = lambda: 0.0,
 ) -> PageCommands | FleetCommands:
     """The commands of a page of the car ocelot, or of a page of all cars."""
     if is_fleet:
-        return FleetCommands(bus, LOCAL, Limits(), now=lambda: 0.0, send=send, complain=complain)
+        return FleetCommands(bus, LOCAL, Limits(), now=now, send=send, complain=complain)
     view = cast(ViewSource, SimpleNamespace(is_replaying=False))
-    return PageCommands(
-        bus, "ocelot", view, LOCAL, Limits(), now=lambda: 0.0, wall_ms=lambda: 0, send=send, complain=complain
-    )
+    return PageCommands(bus, "ocelot", view, LOCAL, Limits(), now=now, wall_ms=lambda: 0, send=send, complain=complain)
+
+
+@contextlib.asynccontextmanager
+async def at_work(page: PageCommands | FleetCommands) -> AsyncIterator[None]:
+    """What the page sends is carried out meanwhile."""
+    work = asyncio.create_task(page.run())
+    yield
+    work.cancel()
+    await asyncio.gather(work, return_exceptions=True)
+    await page.close()
 
 
 async def test_another_car_that_is_lost_does_not_hold_up_the_page() -> None:
@@ -53,13 +65,109 @@ async def test_another_car_that_is_lost_does_not_hold_up_the_page() -> None:
     bus.serve("serval", lost)
     page = page_of(bus)
     page.begin({"kind": "hello"})
-    async with asyncio.timeout(0.5):
+    async with asyncio.timeout(0.5), at_work(page):
         for _ in range(3):
-            await page.present(
-                {"kind": "present", "visible": True, "sound": "ready", "awake": "ready", "announces": ["serval"]}
-            )
+            page.present({**PRESENT, "announces": ["serval"]})
+            await page.finished()
         await requested.wait()
-        await page.close()
+
+
+@pytest.mark.parametrize("is_fleet", [False, True])
+async def test_a_command_waits_for_no_answer_to_a_status(is_fleet: bool) -> None:
+    reached: list[tuple[float, object]] = []
+    loop = asyncio.get_running_loop()
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        if command["kind"] in ("present", "announces"):
+            await asyncio.sleep(60)
+        reached.append((loop.time() - began_s, command["kind"]))
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=loop.time)
+    bus.serve("ocelot", car)
+    page = page_of(bus, is_fleet=is_fleet)
+    page.begin({"kind": "hello"})
+    began_s = loop.time()
+    async with at_work(page):
+        page.present(PRESENT)
+        await page.add({"kind": "acknowledge", "vehicle": "ocelot", "alarm": "speed", "occurrence": 1, "id": "a-1"})
+        await asyncio.sleep(0.1)
+        assert reached == [(0.0, "acknowledge")]
+
+
+async def test_a_command_that_waits_for_slow_ones_is_carried_out_in_its_time_or_not_at_all() -> None:
+    reached: list[tuple[float, object]] = []
+    loop = asyncio.get_running_loop()
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        reached.append((loop.time() - began_s, command["id"]))
+        if str(command["id"]).startswith("slow"):
+            await asyncio.sleep(60)
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=loop.time)
+    bus.serve("ocelot", car)
+    replies: list[Any] = []
+    page = page_of(bus, send=replies.append, now=loop.time)
+    page.begin({"kind": "hello"})
+    began_s = loop.time()
+    async with at_work(page):
+        await page.add({"kind": "mark", "id": "slow"})
+        await page.add({"kind": "slow_down", "id": "slow down"})
+        await page.add({"kind": "mark", "id": "too long"})
+        await asyncio.sleep(1.0)
+        await page.add({"kind": "mark", "id": "in time"})
+        await page.finished()
+    assert [(round(at_s, 3), id) for at_s, id in reached] == [(0.0, "slow"), (3.0, "in time")]
+    by_id = {one["id"]: one for one in replies if "id" in one}
+    assert by_id["slow down"]["outcome"] == by_id["too long"]["outcome"] == "not_delivered"
+    assert "3.0 s for earlier commands" in by_id["too long"]["reason"]
+    assert by_id["in time"]["ok"]
+
+
+async def test_a_command_to_one_car_waits_for_none_to_another() -> None:
+    reached: list[tuple[float, object]] = []
+    loop = asyncio.get_running_loop()
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        reached.append((loop.time() - began_s, command["id"]))
+        await asyncio.sleep(60 if command["vehicle"] == "ocelot" else 0.5)
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=loop.time)
+    bus.serve("ocelot", car)
+    bus.serve("serval", car)
+    page = page_of(bus, is_fleet=True, now=loop.time)
+    page.begin({"kind": "hello"})
+    began_s = loop.time()
+    async with at_work(page):
+        for vehicle, id in (("ocelot", "1"), ("serval", "2"), ("serval", "3")):
+            await page.add({"kind": "take_item", "vehicle": vehicle, "id": id})
+        await page.finished()
+    assert reached == [(0.0, "1"), (0.0, "2"), (0.5, "3")]
+
+
+async def test_of_statuses_that_wait_the_newest_is_passed_on() -> None:
+    reached: list[bool] = []
+    answers = asyncio.Event()
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        reached.append(command["visible"])
+        await answers.wait()
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=lambda: 0.0)
+    bus.serve("ocelot", car)
+    page = page_of(bus)
+    page.begin({"kind": "hello"})
+    async with at_work(page):
+        page.present(PRESENT)
+        await asyncio.sleep(0.1)
+        page.present(PRESENT)
+        page.present({**PRESENT, "visible": False})
+        answers.set()
+        await page.finished()
+    assert reached == [True, False]
 
 
 async def test_other_cars_are_announced_while_the_own_one_is_not_served() -> None:
@@ -74,10 +182,9 @@ async def test_other_cars_are_announced_while_the_own_one_is_not_served() -> Non
     complaints: list[str] = []
     page = page_of(bus, complain=complaints.append)
     page.begin({"kind": "hello"})
-    await page.present(
-        {"kind": "present", "visible": True, "sound": "ready", "awake": "ready", "announces": ["serval"]}
-    )
-    await page.leave()
+    async with at_work(page):
+        page.present({**PRESENT, "announces": ["serval"]})
+        await page.leave()
     assert [(one["kind"], one["leaves"]) for one in received] == [("announces", False), ("announces", True)]
     assert complaints == []
 
@@ -92,11 +199,12 @@ async def test_a_page_of_all_cars_is_not_counted_on_before_its_hello() -> None:
     bus = LocalBus(Journal(None), now=lambda: 0.0)
     bus.serve("ocelot", car)
     page = page_of(bus, is_fleet=True)
-    present = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready"}
-    await page.present(present)
-    page.begin({"kind": "hello", "page": "page-ann"})
-    await page.present(present)
-    await page.leave()
+    async with at_work(page):
+        page.present(PRESENT)
+        await page.finished()
+        page.begin({"kind": "hello", "page": "page-ann"})
+        page.present(PRESENT)
+        await page.leave()
     assert set(reached) == {"page-ann"}
 
 
@@ -125,7 +233,7 @@ async def test_before_its_hello_no_command_of_a_page_is_carried_out_and_no_outco
     query = {"kind": "outcome", "id": "a-1?", "of": "a-1", "ago_s": 1.0, "vehicle": "ocelot"}
 
     async def answer(to: PageCommands | FleetCommands, message: dict[str, Any]) -> dict[str, Any]:
-        await to.command(message)
+        await to.carry_out(message)
         return next(one for one in reversed(replies) if one.get("id") == message["id"])
 
     before, after = (page_of(bus, is_fleet=is_fleet, send=replies.append) for _ in range(2))
@@ -154,7 +262,7 @@ async def test_a_command_needs_an_id_that_fits_into_its_reply(is_fleet: bool) ->
     page = page_of(bus, is_fleet=is_fleet, complain=complaints.append)
     page.begin({"kind": "hello"})
     for id in (None, 7, "x" * 81, "x" * 80):
-        await page.command(
+        await page.carry_out(
             {"kind": "acknowledge", "vehicle": "ocelot", "alarm": "speed_limit", "occurrence": 1, "id": id}
         )
     assert reached == ["x" * 80]
