@@ -24,7 +24,7 @@ from server.web import page_inbox
 from server.web.cars_board import FLEET, CarsBoard
 from server.web.fair_wakeup import FairWakeup
 from server.web.fleet_log import FleetLog
-from server.web.page_commands import NO_HELLO, NOT_A_VIEWERS, TOO_MANY, CommandsOfPage, passed_on
+from server.web.page_commands import NO_HELLO, NOT_A_VIEWERS, TOO_MANY, CommandsOfPage, lane_of, passed_on
 from server.web.page_inbox import PageInbox
 from server.web.page_sender import PageSender
 from server.web.page_writer import MAX_REPLIES
@@ -38,9 +38,10 @@ class FleetCommands(CommandsOfPage):
     """Has each command of one page carried out by the session of the car that it names."""
 
     async def add(self, message: dict[str, Any]) -> None:
-        """Have a command carried out after those to the same car before it."""
+        """Have a command carried out after those to the same car before it in its lane."""
         vehicle = message.get("vehicle")
-        await self._orders.add(message, vehicle if isinstance(vehicle, str) and vehicle in self._bus.vehicles else "")
+        car = vehicle if isinstance(vehicle, str) and vehicle in self._bus.vehicles else ""
+        await self._orders.add(message, f"{lane_of(message.get('kind'))} {car}")
 
     async def carry_out(self, message: dict[str, Any], waited_s: float = 0.0) -> None:
         """Have the session of the car carry out a command that came `waited_s` ago, and reply."""

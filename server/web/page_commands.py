@@ -25,6 +25,7 @@ TOO_MANY = "Too many commands at once from this page: wait a second."
 NOT_A_VIEWERS = "This device is paired as a viewer and cannot make changes."
 NO_HELLO = "Not carried out: this page has not sent its hello yet."
 NOT_FROM_A_REPLAY = "This page shows a replay and cannot send commands. Return to live first."
+SENT_BY_ITSELF = frozenset({"outcome", "position"})
 ANSWERED_WITHIN_S = 3.0  # a session carries out what reaches it until then
 WAITED = "it waited {waited_s:.1f} s for earlier commands of this page, and was not sent any more"
 
@@ -49,6 +50,13 @@ async def passed_on(
             logged = (vehicle, message.get("kind"), message.get("by"), answer.get("ok"), answer.get("reason", ""))
             log.info("command_passed_on vehicle=%s kind=%s by=%s ok=%s reason=%s", *logged)
         return answer
+
+
+def lane_of(kind: object) -> str:
+    """What slows or releases the car waits for no other command, and no command for what a page sends by itself."""
+    if not isinstance(kind, str) or kind not in commands.SLOW_DOWN | SENT_BY_ITSELF:
+        return ""
+    return "slow-down" if kind in commands.SLOW_DOWN else kind
 
 
 class CommandsOfPage:
@@ -102,8 +110,8 @@ class CommandsOfPage:
         await self._orders.run(self.carry_out, self.pass_on)
 
     async def add(self, message: dict[str, Any]) -> None:
-        """Have a command carried out after those before it."""
-        await self._orders.add(message)
+        """Have a command carried out after those before it in its lane."""
+        await self._orders.add(message, lane_of(message.get("kind")))
 
     async def carry_out(self, message: dict[str, Any], waited_s: float = 0.0) -> None:
         """Carry out a command that came `waited_s` ago, and reply."""

@@ -13,9 +13,9 @@ CarryOut = Callable[[dict[str, Any], float], Awaitable[None]]
 
 
 class PageOrders:
-    """Of one page: its orders to one car one after the other, as they came, and beside them the newest of its statuses.
+    """Of one page: its orders of a lane one after the other, as they came, and beside them the newest of its statuses.
 
-    A car that is lost answers neither for seconds: an order waits for no other car, and for no answer to a status.
+    A car that is lost answers neither for seconds: an order waits for no other lane, and for no answer to a status.
     `now` is a monotonic clock [s].
     """
 
@@ -25,7 +25,7 @@ class PageOrders:
         self._orders: asyncio.Queue[tuple[dict[str, Any], str, float]] = asyncio.Queue()
         self._turns: defaultdict[str, asyncio.Lock] = defaultdict(
             asyncio.Lock
-        )  # by car; those who wait have it in turn
+        )  # by lane; those who wait have it in turn
         self._statuses: asyncio.Queue[Mapping[str, Any]] = asyncio.Queue(1)
         self._unfinished = 0
 
@@ -34,12 +34,12 @@ class PageOrders:
         """Whether an order waits or is being carried out."""
         return self._unfinished > 0
 
-    async def add(self, order: dict[str, Any], vehicle: str = "") -> None:
-        """To be carried out after those to the same car that came before."""
+    async def add(self, order: dict[str, Any], lane: str) -> None:
+        """To be carried out after those of the same lane that came before; of lanes there are few."""
         self._unfinished += 1
         came_s = self._now()
         await self._room.acquire()
-        self._orders.put_nowait((order, vehicle, came_s))
+        self._orders.put_nowait((order, lane, came_s))
 
     def add_status(self, status: Mapping[str, Any]) -> None:
         """To be passed on once the one before was answered, in place of one that still waits."""
@@ -58,11 +58,11 @@ class PageOrders:
         async with asyncio.TaskGroup() as group:
             group.create_task(self._pass_on_all(pass_on), name="statuses of a page")
             while True:
-                order, vehicle, came_s = await self._orders.get()
-                group.create_task(self._carry_out(carry_out, order, vehicle, came_s), name="order of a page")
+                order, lane, came_s = await self._orders.get()
+                group.create_task(self._carry_out(carry_out, order, lane, came_s), name="order of a page")
 
-    async def _carry_out(self, carry_out: CarryOut, order: dict[str, Any], vehicle: str, came_s: float) -> None:
-        async with self._turns[vehicle]:
+    async def _carry_out(self, carry_out: CarryOut, order: dict[str, Any], lane: str, came_s: float) -> None:
+        async with self._turns[lane]:
             await carry_out(order, self._now() - came_s)
         self._unfinished -= 1
         self._room.release()

@@ -92,7 +92,7 @@ async def test_a_command_waits_for_no_answer_to_a_status(is_fleet: bool) -> None
         page.present(PRESENT)
         await page.add({"kind": "acknowledge", "vehicle": "ocelot", "alarm": "speed", "occurrence": 1, "id": "a-1"})
         await asyncio.sleep(0.1)
-        assert reached == [(0.0, "acknowledge")]
+        assert [(round(at_s, 3), kind) for at_s, kind in reached] == [(0.0, "acknowledge")]
 
 
 async def test_a_command_that_waits_for_slow_ones_is_carried_out_in_its_time_or_not_at_all() -> None:
@@ -113,16 +113,38 @@ async def test_a_command_that_waits_for_slow_ones_is_carried_out_in_its_time_or_
     began_s = loop.time()
     async with at_work(page):
         await page.add({"kind": "mark", "id": "slow"})
-        await page.add({"kind": "slow_down", "id": "slow down"})
         await page.add({"kind": "mark", "id": "too long"})
         await asyncio.sleep(1.0)
         await page.add({"kind": "mark", "id": "in time"})
         await page.finished()
     assert [(round(at_s, 3), id) for at_s, id in reached] == [(0.0, "slow"), (3.0, "in time")]
     by_id = {one["id"]: one for one in replies if "id" in one}
-    assert by_id["slow down"]["outcome"] == by_id["too long"]["outcome"] == "not_delivered"
+    assert by_id["too long"]["outcome"] == "not_delivered"
     assert "3.0 s for earlier commands" in by_id["too long"]["reason"]
     assert by_id["in time"]["ok"]
+
+
+async def test_what_slows_the_car_waits_for_nothing_else() -> None:
+    reached: list[tuple[float, object]] = []
+    loop = asyncio.get_running_loop()
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        reached.append((loop.time() - began_s, command["kind"]))
+        await asyncio.sleep(0.2 if command["kind"] == "release" else 60)
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=loop.time)
+    bus.serve("ocelot", car)
+    page = page_of(bus, now=loop.time)
+    page.begin({"kind": "hello"})
+    began_s = loop.time()
+    async with at_work(page):
+        for number, kind in enumerate(("pause", "outcome", "position", "release", "slow_down")):
+            await page.add({"kind": kind, "id": str(number)})
+        await page.add({"kind": ["slow_down"], "id": "5"})
+        await asyncio.sleep(1.0)
+    at_once = [(0.0, "pause"), (0.0, "outcome"), (0.0, "position"), (0.0, "release")]
+    assert [(round(at_s, 3), kind) for at_s, kind in reached] == [*at_once, (0.2, "slow_down")]
 
 
 async def test_a_command_to_one_car_waits_for_none_to_another() -> None:
@@ -144,7 +166,7 @@ async def test_a_command_to_one_car_waits_for_none_to_another() -> None:
         for vehicle, id in (("ocelot", "1"), ("serval", "2"), ("serval", "3")):
             await page.add({"kind": "take_item", "vehicle": vehicle, "id": id})
         await page.finished()
-    assert reached == [(0.0, "1"), (0.0, "2"), (0.5, "3")]
+    assert [(round(at_s, 3), id) for at_s, id in reached] == [(0.0, "1"), (0.0, "2"), (0.5, "3")]
 
 
 async def test_of_statuses_that_wait_the_newest_is_passed_on() -> None:
