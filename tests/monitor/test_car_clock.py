@@ -79,6 +79,18 @@ def test_after_a_step_back_the_time_is_requested_anew() -> None:
     assert delay.late_s(53.5, 3.6, clock) == pytest.approx(0.1)
 
 
+@pytest.mark.parametrize("behind_s", [0.7, 3.0, 60.0])
+def test_the_late_one_of_two_publishers_stays_late_when_the_other_ends(behind_s: float) -> None:
+    """Its stamps go back once, keep their distance and advance at the rate of arrival, as those of another clock do."""
+    clock, delay = clock_of((0.0, 0.0, 50.0)), StampedDelay()
+    assert delay.late_s(51.0, 1.0, clock) == pytest.approx(0.0)
+    for n in range(100):
+        at_s = 1.1 + n / 10
+        late_s = delay.late_s(50.0 + at_s - behind_s, at_s, clock)
+        assert late_s == (None if n == 0 else pytest.approx(behind_s))
+        clock.answered(at_s + 0.05, at_s + 0.05, 50.0 + at_s + 0.05)
+
+
 def test_a_clock_that_was_set_forgets_what_was_in_time() -> None:
     clock, delay = clock_of((0.0, 0.0, 50.0)), StampedDelay()
     assert delay.late_s(51.0, 1.0, clock) == pytest.approx(0.0)
