@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ipaddress
 import random
 import socket
 import threading
 from collections.abc import Callable
 
+from server.system.loopback import is_ip
 from server.system.supervision import cancel
 
 EVERY_S = 0.25  # a dial into the last moment of a gap is lost, and the system repeats it after 1 or 3 s
@@ -27,7 +27,7 @@ class PortProbe:
     def __init__(self, host: str, port: int, refusal_counts: Callable[[], bool]) -> None:
         self._host, self._port = host, port
         self._refusal_counts = refusal_counts
-        self._addresses = [host] if _is_address(host) else []  # the last known ones, one of each family
+        self._addresses = [host] if is_ip(host) else []  # the last known ones, one of each family
         self._is_looking_up = False
         self._looked_up_s = -LOOK_UP_EVERY_S
         self._task: asyncio.Task[None] | None = None
@@ -83,7 +83,7 @@ class PortProbe:
         """One at a time, and in a thread of its own: with its resolver behind the radio a lookup takes 10 s and cannot
         be cancelled, and a few of them would hold up all work in the threads that a process shares."""
         loop = asyncio.get_running_loop()
-        if self._is_looking_up or _is_address(self._host) or loop.time() - self._looked_up_s < LOOK_UP_EVERY_S:
+        if self._is_looking_up or is_ip(self._host) or loop.time() - self._looked_up_s < LOOK_UP_EVERY_S:
             return
 
         def look_up() -> None:
@@ -100,11 +100,3 @@ class PortProbe:
     def _looked_up(self, found: list[str]) -> None:
         self._is_looking_up, self._looked_up_s = False, asyncio.get_running_loop().time()
         self._addresses = found or self._addresses
-
-
-def _is_address(host: str) -> bool:
-    try:
-        ipaddress.ip_address(host)
-    except ValueError:
-        return False
-    return True

@@ -8,6 +8,8 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from urllib.parse import SplitResult, quote, urlsplit
 
+from server.system.loopback import is_ip
+
 DEFAULT_PORT = 9090  # rosbridge's own, of an address without a scheme
 SCHEME_PORTS = {"ws": 80, "wss": 443}  # of a URL without a port (RFC 6455, 3)
 FOXGLOVE_PORT = 8765  # of a Foxglove server
@@ -175,11 +177,11 @@ def _host_of(host: str) -> str:
     """The host as it is dialled. Raises BadAddress."""
     if not host:
         raise BadAddress("The address names no host.", _EXAMPLE)
-    if "%" in host and _is_ip(host):  # an interface's name: only link-local addresses have use for one
+    if "%" in host and is_ip(host):  # an interface's name: only link-local addresses have use for one
         raise BadAddress(
             f"{host[:60]} is never dialled.", "Use the car's address on its own network.", code="forbidden"
         )
-    if not _is_ip(host) and not _HOST.match(host):
+    if not is_ip(host) and not _HOST.match(host):
         raise _no_host(host)
     return host
 
@@ -273,13 +275,5 @@ def _bracketed(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-def _is_ip(host: str) -> bool:
-    try:
-        ipaddress.ip_address(host)
-    except ValueError:
-        return False
-    return True
-
-
 def _is_bare_ipv6(text: str) -> bool:
-    return _is_ip(text) and ":" in text
+    return is_ip(text) and ":" in text

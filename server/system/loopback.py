@@ -1,8 +1,17 @@
-"""Whether a host name or an address means this machine."""
+"""What a host is by its text: an IP address, and whether it means this machine."""
 
 from __future__ import annotations
 
 import ipaddress
+
+
+def is_ip(host: str) -> bool:
+    """Whether `host` is an IP address; IPv6 without brackets."""
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True
 
 
 def is_loopback(host: str) -> bool:
