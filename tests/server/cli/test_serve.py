@@ -6,7 +6,18 @@ from pathlib import Path
 
 import pytest
 
+from server.app import process
 from server.cli.main import main
+
+
+@pytest.fixture(autouse=True)
+def _never_serves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the refusal a server would go on until the test times out."""
+
+    async def serve(*_: object, **__: object) -> None:
+        pytest.fail("it was not refused")
+
+    monkeypatch.setattr(process.Server, "serve", serve)
 
 
 @pytest.mark.parametrize(
