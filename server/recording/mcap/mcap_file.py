@@ -209,8 +209,19 @@ def _is_alone(file: IO[bytes]) -> bool:
     file.seek(end - _FOOTER_BYTES)
     start = int.from_bytes(file.read(8), "little") - len(_DATA_END) - 4  # before the checksum of the data
     file.seek(start)
-    content = file.read(end - start)
-    return content.startswith(_DATA_END) and MAGIC not in content
+    return file.read(len(_DATA_END)) == _DATA_END and not has_magic(file, start, end)
+
+
+def has_magic(file: IO[bytes], at: int, end: int, block_bytes: int = 1 << 20) -> bool:
+    """Whether a file begins or ends between two places, which may be far apart: it is read in blocks to the first."""
+    file.seek(at)
+    kept = b""
+    while block := file.read(min(block_bytes, end - at)):
+        at += len(block)
+        kept = kept[1 - len(MAGIC) :] + block
+        if MAGIC in kept:
+            return True
+    return False
 
 
 def _is_complete(summary: Any, statistics: Statistics) -> bool:

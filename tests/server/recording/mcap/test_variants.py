@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import struct
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 
 import pytest
@@ -213,6 +214,19 @@ def test_of_two_joined_files_no_message_is_missing_in_silence_wherever_the_first
             times = [round(at_s * 1e9) for at_s, *_ in recording.rows()]
             is_named = recording.damage or recording.notes or recording.rejected
             assert is_named or times == sorted((1, 2, 3, *other_times)), size
+
+
+@pytest.mark.parametrize("block", [8, 9, 20])
+@pytest.mark.parametrize("place", range(30))
+def test_another_file_is_found_across_blocks(block: int, place: int) -> None:
+    raw = bytes(place) + MAGIC + bytes(30 - place)
+    for at, end, is_there in (
+        (0, len(raw), True),
+        (place, place + len(MAGIC), True),
+        (place + 1, len(raw), False),
+        (0, place + len(MAGIC) - 1, False),
+    ):
+        assert mcap_file.has_magic(BytesIO(raw), at, end, block) is is_there
 
 
 def scanned(*_: object, **__: object) -> object:
