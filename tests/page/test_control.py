@@ -113,9 +113,9 @@ async def car() -> AsyncIterator[Process]:
 
 
 @contextlib.asynccontextmanager
-async def crew(browser: Browser, data: Path, car: Process) -> AsyncIterator[Crew]:
+async def crew(browser: Browser, data: Path, car: Process, module: str = "server") -> AsyncIterator[Crew]:
     contexts, phones = [], {}
-    async with running(*server(data, car.address)) as watch:
+    async with running(*server(data, car.address), module=module) as watch:
         try:
             for name in NAMES:
                 context, phones[name] = await opened(browser, name, watch.address)
@@ -138,7 +138,7 @@ async def holds(one: Crew, name: str) -> None:
 async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(
     browser: Browser, car: Process, tmp_path: Path
 ) -> None:
-    async with crew(browser, tmp_path, car) as one:
+    async with crew(browser, tmp_path, car, "tests.page.patient_server") as one:
         await expect(one.chip("Ann")).to_have_text("No one")
         await one["Ann"].f("pause").tap()  # the first order takes it
         await holds(one, "Ann")
