@@ -194,6 +194,18 @@ class Walk:
         return _chunk(at, head + self._file.read(int.from_bytes(head[1:], "little")))
 
 
+def has_magic(file: IO[bytes], at: int, end: int, block_bytes: int = _BLOCK) -> bool:
+    """Whether a file begins or ends between two places, which may be far apart: it is read in blocks to the first."""
+    file.seek(at)
+    kept = b""
+    while block := file.read(min(block_bytes, end - at)):
+        at += len(block)
+        kept = kept[1 - len(MAGIC) :] + block
+        if MAGIC in kept:
+            return True
+    return False
+
+
 def _is_record(head: bytes) -> bool:
     if len(head) < HEAD_BYTES:
         return False

@@ -16,7 +16,7 @@ from mcap.records import AttachmentIndex, ChunkIndex, Statistics
 
 from server.judge.message import RosVersion
 from server.recording.mcap.chunk_rows import EVERYWHERE, ChunkRow, chunk_rows, in_order, run_rows
-from server.recording.mcap.chunks import MAGIC
+from server.recording.mcap.chunks import MAGIC, has_magic
 from server.recording.mcap.scan import Index, Part, arrivals_of, by_name, corrected_parts, scan
 from server.recording.own import METADATA, PREFIX
 from server.recording.read.bag2_metadata import is_latched
@@ -210,18 +210,6 @@ def _is_alone(file: IO[bytes]) -> bool:
     start = int.from_bytes(file.read(8), "little") - len(_DATA_END) - 4  # before the checksum of the data
     file.seek(start)
     return file.read(len(_DATA_END)) == _DATA_END and not has_magic(file, start, end)
-
-
-def has_magic(file: IO[bytes], at: int, end: int, block_bytes: int = 1 << 20) -> bool:
-    """Whether a file begins or ends between two places, which may be far apart: it is read in blocks to the first."""
-    file.seek(at)
-    kept = b""
-    while block := file.read(min(block_bytes, end - at)):
-        at += len(block)
-        kept = kept[1 - len(MAGIC) :] + block
-        if MAGIC in kept:
-            return True
-    return False
 
 
 def _is_complete(summary: Any, statistics: Statistics) -> bool:

@@ -17,7 +17,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 
 from server.recording.mcap import mcap_file
-from server.recording.mcap.chunks import HEAD_BYTES, MAGIC
+from server.recording.mcap.chunks import HEAD_BYTES, MAGIC, has_magic
 from server.recording.mcap.write import PartFile
 from server.recording.own import own_schema
 from server.recording.read.read import RecordingUnreadable, open_recording
@@ -226,7 +226,7 @@ def test_another_file_is_found_across_blocks(block: int, place: int) -> None:
         (place + 1, len(raw), False),
         (0, place + len(MAGIC) - 1, False),
     ):
-        assert mcap_file.has_magic(BytesIO(raw), at, end, block) is is_there
+        assert has_magic(BytesIO(raw), at, end, block) is is_there
 
 
 def scanned(*_: object, **__: object) -> object:
