@@ -7,10 +7,11 @@ missed.
 from __future__ import annotations
 
 import asyncio
+import base64
 import contextlib
 import logging
 from collections import defaultdict
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any
 
 from nats.aio.client import Client
@@ -19,8 +20,9 @@ from nats.aio.subscription import Subscription
 from nats.errors import Error as NatsError
 
 from server.bus import nats_wire as wire
-from server.bus.bus import ALL, SUMMARY, Frame, NotAdmitted, NotServed
+from server.bus.bus import Frame, NotAdmitted, NotServed
 from server.bus.local import LocalBus
+from server.bus.nats_agent_frames import FIRST_EVERY_S, FirstStates, Looked, TooLarge
 from server.bus.nats_link import processed
 from server.system import log_context
 from server.system.supervision import Supervisor, cancel
@@ -32,7 +34,6 @@ MOST_PULLS = 256  # that wait at once, of all nodes
 MOST_REQUESTS = 64  # requests at once; a flood is refused
 Admit = Callable[[str, Mapping[str, Any]], Awaitable[Mapping[str, Any]]]  # of vehicle, message; raises NotAdmitted
 Late = Callable[[str, Mapping[str, Any], str], None]  # of vehicle, command, and why it is late, as a sentence
-LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
 FILTERS = frozenset({"before", "alarm", "change", "since_ms", "until_ms"})
 
 
@@ -42,65 +43,6 @@ async def as_it_is(vehicle: str, message: Mapping[str, Any]) -> Mapping[str, Any
 
 def unnoted(vehicle: str, command: Mapping[str, Any], why: str) -> None:
     """Nothing."""
-
-
-class Looked:
-    """One kind of frame of one vehicle, while nodes pull it: counted as one viewer, and its newest frame awaited."""
-
-    def __init__(self, bus: LocalBus, vehicle: str, kind: str) -> None:
-        self._bus = bus
-        self._key = (ALL, vehicle) if kind == SUMMARY else (vehicle, kind)
-        self._changed = asyncio.Event()
-        self._is_extra = kind not in ("state", SUMMARY)
-        self._unwatch = bus.watch(self._key[0], self._on_new)
-        if self._is_extra:
-            bus.want(*self._key, +1)
-        self.until_s = 0.0
-
-    def close(self) -> None:
-        self._unwatch()
-        if self._is_extra:
-            self._bus.want(*self._key, -1)
-
-    @property
-    def newest(self) -> Frame | None:
-        return self._bus.newest(*self._key)
-
-    async def after(self, number: int, wait_s: float) -> Frame | None:
-        """The newest frame once it is another than `number`; None where none came in time."""
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(wait_s):
-                while (frame := self.newest) is None or frame.number == number:
-                    await self._changed.wait()
-                return frame
-        return None
-
-    def _on_new(self, kind: str) -> None:
-        if kind == self._key[1]:
-            self._changed.set()
-            self._changed = asyncio.Event()
-
-
-class TooLarge:
-    """What was too large for the broker of late. Times are monotonic, in seconds."""
-
-    def __init__(self) -> None:
-        self._found: dict[str, tuple[str, float, float]] = {}  # what: a sentence, when it was so, and was logged
-
-    def note(self, what: str, vehicle: str, size: int, largest: int, now_s: float) -> str:
-        """A sentence on it."""
-        key = f"{what} {vehicle}"
-        _, _, logged_s = self._found.get(key, ("", 0.0, -LOG_AGAIN_S))
-        if now_s - logged_s >= LOG_AGAIN_S:
-            logged_s = now_s
-            log.error("too_large_for_the_broker what=%s vehicle=%s bytes=%d", what, vehicle, size)
-        takes = f"and the broker takes {largest // 1000} kB: it is not sent to web nodes."
-        self._found[key] = (f"The {what} of {vehicle} has {size // 1000} kB, {takes}", now_s, logged_s)
-        return self._found[key][0]
-
-    def text(self, now_s: float) -> str | None:
-        """In sentences; None: nothing."""
-        return " ".join(text for text, at_s, _ in self._found.values() if at_s > now_s - LOG_AGAIN_S) or None
 
 
 class NatsAgent:
@@ -121,6 +63,7 @@ class NatsAgent:
         self._now = now
         self._looked: dict[tuple[str, str], Looked] = {}
         self._bases = defaultdict[tuple[str, str], wire.Bases](wire.Bases)  # of what was sent
+        self._first = FirstStates()
         self._tasks: set[asyncio.Task[None]] = set()
         self._supervisor = Supervisor("agent at the broker")
         self._pulls = self._requests = 0
@@ -151,7 +94,9 @@ class NatsAgent:
             for what, answer in (("pull.*", self._on_pull), ("ask", self._on_ask)):
                 self._subscriptions.append(await client.subscribe(wire.subject(vehicle, what), cb=answer))
         # In one packet with the subscriptions: the broker has them before a node can answer this.
-        await self._announce()
+        await self._announce(self._published)
+        self._first.begin()
+        self._spawn(self._send_first_states(client))
 
     async def stop(self) -> None:
         with contextlib.suppress(NatsError, TimeoutError):  # without a broker nothing is routed to it
@@ -188,7 +133,10 @@ class NatsAgent:
         if kind not in wire.KINDS or self._pulls >= MOST_PULLS:
             self.refused += 1
             return
-        self._spawn(self._answer_pull(message, wire.vehicle_of(message.subject), kind, pull))
+        vehicle = wire.vehicle_of(message.subject)
+        if kind == "state" and pull.inflates and pull.is_base and pull.run == self._run:
+            self._first.note_pull(vehicle, pull.have)
+        self._spawn(self._answer_pull(message, vehicle, kind, pull))
 
     async def _answer_pull(self, message: Msg, vehicle: str, kind: str, pull: wire.Pull) -> None:
         came_s = self._now()
@@ -224,6 +172,22 @@ class NatsAgent:
         )
         return wire.encode_frame(head, frame.payload)
 
+    async def _send_first_states(self, client: Client) -> None:
+        """With announcements: a pull brings one a round trip later."""
+        while self._client is client and (due := self._first.due):
+            await self._announce(due)
+            await asyncio.sleep(FIRST_EVERY_S)
+
+    def _first_state(self, vehicle: str) -> dict[str, Any]:
+        """Fields of an announcement; empty where none is due, or it would be more than one packet."""
+        frame, base = self._bus.newest(vehicle, "state"), self._first.take(vehicle)
+        bases = self._bases[vehicle, "state"]
+        if frame is None or not isinstance(frame.payload, str) or not (text := bases.get(base)):
+            return {}
+        bases.add(frame.number, frame.payload)
+        data = wire.compressed(self._framed(self._now(), frame), text)
+        return {"state": base64.b64encode(data).decode(), "base": base}
+
     # -- events --------------------------------------------------------------------------------------------------------
 
     async def _publish_events(self, vehicle: str) -> None:
@@ -236,16 +200,18 @@ class NatsAgent:
             self._published[vehicle] = events[-1]["n"]
             await self._publish(vehicle, "events", wire.Events(run=self._run, events=events))
 
-    async def _announce(self) -> None:
-        for vehicle in [*self._published]:
+    async def _announce(self, vehicles: Iterable[str]) -> None:
+        for vehicle in [*vehicles]:
             last = self._bus.last_event(vehicle)
-            here = wire.Here(run=self._run, last=last, resumes=True, connection=self._connection)
+            here = wire.Here(
+                run=self._run, last=last, resumes=True, connection=self._connection, **self._first_state(vehicle)
+            )
             await self._publish(vehicle, "here", here)
 
     async def _be_here(self) -> None:
         while True:
             await asyncio.sleep(wire.HERE_EVERY_S)
-            await self._announce()
+            await self._announce(self._published)
             now_s = self._now()
             for key in [key for key, looked in self._looked.items() if looked.until_s < now_s]:
                 self._looked.pop(key).close()

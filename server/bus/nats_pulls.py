@@ -7,13 +7,15 @@ as frames are made. The age of a frame counts from its own pull.
 from __future__ import annotations
 
 import asyncio
+import base64
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from nats.errors import Error as NatsError
 
 from server.bus import nats_wire as wire
+from server.bus.nats_clock import AgentAhead
 from server.bus.nats_questions import ANSWER_S, Questions
 
 MOST = 100  # pulls a second of one kind of frame, where an agent answers at once
@@ -22,6 +24,7 @@ EVERY_S = 0.1  # a state is made
 SLOW_S = 0.15  # the round trip from which on several pulls are under way
 SMOOTHING = 0.75
 MOST_UNDER_WAY = 6  # compressed, they are fewer bytes than one state is
+MOST_TEXTS = 12  # frames by which one may be compressed: those that were under way when an agent was lost
 Keep = Callable[[str, str, str | bytes, float], None]
 Refuse = Callable[[str, str, str], None]
 
@@ -33,7 +36,8 @@ class _Newest:
     number: int = 0
     run: str = ""
     run_requested_s: float = -math.inf  # when the pull was sent that brought the first one of this run
-    text: bytes = b""  # by which the next one may be compressed; none of a scan
+    texts: wire.Bases = field(default_factory=lambda: wire.Bases(MOST_TEXTS))  # none of a scan
+    ahead: AgentAhead = field(default_factory=AgentAhead)
 
 
 async def _ended(pulls: set[asyncio.Task[None]]) -> set[asyncio.Task[None]]:
@@ -120,7 +124,7 @@ class Pulls:
         if (client := self._questions.client) is None:
             return await asyncio.sleep(RETRY_S)
         requested_s = self._now()
-        base = newest.text
+        base = newest.texts.get(newest.number)
         pull = wire.Pull(have=newest.number, run=newest.run, inflates=True, is_base=bool(base))
         try:
             message = await client.request(
@@ -130,27 +134,53 @@ class Pulls:
         except (NatsError, TimeoutError):
             return await asyncio.sleep(RETRY_S)
         except wire.Malformed as why:
-            newest.text = b""  # whatever it was: the next one is to need no other
+            newest.texts = wire.Bases(MOST_TEXTS)  # whatever it was: the next one is to need no other
             return await self._not_read(vehicle, kind, why)
         if head.run != newest.run:
             if requested_s < newest.run_requested_s:  # of a run that has ended since, and comes late
                 return None
-            newest.number, newest.run, newest.run_requested_s, newest.text = 0, head.run, requested_s, b""
-        waited_s = max(0.0, head.waited_s)
-        trip_s = max(0.0, self._now() - requested_s - waited_s)
+            newest.number, newest.run, newest.run_requested_s = 0, head.run, requested_s
+            newest.texts, newest.ahead = wire.Bases(MOST_TEXTS), AgentAhead()
+        waited_s, now_s = max(0.0, head.waited_s), self._now()
+        trip_s = max(0.0, now_s - requested_s - waited_s)
         self._trips_s[vehicle] = trip_s + SMOOTHING * (self._trips_s.get(vehicle, trip_s) - trip_s)
         self._questions.set_clock(vehicle, head.run, head.now_s)
+        newest.ahead.received(head.now_s, now_s)
+        newest.ahead.answered(requested_s, head.now_s - waited_s, now_s)
         if head.refused:
             self._refuse(vehicle, kind, head.refused)
-        if head.number <= newest.number:
-            return None
-        newest.number, newest.text = head.number, payload.encode() if isinstance(payload, str) else b""
         # By our clock, and no later than it was: the pull was at the agent after `requested_s`.
-        put_s = min(requested_s + waited_s, self._now()) - max(0.0, head.age_s)
+        put_s = min(requested_s + waited_s, now_s) - max(0.0, head.age_s)
         try:
-            self._keep(vehicle, kind, payload, put_s)
+            self._take(vehicle, kind, newest, head, payload, put_s)
         except wire.Malformed as why:
             await self._not_read(vehicle, kind, why)
+
+    def take_unasked(self, vehicle: str, here: wire.Here) -> None:
+        """The state of an announcement, where somebody looks, and how old it is at most is known."""
+        newest = self._newest.get((vehicle, "state"))
+        if newest is None or here.run != newest.run or not (base := newest.texts.get(here.base)):
+            return
+        try:
+            head, payload = wire.decode_frame(base64.b64decode(here.state), base)
+            now_s = self._now()
+            newest.ahead.received(head.now_s, now_s)
+            put_s = newest.ahead.earliest(head.now_s, now_s) - max(0.0, head.age_s)
+            if head.run == newest.run and put_s > -math.inf:
+                self._take(vehicle, "state", newest, head, payload, min(put_s, now_s))
+        except ValueError as why:  # also of base64
+            self._questions.refuse(wire.subject(vehicle, "here"), wire.Malformed(str(why)[:200]))
+
+    def _take(
+        self, vehicle: str, kind: str, newest: _Newest, head: wire.FrameHead, payload: str | bytes, put_s: float
+    ) -> None:
+        """Raises Malformed."""
+        if head.number <= newest.number:
+            return
+        newest.number = head.number
+        if isinstance(payload, str):
+            newest.texts.add(head.number, payload)
+        self._keep(vehicle, kind, payload, put_s)
 
     async def _not_read(self, vehicle: str, kind: str, why: wire.Malformed) -> None:
         self._questions.refuse(wire.subject(vehicle, f"pull.{kind}"), why)

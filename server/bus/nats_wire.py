@@ -6,13 +6,14 @@
 | `ask` | node requests, agent answers | a command, or a request for events or the clock |
 | `http.…` | node requests, agent answers | requests for what the agent keeps: `nats_http.py` |
 | `events` | agent publishes | events in order, once pages may have them |
-| `here` | agent publishes every second | its run and the number of its newest event |
+| `here` | agent publishes every second | its run and the number of its newest event; behind a gap a state |
 
 A request about a command has its id in the header `Catgraph-Trace`, for the logs.
 
 A frame is pulled, never pushed: one is under way to a node at a time, over a slow radio a few (`nats_pulls.py`), so
 that a stalled hop finds nothing old. Where the pull allows it, the answer is compressed by zlib, and by the frame that
-the node has as the preset dictionary. All times are of the agent's monotonic clock, in seconds.
+the node has as the preset dictionary. Behind a gap a few states come unasked with the announcements of the agent, until
+its first pull: an agent may publish no other subject. All times are of the agent's monotonic clock, in seconds.
 """
 
 from __future__ import annotations
@@ -87,6 +88,8 @@ class Here(Body):
     last: Number
     resumes: bool = False  # the agent answers `resume`
     connection: Number = 0  # of this run to the broker; what still comes from an earlier one is old
+    state: str = ""  # base64 of a frame, compressed by frame `base`
+    base: Number = 0
 
 
 class Events(Body):
@@ -176,13 +179,14 @@ def encode_frame(head: FrameHead, payload: str | bytes = b"") -> bytes:
 class Bases:
     """Texts of the newest frames of a kind, by which others are compressed, by their numbers."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = MOST_BASES) -> None:
+        self._most = most
         self._texts: dict[int, bytes] = {}
 
     def add(self, number: int, text: str) -> None:
         if number not in self._texts:
             self._texts[number] = text.encode()
-        while len(self._texts) > MOST_BASES:
+        while len(self._texts) > self._most:
             del self._texts[next(iter(self._texts))]
 
     def get(self, number: int) -> bytes:
