@@ -22,7 +22,7 @@ from nats.errors import Error as NatsError
 from server.bus import nats_wire as wire
 from server.bus.bus import Frame, NotAdmitted, NotServed
 from server.bus.local import LocalBus
-from server.bus.nats_agent_frames import FIRST_EVERY_S, FirstStates, Looked, TooLarge
+from server.bus.nats_agent_frames import FIRST_EVERY_S, LARGEST_FIRST, FirstStates, Looked, TooLarge
 from server.bus.nats_link import processed
 from server.system import log_context
 from server.system.supervision import Supervisor, cancel
@@ -179,13 +179,15 @@ class NatsAgent:
             await asyncio.sleep(FIRST_EVERY_S)
 
     def _first_state(self, vehicle: str) -> dict[str, Any]:
-        """Fields of an announcement; empty where none is due, or it would be more than one packet."""
+        """Fields of an announcement; empty where none is due, or none that is small."""
         frame, base = self._bus.newest(vehicle, "state"), self._first.take(vehicle)
         bases = self._bases[vehicle, "state"]
         if frame is None or not isinstance(frame.payload, str) or not (text := bases.get(base)):
             return {}
-        bases.add(frame.number, frame.payload)
         data = wire.compressed(self._framed(self._now(), frame), text)
+        if len(data) > LARGEST_FIRST:
+            return {}
+        bases.add(frame.number, frame.payload)
         return {"state": base64.b64encode(data).decode(), "base": base}
 
     # -- events --------------------------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ log = logging.getLogger("catgraph.bus")
 
 LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
 FIRST_EVERY_S = 0.1  # a state is made
+LARGEST_FIRST = 4000  # bytes of one: by the state that the node has it is 0.6 to 1.1 kB
 MOST_FIRST = 10  # states: the first pull comes a round trip after the announcement, or later where a packet was lost
 
 

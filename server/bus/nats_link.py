@@ -34,7 +34,8 @@ PING_EVERY_S = 2.0
 PING_ANSWERED_WITHIN_S = 4  # else the broker is gone
 SILENT_S = 1 << 30  # clients send no pings of their own: of a spare one none is to be under way when the radio is lost
 LOOKS_EVERY_S = 0.1  # whether the connection is lost: the callbacks of a client come only once its socket is closed
-ANSWERS_WITHIN_S = 1.5  # a connection that was taken, where there is another one
+NEWER_AFTER_S = 0.8  # a connection that was taken gives way to a new one: no sooner than over a bad radio it answers
+ANSWERS_WITHIN_S = 1.5  # it does, where there is another idle one
 ANSWERS_AT_LAST_S = 10
 LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
 MOST_REFUSED = 20  # subjects that are named
@@ -181,7 +182,9 @@ class BrokerLink:
         began_s = now()
         while not self._pinging.done():
             await asyncio.wait({self._pinging}, timeout=LOOKS_EVERY_S)
-            is_late = self._spares.is_newer or (now() - began_s >= ANSWERS_WITHIN_S and self._spares.is_any)
+            waited_s = now() - began_s
+            is_newer = waited_s >= NEWER_AFTER_S and self._spares.is_newer
+            is_late = is_newer or (waited_s >= ANSWERS_WITHIN_S and self._spares.is_any)
             if not self._pinging.done() and not client.is_connected:
                 raise client.last_error or ConnectionResetError("it ended the connection")
             if not self._pinging.done() and is_late:

@@ -149,8 +149,9 @@ class Pulls:
         newest.ahead.answered(requested_s, head.now_s - waited_s, now_s)
         if head.refused:
             self._refuse(vehicle, kind, head.refused)
-        # By our clock, and no later than it was: the pull was at the agent after `requested_s`.
-        put_s = min(requested_s + waited_s, now_s) - max(0.0, head.age_s)
+        # By our clock, and no later than it was: the pull was at the agent after `requested_s`, and no clock runs wild.
+        sent_s = max(requested_s + waited_s, newest.ahead.earliest(head.now_s, now_s))
+        put_s = min(sent_s, now_s) - max(0.0, head.age_s)
         try:
             self._take(vehicle, kind, newest, head, payload, put_s)
         except wire.Malformed as why:

@@ -1,0 +1,222 @@
+"""The states that an agent sends unasked behind a gap, and how old a node takes them to be."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import random
+from types import SimpleNamespace
+from typing import Any, cast
+
+import orjson
+import pytest
+from nats.aio.client import Client
+from nats.aio.msg import Msg
+
+from server.bus import nats_wire as wire
+from server.bus.nats_agent import NatsAgent
+from server.bus.nats_agent_frames import FIRST_EVERY_S, MOST_FIRST
+from server.bus.nats_bus import NatsBus
+from server.bus.nats_clock import DRIFT, AgentAhead
+from tests.server.bus.broker import connected, running_broker
+from tests.server.bus.buses import Clock, local_buses, node, offering, until
+
+STATE = random.Random(1).randbytes(8000).hex()
+
+
+async def nothing(*_: Any, **__: Any) -> Any:
+    return SimpleNamespace(unsubscribe=nothing)
+
+
+class Air:
+    """What an agent publishes by its connections."""
+
+    def __init__(self) -> None:
+        self.heres: list[wire.Here] = []
+        self.client = cast(Client, SimpleNamespace(publish=self.publish, subscribe=nothing, flush=nothing,
+                                                   is_connected=True, max_payload=1 << 20))  # fmt: skip
+
+    async def publish(self, subject: str, data: bytes) -> None:
+        if subject == "veh.ocelot.here":
+            self.heres.append(wire.decode(wire.Here, data))
+
+
+async def pull(agent: NatsAgent, **fields: Any) -> None:
+    body = orjson.dumps({"run": "a", "inflates": True, "is_base": True, **fields})
+    await agent._on_pull(cast(Msg, SimpleNamespace(subject="veh.ocelot.pull.state", data=body, reply="node")))
+    await asyncio.sleep(0.01)
+
+
+@pytest.mark.virtual_time
+async def test_behind_a_gap_a_few_states_go_unasked_until_the_first_pull() -> None:
+    air = Air()
+    async with local_buses() as both:
+        agent = NatsAgent(both.session, run="a", now=both.clock)
+
+        async def drive(lasts_s: float) -> list[wire.Here]:
+            air.heres.clear()
+            for _ in range(round(lasts_s / FIRST_EVERY_S)):
+                both.session.put("ocelot", "state", f"{STATE}{both.clock()}")
+                await asyncio.sleep(FIRST_EVERY_S)
+            return [here for here in air.heres if here.state]
+
+        await agent.start(air.client)
+        assert await drive(2.0) == [], "nobody looks"
+        both.session.put("ocelot", "state", f"{STATE}0")
+        await pull(agent, have=0, run="", is_base=False)
+        base = both.session.newest("ocelot", "state")
+        assert base is not None
+        await pull(agent, have=base.number)
+        assert await drive(2.0) == []
+        await agent.start(air.client)
+        sent = await drive(4.0)
+        assert len(sent) == MOST_FIRST, "a hop that stalls finds no more"
+        heads = [wire.decode_frame(_data(here), f"{STATE}0".encode())[0] for here in sent]
+        assert [head.number for head in heads] == [*range(heads[0].number, heads[0].number + MOST_FIRST)]
+        assert all(0 <= head.age_s <= FIRST_EVERY_S for head in heads), "each is the newest"
+        assert max(len(wire.encode(here)) for here in sent) < 1000, "one packet"
+        air.heres.clear()
+        await agent.start(air.client)
+        both.session.put("ocelot", "state", random.Random(2).randbytes(8000).hex())
+        await asyncio.sleep(2.0)
+        assert not any(here.state for here in air.heres), "one that is large is left to the pull"
+        await agent.start(air.client)
+        await asyncio.sleep(0)
+        await pull(agent, have=heads[-1].number)
+        assert len(await drive(2.0)) <= 1, "what is pulled is not sent beside it"
+        await agent.start(air.client)
+        assert len(await drive(2.0)) == MOST_FIRST, "the last one that was sent is one by which others are compressed"
+        await agent.stop()
+
+
+def _data(here: wire.Here) -> bytes:
+    return base64.b64decode(here.state)
+
+
+async def test_through_a_broker_they_come_without_a_pull() -> None:
+    async with running_broker() as broker, local_buses() as both, connected(broker.address) as second:
+        async with (
+            node(broker.address, both.clock) as page,
+            offering(both.session, broker.address, "a", both.clock) as agent,
+        ):
+            page.watch("ocelot", lambda _: None)
+            for n in range(5):
+                both.session.put("ocelot", "state", f"{STATE}{n}")
+                await until(lambda n=n: _newest(page) == f"{STATE}{n}")
+            agent._on_pull = nothing  # type: ignore[method-assign]
+            await agent.start(second)
+            both.session.put("ocelot", "state", "back")
+            await until(lambda: _newest(page) == "back")
+
+
+def _newest(page: NatsBus) -> str | bytes | None:
+    frame = page.newest("ocelot", "state")
+    return frame and frame.payload
+
+
+class Node:
+    """A node that pulled frame 1 of run `a`, whose agent's clock is 1000 s ahead of its own."""
+
+    def __init__(self) -> None:
+        self.clock = Clock()
+        self.bus = NatsBus(now=self.clock)
+        self.there_s = 0.25  # from node to agent
+        self.answers = 1
+        self.bus._questions.client = cast(Client, SimpleNamespace(request=self.request, is_connected=True))
+
+    async def request(self, subject: str, body: bytes, timeout: float) -> Any:
+        if not self.answers:
+            await asyncio.Event().wait()
+        self.answers -= 1
+        self.clock.ahead_s += self.there_s
+        head = wire.FrameHead(run="a", number=1, now_s=self.clock() + 1000.0)
+        return SimpleNamespace(data=wire.encode_frame(head, f"{STATE}1"))
+
+    async def here(self, *, state: str = "", base: int = 0, run: str = "a") -> None:
+        body = wire.encode(wire.Here(run=run, last=0, resumes=True, state=state, base=base))
+        await self.bus._on_here(cast(Msg, SimpleNamespace(subject="veh.ocelot.here", data=body)))
+
+    async def unasked(self, number: int, *, late_s: float = 0.0, ahead_s: float = 1000.0, **more: Any) -> None:
+        """A state that is 0.05 s old when it is sent, and comes `late_s` after that."""
+        head = wire.FrameHead(run="a", number=number, now_s=self.clock() + ahead_s, age_s=0.05)
+        data = wire.compressed(wire.encode_frame(head, f"{STATE}{number}"), f"{STATE}1".encode())
+        self.clock.ahead_s += late_s
+        await self.here(**{"state": base64.b64encode(data).decode(), "base": 1, **more})
+
+    @property
+    def age_s(self) -> float:
+        frame = self.bus.newest("ocelot", "state")
+        return float("inf") if frame is None else self.clock() - frame.put_s
+
+
+async def test_an_unasked_state_is_never_shown_younger_than_it_is() -> None:
+    at = Node()
+    await at.here()
+    at.bus.watch("ocelot", lambda _: None)
+    await until(lambda: _newest(at.bus) == f"{STATE}1")
+    at.clock.ahead_s += 30.0
+    await at.unasked(2, late_s=0.6)
+    assert _newest(at.bus) == f"{STATE}2"
+    least_s = 0.65 + at.there_s
+    assert least_s <= at.age_s <= least_s + 31 * DRIFT + 0.05, "with the way of the pull before the gap, and the drift"
+    await at.unasked(1)
+    assert _newest(at.bus) == f"{STATE}2", "it is an old one"
+    await at.bus.stop()
+
+
+async def test_an_unasked_state_is_not_shown_younger_where_the_clocks_drifted() -> None:
+    at = Node()
+    at.there_s = 0.0
+    await at.here()
+    at.bus.watch("ocelot", lambda _: None)
+    await until(lambda: _newest(at.bus) == f"{STATE}1")
+    at.clock.ahead_s += 30.0
+    await at.unasked(2, ahead_s=1000.0 + 30 * DRIFT)
+    assert 0.05 - 1e-6 <= at.age_s < 0.2
+    await at.bus.stop()
+
+
+@pytest.mark.parametrize("more", [
+    {"run": "b"}, {"base": 7}, {"base": 0}, {"state": "ü"}, {"state": "x"},
+    {"state": base64.b64encode(b"x{}").decode()}, {"ahead_s": 1005.0},
+])  # fmt: skip
+async def test_an_unasked_state_is_left_out_where_it_cannot_be_read_or_its_age_is_not_known(
+    more: dict[str, Any],
+) -> None:
+    at = Node()
+    await at.here()
+    at.bus.watch("ocelot", lambda _: None)
+    await until(lambda: _newest(at.bus) == f"{STATE}1")
+    await at.unasked(2, **more)
+    assert _newest(at.bus) == f"{STATE}1"
+    if "ahead_s" not in more and "run" not in more:
+        await at.unasked(3)
+        assert _newest(at.bus) == f"{STATE}3", "the next one is"
+    assert at.bus._questions.refused == (more.get("base") is None and "state" in more)
+    await at.bus.stop()
+
+
+async def test_what_nobody_looks_at_is_not_taken() -> None:
+    at = Node()
+    await at.here()
+    at.bus.watch("ocelot", lambda _: None)()
+    await at.unasked(2)
+    assert _newest(at.bus) is None
+    await at.bus.stop()
+
+
+def test_the_least_way_bounds_the_clock_until_the_drift_makes_it_worthless_or_a_clock_stood_still() -> None:
+    ahead = AgentAhead()
+    assert ahead.earliest(1000.0, 0.0) == -float("inf")
+    ahead.answered(0.0, 1000.3, 0.6)
+    assert ahead.earliest(1001.0, 1.0) == pytest.approx(0.7, abs=0.001)
+    ahead.answered(1.0, 1001.1, 1.6)
+    ahead.answered(2.0, 1002.5, 3.0)
+    assert ahead.earliest(1004.0, 4.0) == pytest.approx(3.9, abs=0.01), "the shorter way counts"
+    assert ahead.earliest(1104.0, 104.0) == pytest.approx(103.9 - 102.4 * DRIFT, abs=0.001)
+    ahead.received(1103.9, 104.0)
+    assert ahead.earliest(1104.0, 104.0) > 103.0
+    ahead.received(1105.0, 104.0)
+    assert ahead.earliest(1104.0, 104.0) == -float("inf"), "this one stood still"
+    ahead.answered(105.0, 1106.2, 105.6)
+    assert ahead.earliest(1107.2, 106.0) == pytest.approx(106.0, abs=0.001)
