@@ -7,10 +7,8 @@ missed.
 from __future__ import annotations
 
 import asyncio
-import base64
 import contextlib
 import logging
-from collections import defaultdict
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any
 
@@ -20,9 +18,9 @@ from nats.aio.subscription import Subscription
 from nats.errors import Error as NatsError
 
 from server.bus import nats_wire as wire
-from server.bus.bus import Frame, NotAdmitted, NotServed
+from server.bus.bus import NotAdmitted, NotServed
 from server.bus.local import LocalBus
-from server.bus.nats_agent_frames import FIRST_EVERY_S, LARGEST_FIRST, FirstStates, Looked, TooLarge
+from server.bus.nats_agent_frames import FIRST_EVERY_S, Looked, SentFrames, TooLarge
 from server.bus.nats_link import processed
 from server.system import log_context
 from server.system.supervision import Supervisor, cancel
@@ -62,8 +60,7 @@ class NatsAgent:
         self._run = run
         self._now = now
         self._looked: dict[tuple[str, str], Looked] = {}
-        self._bases = defaultdict[tuple[str, str], wire.Bases](wire.Bases)  # of what was sent
-        self._first = FirstStates()
+        self._frames = SentFrames(bus, run, now)
         self._tasks: set[asyncio.Task[None]] = set()
         self._supervisor = Supervisor("agent at the broker")
         self._pulls = self._requests = 0
@@ -95,7 +92,6 @@ class NatsAgent:
                 self._subscriptions.append(await client.subscribe(wire.subject(vehicle, what), cb=answer))
         # In one packet with the subscriptions: the broker has them before a node can answer this.
         await self._announce(self._published)
-        self._first.begin()
         self._spawn(self._send_first_states(client))
 
     async def stop(self) -> None:
@@ -134,61 +130,41 @@ class NatsAgent:
             self.refused += 1
             return
         vehicle = wire.vehicle_of(message.subject)
-        if kind == "state" and pull.inflates and pull.is_base and pull.run == self._run:
-            self._first.note_pull(vehicle, pull.have)
+        self._frames.note_pull(vehicle, kind, pull)
         self._spawn(self._answer_pull(message, vehicle, kind, pull))
 
     async def _answer_pull(self, message: Msg, vehicle: str, kind: str, pull: wire.Pull) -> None:
         came_s = self._now()
-        looked = self._looked.get((vehicle, kind))
-        if looked is None:
-            looked = self._looked[vehicle, kind] = Looked(self._bus, vehicle, kind)
-        looked.until_s = came_s + wire.PULL_WAITS_S + WANTED_FOR_S
+        looked = self._look(vehicle, kind)
+        reader = message.reply.rpartition(".")[0] if kind == "state" else ""
         self._pulls += 1
         try:
-            frame = await looked.after(pull.have if pull.run == self._run else 0, wire.PULL_WAITS_S)
+            frame = await looked.after(pull.have if pull.run == self._run else 0, wire.PULL_WAITS_S, reader)
         finally:
             self._pulls -= 1
-        data = self._framed(came_s, frame)
+        data = self._frames.encoded(came_s, frame)
         if len(data) > self._largest:
             refused = self._note_too_large(f"{kind} frame", vehicle, len(data))
             await asyncio.sleep(wire.PULL_WAITS_S)  # it would be requested again at once
-            data, frame = self._framed(came_s, None, refused), None
+            data, frame = self._frames.encoded(came_s, None, refused), None
         if pull.inflates:
-            bases = self._bases[vehicle, kind]
-            data = wire.compressed(data, bases.get(pull.have) if pull.is_base and pull.run == self._run else b"")
-            if frame is not None and isinstance(frame.payload, str):
-                bases.add(frame.number, frame.payload)
+            data = self._frames.compressed(vehicle, kind, data, frame, pull)
         await self._respond(message, data)
 
-    def _framed(self, came_s: float, frame: Frame | None, refused: str = "") -> bytes:
-        """A frame as it is sent now; None: that there is no newer one, or why it is refused."""
-        now_s = self._now()
-        head = wire.FrameHead(run=self._run, number=0, now_s=now_s, waited_s=now_s - came_s, refused=refused)
-        if frame is None:
-            return wire.encode_frame(head)
-        head = head.model_copy(
-            update={"number": frame.number, "age_s": now_s - frame.put_s, "is_text": isinstance(frame.payload, str)}
-        )
-        return wire.encode_frame(head, frame.payload)
+    def _look(self, vehicle: str, kind: str) -> Looked:
+        looked = self._looked.get((vehicle, kind))
+        if looked is None:
+            looked = self._looked[vehicle, kind] = Looked(self._bus, vehicle, kind)
+        looked.until_s = self._now() + wire.PULL_WAITS_S + WANTED_FOR_S
+        return looked
 
     async def _send_first_states(self, client: Client) -> None:
         """With announcements: a pull brings one a round trip later."""
-        while self._client is client and (due := self._first.due):
+        for vehicle in self._frames.begin_first():
+            self._look(vehicle, "state")  # else none is made
+        while self._client is client and (due := self._frames.first_due):
             await self._announce(due)
             await asyncio.sleep(FIRST_EVERY_S)
-
-    def _first_state(self, vehicle: str) -> dict[str, Any]:
-        """Fields of an announcement; empty where none is due, or none that is small."""
-        frame, base = self._bus.newest(vehicle, "state"), self._first.take(vehicle)
-        bases = self._bases[vehicle, "state"]
-        if frame is None or not isinstance(frame.payload, str) or not (text := bases.get(base)):
-            return {}
-        data = wire.compressed(self._framed(self._now(), frame), text)
-        if len(data) > LARGEST_FIRST:
-            return {}
-        bases.add(frame.number, frame.payload)
-        return {"state": base64.b64encode(data).decode(), "base": base}
 
     # -- events --------------------------------------------------------------------------------------------------------
 
@@ -204,11 +180,7 @@ class NatsAgent:
 
     async def _announce(self, vehicles: Iterable[str]) -> None:
         for vehicle in [*vehicles]:
-            last = self._bus.last_event(vehicle)
-            here = wire.Here(
-                run=self._run, last=last, resumes=True, connection=self._connection, **self._first_state(vehicle)
-            )
-            await self._publish(vehicle, "here", here)
+            await self._publish(vehicle, "here", self._frames.announcement(vehicle, self._connection))
 
     async def _be_here(self) -> None:
         while True:

@@ -1,17 +1,22 @@
-"""What an agent keeps of the frames that web nodes pull: what is looked at, goes unasked, or was too large."""
+"""The frames of an agent for web nodes: what is looked at, what is sent and how, and what was too large."""
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
+import base64
 import logging
+from collections import defaultdict
+from collections.abc import Callable
+from typing import Any
 
+from server.bus import nats_wire as wire
 from server.bus.bus import ALL, SUMMARY, Frame
 from server.bus.local import LocalBus
 
 log = logging.getLogger("catgraph.bus")
 
 LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
+MOST_READERS = 100
 FIRST_EVERY_S = 0.1  # a state is made
 LARGEST_FIRST = 4000  # bytes of one: by the state that the node has it is 0.6 to 1.1 kB
 MOST_FIRST = 10  # states: the first pull comes a round trip after the announcement, or later where a packet was lost
@@ -28,6 +33,8 @@ class Looked:
         self._unwatch = bus.watch(self._key[0], self._on_new)
         if self._is_extra:
             bus.want(*self._key, +1)
+        self._given: dict[str, int] = {}  # the newest frame of each reader
+        self._waiting = defaultdict[str, list[object]](list)
         self.until_s = 0.0
 
     def close(self) -> None:
@@ -39,14 +46,32 @@ class Looked:
     def newest(self) -> Frame | None:
         return self._bus.newest(*self._key)
 
-    async def after(self, number: int, wait_s: float) -> Frame | None:
-        """The newest frame once it is another than `number`; None where none came in time."""
-        with contextlib.suppress(TimeoutError):
+    async def after(self, number: int, wait_s: float, reader: str = "") -> Frame | None:
+        """The newest frame once it is another than `number`; None where none came in time.
+
+        Pulls of one reader that come together get one frame each, the newest pull first: behind a stall the reader may
+        have given up the others. "": no such reader.
+        """
+        waiting = self._waiting[reader]
+        waiting.append(turn := object())
+        try:
             async with asyncio.timeout(wait_s):
-                while (frame := self.newest) is None or frame.number == number:
+                while not self._is_for(reader, number, frame := self.newest) or (reader and waiting[-1] is not turn):
                     await self._changed.wait()
-                return frame
-        return None
+            if reader and frame is not None:
+                self._given[reader] = frame.number
+                if len(self._given) > MOST_READERS:
+                    self._given.clear()
+            return frame
+        except TimeoutError:
+            return None
+        finally:
+            waiting.remove(turn)
+            if not waiting:
+                self._waiting.pop(reader, None)
+
+    def _is_for(self, reader: str, number: int, frame: Frame | None) -> bool:
+        return frame is not None and frame.number not in (number, self._given.get(reader))
 
     def _on_new(self, kind: str) -> None:
         if kind == self._key[1]:
@@ -54,37 +79,77 @@ class Looked:
             self._changed = asyncio.Event()
 
 
-class FirstStates:
-    """Which states go unasked behind a gap: of vehicles whose states were pulled before it, until the first pull.
+class SentFrames:
+    """Frames as nodes get them: encoded, compressed by one that the node has, and the first ones behind a gap unasked.
 
-    A few and no more, so that a hop that stalls finds nothing old.
+    The unasked ones are states of vehicles whose states were pulled before it, until the first pull: a few and no more,
+    so that a hop that stalls finds nothing old. `now`: a monotonic clock in seconds.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, bus: LocalBus, run: str, now: Callable[[], float]) -> None:
+        self._bus = bus
+        self._run = run
+        self._now = now
+        self._bases = defaultdict[tuple[str, str], wire.Bases](wire.Bases)
         self._have: dict[str, int] = {}  # the state that the node had at the last pull
-        self._left: dict[str, int] = {}
+        self._left: dict[str, int] = {}  # so many go unasked
 
-    def begin(self) -> None:
-        """The agent is back."""
+    def encoded(self, came_s: float, frame: Frame | None, refused: str = "") -> bytes:
+        """A frame as it is sent now; None: that there is no newer one, or why it is refused. The pull came then."""
+        now_s = self._now()
+        head = wire.FrameHead(run=self._run, number=0, now_s=now_s, waited_s=now_s - came_s, refused=refused)
+        if frame is None:
+            return wire.encode_frame(head)
+        head = head.model_copy(
+            update={"number": frame.number, "age_s": now_s - frame.put_s, "is_text": isinstance(frame.payload, str)}
+        )
+        return wire.encode_frame(head, frame.payload)
+
+    def compressed(self, vehicle: str, kind: str, data: bytes, frame: Frame | None, pull: wire.Pull) -> bytes:
+        """An encoded frame, for a node that inflates it."""
+        bases = self._bases[vehicle, kind]
+        data = wire.compressed(data, bases.get(pull.have) if pull.is_base and pull.run == self._run else b"")
+        if frame is not None and isinstance(frame.payload, str):
+            bases.add(frame.number, frame.payload)
+        return data
+
+    def begin_first(self) -> list[str]:
+        """The agent is back; `first_due`."""
         self._left = dict.fromkeys(self._have, MOST_FIRST)
+        return self.first_due
 
-    def note_pull(self, vehicle: str, have: int) -> None:
-        self._have[vehicle] = have
-        self._left.pop(vehicle, None)
+    def note_pull(self, vehicle: str, kind: str, pull: wire.Pull) -> None:
+        if kind == "state" and pull.inflates and pull.is_base and pull.run == self._run:
+            self._have[vehicle] = pull.have
+            self._left.pop(vehicle, None)
 
     @property
-    def due(self) -> list[str]:
-        """Vehicles of which one goes now."""
+    def first_due(self) -> list[str]:
+        """Vehicles of which a state goes unasked now."""
         return [*self._left]
 
-    def take(self, vehicle: str) -> int:
-        """One goes now; the number of the state that the node has, 0 where none is due."""
+    def announcement(self, vehicle: str, connection: int) -> wire.Here:
+        """Of the agent, with the state that goes unasked now."""
+        last = self._bus.last_event(vehicle)
+        return wire.Here(run=self._run, last=last, resumes=True, connection=connection, **self._first(vehicle))
+
+    def _first(self, vehicle: str) -> dict[str, Any]:
+        """Its newest state as fields of an announcement; empty where none is due, or none that is small."""
         if vehicle not in self._left:
-            return 0
+            return {}
         self._left[vehicle] -= 1
         if not self._left[vehicle]:
             del self._left[vehicle]
-        return self._have[vehicle]
+        bases, base, frame = self._bases[vehicle, "state"], self._have[vehicle], self._bus.newest(vehicle, "state")
+        if frame is None or not isinstance(frame.payload, str) or not (text := bases.get(base)):
+            return {}
+        if bases.get(frame.number):  # none was made since
+            return {}
+        data = wire.compressed(self.encoded(self._now(), frame), text)
+        if len(data) > LARGEST_FIRST:
+            return {}
+        bases.add(frame.number, frame.payload)
+        return {"state": base64.b64encode(data).decode(), "base": base}
 
 
 class TooLarge:

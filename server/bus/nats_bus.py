@@ -124,8 +124,7 @@ class NatsBus:
         if (is_again := self._agents.connects(vehicle, here)) is not None:
             self._logs.note_resuming(vehicle, is_able=here.resumes)
             self._meet(vehicle, here.run, here.last, is_again=is_again)
-            if here.state:
-                self._pulls.take_unasked(vehicle, here)
+            self._pulls.take_unasked(vehicle, here)
         return None
 
     def _meet(self, vehicle: str, run: str, last: int, *, is_again: bool = False) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +18,7 @@ from server.bus.broker import Broker as BrokerAddress
 from server.bus.bus import NotServed
 from server.bus.nats_agent import NatsAgent
 from server.bus.nats_bus import NatsBus
-from server.bus.nats_link import MOST_AT_ONCE, RETRY_S, BrokerLink
+from server.bus.nats_link import MOST_AT_ONCE, NEWER_AFTER_S, RETRY_S, BrokerLink
 from server.bus.nats_spares import MOST_DIALS
 from tests.server.bus.broker import running_broker
 from tests.server.bus.buses import local_buses, until
@@ -194,3 +195,22 @@ async def test_with_keys_no_answer_is_sent_by_another_connection_than_the_reques
             assert why.value.outcome == "unknown"
             assert link._client is not before
             assert link.complaint is link.refused is None
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize(
+    ("answers_after_s", "is_replaced"), [(NEWER_AFTER_S - 0.2, False), (NEWER_AFTER_S + 0.2, True)]
+)
+async def test_a_new_connection_takes_no_place_before_the_one_that_was_taken_can_answer(
+    answers_after_s: float, is_replaced: bool
+) -> None:
+    """Behind a gap dials end at about the same time: each replaced one is lost for the next gap."""
+    link = BrokerLink(BrokerAddress(address="nats://127.0.0.1:1"), name="test")
+    link._spares = cast(Any, SimpleNamespace(is_newer=True, is_any=True))
+
+    async def rtt(timeout: float) -> None:
+        await asyncio.sleep(answers_after_s)
+
+    answer = link._answers(cast(Client, SimpleNamespace(rtt=rtt, is_connected=True)))
+    with pytest.raises(TimeoutError) if is_replaced else contextlib.nullcontext():
+        await answer
