@@ -16,7 +16,7 @@ from server.protocol.rate_limit import Allowance, Limits
 from server.replay.manager import NoReplay
 from server.replay.view_source import ViewSource
 from server.system import log_context
-from server.web.page_orders import PageOrders
+from server.web.page_orders import REPORTS, PageOrders
 from server.web.page_sender import PageSender
 
 log = logging.getLogger("catgraph.web")
@@ -56,7 +56,7 @@ def lane_of(kind: object) -> str:
     """What slows or releases the car waits for no other command, and no command for what a page sends by itself."""
     if not isinstance(kind, str) or kind not in commands.SLOW_DOWN | SENT_BY_ITSELF:
         return ""
-    return "slow-down" if kind in commands.SLOW_DOWN else kind
+    return "slow-down" if kind in commands.SLOW_DOWN else REPORTS
 
 
 class CommandsOfPage:
@@ -83,7 +83,7 @@ class CommandsOfPage:
         self._complain = complain
         self._sender = PageSender(principal, people, signs=bus.grows)
         self._allowed = Allowance(limits.commands, now())
-        self._orders = PageOrders(now)
+        self._orders = PageOrders(now, self.carry_out, self.pass_on)
         self._announcements = Announcements(bus)
 
     @property
@@ -107,7 +107,7 @@ class CommandsOfPage:
 
     async def run(self) -> None:
         """Carries out the page's commands and passes on its statuses, without end."""
-        await self._orders.run(self.carry_out, self.pass_on)
+        await self._orders.run()
 
     async def add(self, message: dict[str, Any]) -> None:
         """Have a command carried out after those before it in its lane."""
