@@ -23,6 +23,7 @@ from server.bus import nats_wire as wire
 from server.storage import bounded_toml, durable_file
 
 LIST, CONF = "fleet.toml", "fleet.conf"
+KEY_WITHIN_S = 5  # after a connection; by itself a broker waits 2 s, too short for a bad radio that loses a packet
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
 _PUBLIC = re.compile(r"U[A-Z2-7]{55}")
 
@@ -118,7 +119,7 @@ def conf(users: Sequence[User]) -> str:
     nobody = f'    {{user: nobody, password: {secrets.token_hex(32)}, permissions: {{publish: {{deny: ">"}}}}}}'
     return (
         "# Made by `catgraph fleet`: changes here are lost.\n"
-        "authorization {\n  users = [\n" + "\n".join(rows or [nobody]) + "\n  ]\n}\n"
+        f"authorization {{\n  timeout: {KEY_WITHIN_S}\n  users = [\n" + "\n".join(rows or [nobody]) + "\n  ]\n}\n"
     )
 
 

@@ -337,3 +337,9 @@ def test_a_broker_that_is_not_the_pinned_one_is_not_run(tmp_path: Path, monkeypa
     if (platform.system(), platform.machine()) in PINNED:
         with pytest.raises(AssertionError, match="is not the pinned nats-server"):
             check_pinned.__wrapped__(program)
+
+
+def test_a_connection_over_a_bad_radio_has_time_to_prove_its_key() -> None:
+    """Three round trips, and a packet that is repeated after a second and after two more."""
+    text = broker_users.conf([])
+    assert float(text.split("authorization {\n  timeout: ")[1].split()[0]) >= 3 * 0.6 + 1 + 2
