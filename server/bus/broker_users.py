@@ -134,7 +134,7 @@ def permissions(user: User) -> dict[str, Any]:
         return {
             "publish": [wire.subject(user.name, "events"), wire.subject(user.name, "here")],
             "subscribe": [wire.subject(user.name, what) for what in ("pull.*", "ask", "http.*")],
-            "allow_responses": {"max": 1, "ttl": "5s"},
+            "allow_responses": {"max": 1, "ttl": "30s"},  # what a radio held up is late, and no missing right
         }
     return {
         "publish": [*(wire.subject("*", what) for what in ("pull.*", "ask", "http.*")), *_DEVICES],
