@@ -12,6 +12,7 @@ from typing import Any
 from server.bus import nats_wire as wire
 from server.bus.bus import ALL, SUMMARY, Frame
 from server.bus.local import LocalBus
+from server.bus.nats_clock import Steady
 
 log = logging.getLogger("catgraph.bus")
 
@@ -19,6 +20,7 @@ LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
 MOST_READERS = 100
 FIRST_EVERY_S = 0.1  # a state is made
 LARGEST_FIRST = 4000  # bytes of one: by the state that the node has it is 0.6 to 1.1 kB
+LOOKED_AT_S = 600.0  # before the return, at most: of others none is made
 MOST_FIRST = 10  # states: the first pull comes a round trip after the announcement, or later where a packet was lost
 
 
@@ -86,13 +88,16 @@ class SentFrames:
     so that a hop that stalls finds nothing old. `now`: a monotonic clock in seconds.
     """
 
-    def __init__(self, bus: LocalBus, run: str, now: Callable[[], float]) -> None:
+    def __init__(self, bus: LocalBus, run: str, now: Callable[[], float], clock: Steady | None = None) -> None:
         self._bus = bus
         self._run = run
         self._now = now
         self._bases = defaultdict[tuple[str, str], wire.Bases](wire.Bases)
-        self._have: dict[str, int] = {}  # the state that the node had at the last pull
+        self._have: dict[str, tuple[int, float]] = {}  # the state that the node had at the last pull, and when that was
         self._left: dict[str, int] = {}  # so many go unasked
+        self._clock = (
+            clock or Steady()
+        )  # noted at the last pull: after it nodes know the age of a state by this clock alone
 
     def encoded(self, came_s: float, frame: Frame | None, refused: str = "") -> bytes:
         """A frame as it is sent now; None: that there is no newer one, or why it is refused. The pull came then."""
@@ -115,13 +120,17 @@ class SentFrames:
 
     def begin_first(self) -> list[str]:
         """The agent is back; `first_due`."""
-        self._left = dict.fromkeys(self._have, MOST_FIRST)
+        now_s = self._now()
+        self._left = {one: MOST_FIRST for one, (_, at_s) in self._have.items() if now_s - at_s <= LOOKED_AT_S}
         return self.first_due
 
     def note_pull(self, vehicle: str, kind: str, pull: wire.Pull) -> None:
-        if kind == "state" and pull.inflates and pull.is_base and pull.run == self._run:
-            self._have[vehicle] = pull.have
-            self._left.pop(vehicle, None)
+        if kind != "state":
+            return
+        self._left.pop(vehicle, None)
+        if pull.inflates and pull.is_base and pull.run == self._run:
+            self._have[vehicle] = pull.have, self._now()
+            self._clock.note(self._now())
 
     @property
     def first_due(self) -> list[str]:
@@ -140,8 +149,10 @@ class SentFrames:
         self._left[vehicle] -= 1
         if not self._left[vehicle]:
             del self._left[vehicle]
-        bases, base, frame = self._bases[vehicle, "state"], self._have[vehicle], self._bus.newest(vehicle, "state")
+        bases, base, frame = self._bases[vehicle, "state"], self._have[vehicle][0], self._bus.newest(vehicle, "state")
         if frame is None or not isinstance(frame.payload, str) or not (text := bases.get(base)):
+            return {}
+        if not self._clock.is_steady(self._now()):
             return {}
         if bases.get(frame.number):  # none was made since
             return {}

@@ -24,7 +24,8 @@ EVERY_S = 0.1  # a state is made
 SLOW_S = 0.15  # the round trip from which on several pulls are under way
 SMOOTHING = 0.75
 MOST_UNDER_WAY = 6  # compressed, they are fewer bytes than one state is
-MOST_TEXTS = 12  # frames by which one may be compressed: those that were under way when an agent was lost
+MOST_TEXTS = 20  # frames by which one may be compressed: those that were under way when an agent was lost, and ten
+LARGEST_UNASKED = 8000  # letters of one
 Keep = Callable[[str, str, str | bytes, float], None]
 Refuse = Callable[[str, str, str], None]
 
@@ -149,7 +150,7 @@ class Pulls:
         newest.ahead.answered(requested_s, head.now_s - waited_s, now_s)
         if head.refused:
             self._refuse(vehicle, kind, head.refused)
-        # By our clock, and no later than it was: the pull was at the agent after `requested_s`, and no clock runs wild.
+        # By our clock, and no later than it was: the pull was at the agent after `requested_s`.
         sent_s = max(requested_s + waited_s, newest.ahead.earliest(head.now_s, now_s))
         put_s = min(sent_s, now_s) - max(0.0, head.age_s)
         try:
@@ -160,6 +161,8 @@ class Pulls:
     def take_unasked(self, vehicle: str, here: wire.Here) -> None:
         """The state of an announcement, where somebody looks, and how old it is at most is known."""
         newest = self._newest.get((vehicle, "state"))
+        if len(here.state) > LARGEST_UNASKED:
+            return
         if newest is None or here.run != newest.run or not (base := newest.texts.get(here.base)):
             return
         try:

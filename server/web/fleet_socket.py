@@ -41,7 +41,7 @@ class FleetCommands(CommandsOfPage):
         """Have a command carried out after those to the same car before it in its lane."""
         vehicle = message.get("vehicle")
         car = vehicle if isinstance(vehicle, str) and vehicle in self._bus.vehicles else ""
-        await self._orders.add(message, f"{lane_of(message.get('kind'))} {car}")
+        await self._orders.add(message, lane_of(message.get("kind")), car)
 
     async def carry_out(self, message: dict[str, Any], waited_s: float = 0.0) -> None:
         """Have the session of the car carry out a command that came `waited_s` ago, and reply."""

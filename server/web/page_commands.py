@@ -25,9 +25,9 @@ TOO_MANY = "Too many commands at once from this page: wait a second."
 NOT_A_VIEWERS = "This device is paired as a viewer and cannot make changes."
 NO_HELLO = "Not carried out: this page has not sent its hello yet."
 NOT_FROM_A_REPLAY = "This page shows a replay and cannot send commands. Return to live first."
+SLOW_REPLAY = "The replay takes too long to answer earlier requests: try again."
 SENT_BY_ITSELF = frozenset({"outcome", "position"})
 ANSWERED_WITHIN_S = 3.0  # a session carries out what reaches it until then
-WAITED = "it waited {waited_s:.1f} s for earlier commands of this page, and was not sent any more"
 
 
 async def passed_on(
@@ -35,14 +35,15 @@ async def passed_on(
 ) -> Mapping[str, Any]:
     """The answer of the vehicle's session to a command of a page, under the command's id in all logs.
 
-    `waited_s`: how long ago it came; its time to reach the session counts from then.
+    `waited_s`: how long ago it came. What is late by that is not carried out, and is in the log of the car.
     """
+    kind, ago_s = message.get("kind"), message.get("pressed_ago_s", 0.0)
+    if kind in commands.COMES_WITHIN_S and "heard_ms" not in message and isinstance(ago_s, int | float):
+        message = {**message, "pressed_ago_s": ago_s + waited_s}
     with log_context.tracing(message.get("id")):
         within_s = commands.comes_within_s(message)
         left_s = (ANSWERED_WITHIN_S if within_s is None else within_s) - waited_s
         try:
-            if left_s <= 0:
-                raise NotServed(WAITED.format(waited_s=waited_s))
             answer = await bus.request(vehicle, message, deadline_s=ANSWERED_WITHIN_S, comes_within_s=left_s)
         except NotServed as why:
             answer = messages.not_served(why, bus.trouble(vehicle) if fleet else None)
@@ -185,7 +186,7 @@ class PageCommands(CommandsOfPage):
     async def carry_out(self, message: dict[str, Any], waited_s: float = 0.0) -> None:
         """Have the session carry out a command, or the page's own replay, and reply."""
         if message.get("kind") == "replay":
-            await self.replay(message)
+            await self.replay(message, waited_s)
         else:
             await self.command(message, waited_s)
 
@@ -232,10 +233,13 @@ class PageCommands(CommandsOfPage):
         cars = set(self._bus.vehicles).intersection(named) - {self._vehicle}
         self._announcements.forward(status, self._who, cars)
 
-    async def replay(self, message: Mapping[str, Any]) -> None:
-        """Have the page's own replay carry out an order, and reply."""
+    async def replay(self, message: Mapping[str, Any], waited_s: float = 0.0) -> None:
+        """Have the page's own replay carry out an order that came `waited_s` ago, and reply."""
         id = self._id_of(message)
         if id is None:
+            return
+        if waited_s > ANSWERED_WITHIN_S:
+            self._send(messages.refusal(id, SLOW_REPLAY))
             return
         if not self._allowed.takes(self._now()):
             self._send(messages.refusal(id, TOO_MANY))

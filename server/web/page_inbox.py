@@ -136,7 +136,8 @@ async def run_tasks(
     def ended(task: asyncio.Task[None]) -> None:
         if not is_leaving and (task.cancelled() or task.exception() is not None):
             error = None if task.cancelled() else task.exception()
-            log.error("the %s ended: %s", task.get_name(), error or "it was cancelled", exc_info=error)
+            name = task.get_name().removeprefix("page ")
+            log.error("the %s of a page ended: %s", name, error or "it was cancelled", exc_info=error)
             reader.cancel()
 
     for task in others:
@@ -156,5 +157,4 @@ async def run_tasks(
         await leave()
         for task in others:
             task.cancel()
-            with contextlib.suppress(asyncio.CancelledError, *_GONE):
-                await task
+        await asyncio.gather(*others, return_exceptions=True)

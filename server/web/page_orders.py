@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections import defaultdict
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
 from typing import Any
 
+log = logging.getLogger("catgraph.web")
+
 MOST_WAITING = 100  # orders; then the reader waits as well, and so does the page
-REPORTS = "reports"  # the lane of what a page sends by itself: more at once would only fill a slow radio
+# The lanes of what a page sends by itself: one of each at a time, more would only fill a slow radio.
+REPORTS, STATUS = "reports", "status"
 
 
 class PageOrders:
@@ -29,10 +33,10 @@ class PageOrders:
         self._carry_out = carry_out
         self._pass_on = pass_on
         self._room = asyncio.Semaphore(MOST_WAITING)
-        self._calls: asyncio.Queue[tuple[str, Callable[[], Awaitable[None]]]] = asyncio.Queue()
-        self._turns: defaultdict[str, asyncio.Lock] = defaultdict(
-            asyncio.Lock
-        )  # by lane; those who wait have it in turn
+        self._calls: asyncio.Queue[tuple[tuple[str, str], Callable[[], Awaitable[None]]]] = asyncio.Queue()
+        # By lane and car; those who wait have it in turn.
+        self._turns: defaultdict[tuple[str, str], asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._reports: dict[str, dict[str, Any]] = {}  # by id, those that wait
         self._status: Mapping[str, Any] | None = None  # waits for its turn
         self._unfinished = 0
 
@@ -41,19 +45,30 @@ class PageOrders:
         """Whether an order waits or is being carried out."""
         return self._unfinished > 0
 
-    async def add(self, order: dict[str, Any], lane: str) -> None:
-        """To be carried out after those of the same lane that came before; of lanes there are few."""
+    async def add(self, order: dict[str, Any], lane: str, car: str = "") -> None:
+        """To be carried out after those of the same lane and car that came before; of both there are few.
+
+        A report takes the place of one with its id that still waits. The time of an order counts from now, that of a
+        report from its turn.
+        """
+        if lane == REPORTS:
+            is_new = (id := str(order.get("id"))) not in self._reports
+            self._reports[id] = order
+            if not is_new:
+                return
+            call = partial(self._carry_out_report, id)
+        else:
+            call = partial(self._carry_out_order, order, self._now())
         self._unfinished += 1
-        came_s = self._now()
         await self._room.acquire()
-        self._calls.put_nowait((lane, partial(self._carry_out_one, order, came_s)))
+        self._calls.put_nowait(((lane, car), call))
 
     def add_status(self, status: Mapping[str, Any]) -> None:
-        """To be passed on as a report, in place of one that still waits."""
+        """To be passed on once the one before was answered, in place of one that still waits."""
         is_new = self._status is None
         self._status = status
         if is_new:
-            self._calls.put_nowait((REPORTS, self._pass_on_newest))
+            self._calls.put_nowait(((STATUS, ""), self._pass_on_newest))
 
     async def finished(self) -> None:
         """Wait until all that came was carried out."""
@@ -66,13 +81,28 @@ class PageOrders:
                 lane, call = await self._calls.get()
                 group.create_task(self._in_turn(lane, call), name="order of a page")
 
-    async def _in_turn(self, lane: str, call: Callable[[], Awaitable[None]]) -> None:
-        async with self._turns[lane]:
-            await call()
-        self._calls.task_done()
+    async def _in_turn(self, lane: tuple[str, str], call: Callable[[], Awaitable[None]]) -> None:
+        try:
+            async with self._turns[lane]:
+                await call()
+        except Exception:  # a fault of ours: the other orders are carried out
+            log.exception("an order of a page failed")
+        finally:
+            self._calls.task_done()
 
-    async def _carry_out_one(self, order: dict[str, Any], came_s: float) -> None:
-        await self._carry_out(order, self._now() - came_s)
+    async def _carry_out_order(self, order: dict[str, Any], came_s: float) -> None:
+        try:
+            await self._carry_out(order, self._now() - came_s)
+        finally:
+            self._end()
+
+    async def _carry_out_report(self, id: str) -> None:
+        try:
+            await self._carry_out(self._reports.pop(id), 0.0)
+        finally:
+            self._end()
+
+    def _end(self) -> None:
         self._unfinished -= 1
         self._room.release()
 

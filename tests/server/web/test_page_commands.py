@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 from collections.abc import AsyncIterator, Callable, Mapping
 from types import SimpleNamespace
 from typing import Any, cast
@@ -95,33 +96,50 @@ async def test_a_command_waits_for_no_answer_to_a_status(is_fleet: bool) -> None
         assert [(round(at_s, 3), kind) for at_s, kind in reached] == [(0.0, "acknowledge")]
 
 
-async def test_a_command_that_waits_for_slow_ones_is_carried_out_in_its_time_or_not_at_all() -> None:
-    reached: list[tuple[float, object]] = []
+async def test_the_time_of_a_command_counts_from_when_it_came() -> None:
+    reached: list[tuple[object, float, float, float]] = []
     loop = asyncio.get_running_loop()
+    bus = LocalBus(Journal(None), now=loop.time)
 
-    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
-        reached.append((loop.time() - began_s, command["id"]))
-        if str(command["id"]).startswith("slow"):
-            await asyncio.sleep(60)
+    async def request(
+        _: str, command: Mapping[str, Any], *, deadline_s: float, comes_within_s: float
+    ) -> Mapping[str, Any]:
+        reached.append((command["id"], command.get("pressed_ago_s", 0.0), deadline_s, round(comes_within_s, 3)))
+        await asyncio.sleep(2.0)
         return {"ok": True}
 
-    bus = LocalBus(Journal(None), now=loop.time)
-    bus.serve("ocelot", car)
-    replies: list[Any] = []
-    page = page_of(bus, send=replies.append, now=loop.time)
+    bus.request = request  # type: ignore[assignment, method-assign]
+    page = page_of(bus, now=loop.time)
     page.begin({"kind": "hello"})
-    began_s = loop.time()
     async with at_work(page):
-        await page.add({"kind": "mark", "id": "slow"})
-        await page.add({"kind": "mark", "id": "too long"})
-        await asyncio.sleep(1.0)
-        await page.add({"kind": "mark", "id": "in time"})
+        await page.add({"kind": "pause", "id": "1"})
+        await page.add({"kind": "acknowledge", "id": "2"})
+        await page.add({"kind": "pause", "id": "3", "pressed_ago_s": 0.25})
+        await page.add({"kind": "pause", "id": "4", "heard_ms": 5.0})
         await page.finished()
-    assert [(round(at_s, 3), id) for at_s, id in reached] == [(0.0, "slow"), (3.0, "in time")]
-    by_id = {one["id"]: one for one in replies if "id" in one}
-    assert by_id["too long"]["outcome"] == "not_delivered"
-    assert "3.0 s for earlier commands" in by_id["too long"]["reason"]
-    assert by_id["in time"]["ok"]
+    assert reached == [("1", 0.0, 3.0, 0.5), ("2", 0.0, 3.0, 1.0), ("3", 4.25, 3.0, -3.5), ("4", 0.0, 3.0, -5.5)]
+
+
+async def test_one_that_fails_ends_no_other() -> None:
+    reached: list[object] = []
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        if command["kind"] == "pause":
+            raise KeyError("a fault")
+        await asyncio.sleep(0.5)
+        reached.append(command["id"])
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=lambda: 0.0)
+    bus.serve("ocelot", car)
+    page = page_of(bus)
+    page.begin({"kind": "hello"})
+    async with at_work(page):
+        for id, kind in (("1", "release"), ("2", "pause"), ("3", "slow_down"), ("4", "acknowledge")):
+            await page.add({"kind": kind, "id": id, "alarm": "speed", "occurrence": 1})
+        await page.finished()
+        assert not page.are_unfinished
+    assert sorted(reached, key=str) == ["1", "3", "4"]
 
 
 async def test_what_slows_the_car_waits_for_nothing_else() -> None:
@@ -147,6 +165,59 @@ async def test_what_slows_the_car_waits_for_nothing_else() -> None:
         (0.0, "pause"), (0.0, "outcome"), (0.0, "release"),
         (0.2, "position"), (0.2, "slow_down"),  # after those of their lanes
     ]  # fmt: skip
+
+
+async def test_of_reports_that_wait_the_newest_of_an_id_is_passed_on_and_has_its_whole_time() -> None:
+    reached: list[tuple[float, object, object]] = []
+    loop = asyncio.get_running_loop()
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        reached.append((round(loop.time() - began_s, 3), command["id"], command["ago_s"]))
+        await asyncio.sleep(60 if command["id"] == "1?" else 2.0)
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=loop.time)
+    bus.serve("ocelot", car)
+    replies: list[Any] = []
+    page = page_of(bus, send=replies.append, now=loop.time)
+    page.begin({"kind": "hello"})
+    began_s = loop.time()
+    async with at_work(page):
+        for ago_s in (5.0, 6.0, 7.0):
+            for of in ("1", "2"):
+                await page.add({"kind": "outcome", "id": f"{of}?", "of": of, "ago_s": ago_s})
+            await asyncio.sleep(0.5)
+        await page.finished()
+    assert reached == [(0.0, "1?", 5.0), (3.0, "2?", 7.0), (5.0, "1?", 7.0)]
+    assert [one["id"] for one in replies if one.get("ok")] == ["2?"]
+
+
+@pytest.mark.parametrize("trip_s", [0.1, 0.6, 1.0, 2.9])
+async def test_the_status_of_a_page_is_as_often_passed_on_as_it_is_answered(trip_s: float) -> None:
+    """Beside its position every second, and outcomes that are requested; the lease of control lasts 3 s."""
+    statuses: list[float] = []
+    loop = asyncio.get_running_loop()
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        if command["kind"] == "present":
+            statuses.append(loop.time())
+        await asyncio.sleep(trip_s)
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=loop.time)
+    bus.serve("ocelot", car)
+    page = page_of(bus, now=loop.time)
+    page.begin({"kind": "hello"})
+    async with at_work(page):
+        for n in range(30):
+            page.present(PRESENT)
+            await page.add({"kind": "position", "id": "position", "phone": "Ann"})
+            await page.add({"kind": "outcome", "id": f"{n % 3}?", "of": f"{n % 3}", "ago_s": 5.0})
+            await asyncio.sleep(1.0)
+        async with asyncio.timeout(6 * trip_s + 0.1):
+            await page.finished()
+    longest_s = max(after - before for before, after in itertools.pairwise(statuses))
+    assert longest_s <= max(1.0, trip_s) + 0.001
 
 
 async def test_a_command_to_one_car_waits_for_none_to_another() -> None:
