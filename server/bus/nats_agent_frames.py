@@ -12,7 +12,7 @@ from typing import Any
 from server.bus import nats_wire as wire
 from server.bus.bus import ALL, SUMMARY, Frame
 from server.bus.local import LocalBus
-from server.bus.nats_clock import Steady
+from server.bus.nats_clock import Steady, slewed_s
 
 log = logging.getLogger("catgraph.bus")
 
@@ -21,6 +21,7 @@ MOST_READERS = 100
 FIRST_EVERY_S = 0.1  # a state is made
 LARGEST_FIRST = 4000  # bytes of one: by the state that the node has it is 0.6 to 1.1 kB
 LOOKED_AT_S = 600.0  # before the return, at most: of others none is made
+LOOKED_LAST_S = 4.0  # before the last pull of any vehicle: a node repeats one that was lost after 3.5 s
 MOST_FIRST = 10  # states: the first pull comes a round trip after the announcement, or later where a packet was lost
 
 
@@ -88,16 +89,19 @@ class SentFrames:
     so that a hop that stalls finds nothing old. `now`: a monotonic clock in seconds.
     """
 
-    def __init__(self, bus: LocalBus, run: str, now: Callable[[], float], clock: Steady | None = None) -> None:
+    def __init__(
+        self, bus: LocalBus, run: str, now: Callable[[], float], slewed: Callable[[], float] = slewed_s
+    ) -> None:
         self._bus = bus
         self._run = run
         self._now = now
         self._bases = defaultdict[tuple[str, str], wire.Bases](wire.Bases)
         self._have: dict[str, tuple[int, float]] = {}  # the state that the node had at the last pull, and when that was
         self._left: dict[str, int] = {}  # so many go unasked
-        self._clock = (
-            clock or Steady()
-        )  # noted at the last pull: after it nodes know the age of a state by this clock alone
+        self._slewed = slewed
+        # Noted when each of the states was sent by which others are compressed: from its answer on a node that has it
+        # may know the age of a state by this clock alone.
+        self._clocks = defaultdict[str, dict[int, Steady]](dict)
 
     def encoded(self, came_s: float, frame: Frame | None, refused: str = "") -> bytes:
         """A frame as it is sent now; None: that there is no newer one, or why it is refused. The pull came then."""
@@ -116,12 +120,23 @@ class SentFrames:
         data = wire.compressed(data, bases.get(pull.have) if pull.is_base and pull.run == self._run else b"")
         if frame is not None and isinstance(frame.payload, str):
             bases.add(frame.number, frame.payload)
+            if kind == "state":
+                self._note_clock(vehicle, frame.number)
         return data
+
+    def _note_clock(self, vehicle: str, number: int) -> None:
+        clocks = self._clocks[vehicle]
+        if number not in clocks:
+            clocks[number] = Steady(self._slewed)
+            clocks[number].note(self._now())
+        while len(clocks) > wire.MOST_BASES:
+            del clocks[next(iter(clocks))]
 
     def begin_first(self) -> list[str]:
         """The agent is back; `first_due`."""
-        now_s = self._now()
-        self._left = {one: MOST_FIRST for one, (_, at_s) in self._have.items() if now_s - at_s <= LOOKED_AT_S}
+        last_s = max((at_s for _, at_s in self._have.values()), default=0.0)
+        from_s = max(last_s - LOOKED_LAST_S, self._now() - LOOKED_AT_S)
+        self._left = {one: MOST_FIRST for one, (_, at_s) in self._have.items() if at_s >= from_s}
         return self.first_due
 
     def note_pull(self, vehicle: str, kind: str, pull: wire.Pull) -> None:
@@ -130,7 +145,6 @@ class SentFrames:
         self._left.pop(vehicle, None)
         if pull.inflates and pull.is_base and pull.run == self._run:
             self._have[vehicle] = pull.have, self._now()
-            self._clock.note(self._now())
 
     @property
     def first_due(self) -> list[str]:
@@ -152,7 +166,8 @@ class SentFrames:
         bases, base, frame = self._bases[vehicle, "state"], self._have[vehicle][0], self._bus.newest(vehicle, "state")
         if frame is None or not isinstance(frame.payload, str) or not (text := bases.get(base)):
             return {}
-        if not self._clock.is_steady(self._now()):
+        clock = self._clocks[vehicle].get(base)
+        if clock is None or not clock.is_steady(self._now()):
             return {}
         if bases.get(frame.number):  # none was made since
             return {}
@@ -160,6 +175,7 @@ class SentFrames:
         if len(data) > LARGEST_FIRST:
             return {}
         bases.add(frame.number, frame.payload)
+        self._note_clock(vehicle, frame.number)
         return {"state": base64.b64encode(data).decode(), "base": base}
 
 

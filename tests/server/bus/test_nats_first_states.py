@@ -97,7 +97,7 @@ async def test_behind_a_gap_a_few_states_go_unasked_until_the_first_pull() -> No
 async def test_none_goes_unasked_where_a_node_cannot_know_its_age_or_nobody_looked_for_long() -> None:
     slewed_s = 0.0
     async with local_buses() as both:
-        frames = SentFrames(both.session, "a", both.clock, Steady(lambda: slewed_s))
+        frames = SentFrames(both.session, "a", both.clock, lambda: slewed_s)
         pull = wire.Pull(have=1, run="a", inflates=True, is_base=True)
 
         def sent(number: int) -> bool:

@@ -1,0 +1,120 @@
+"""What an agent whose clock was slewed sends unasked behind a gap: no node takes a state for younger than it is."""
+
+from __future__ import annotations
+
+import base64
+import random
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from server.bus import nats_wire as wire
+from server.bus.journal import Journal
+from server.bus.local import LocalBus
+from server.bus.nats_agent_frames import SentFrames
+from server.bus.nats_clock import AgentAhead, Steady
+
+STATE = random.Random(1).randbytes(2000).hex()
+GAP = (60.0, 90.0)
+READ_S = 0.001
+
+
+async def nothing(_: Any) -> dict[str, Any]:
+    return {}
+
+
+class Node:
+    """Of one vehicle, pulled without delay: its bound of the agent's clock is as low as one can be."""
+
+    def __init__(self, vehicle: str) -> None:
+        self.vehicle = vehicle
+        self.ahead = AgentAhead(Steady(lambda: 0.0))
+        self.number = 0
+        self.texts = wire.Bases()
+
+
+class Agent:
+    """Its clock is slewed by `rate` between two moments. `t` is the true time [s]."""
+
+    def __init__(self, rate: float, from_s: float, to_s: float) -> None:
+        self.t = 0.0
+        self._slew = (rate, from_s, to_s)
+        self._made = 0
+        self.bus = LocalBus(Journal(None), now=self.now)
+        for vehicle in ("ocelot", "margay"):
+            self.bus.serve(vehicle, nothing)
+        self.frames = SentFrames(self.bus, "a", self.now, self.slewed_s)
+
+    def slewed_s(self) -> float:
+        rate, from_s, to_s = self._slew
+        return rate * (min(max(self.t, from_s), to_s) - from_s)
+
+    def now(self) -> float:
+        return 1000.0 + self.t + self.slewed_s()
+
+    def pull(self, node: Node, *, is_answer_lost: bool = False) -> None:
+        pull = wire.Pull(have=node.number, run="a", inflates=True, is_base=node.number > 0)
+        self.frames.note_pull(node.vehicle, "state", pull)
+        if is_answer_lost:
+            return
+        self._made += 1
+        self.bus.put(node.vehicle, "state", f"{STATE}{self._made}")
+        frame = self.bus.newest(node.vehicle, "state")
+        assert frame is not None
+        self.frames.compressed(node.vehicle, "state", self.frames.encoded(self.now(), frame), frame, pull)
+        node.ahead.answered(self.t, self.now(), self.t)
+        node.number = frame.number
+        node.texts.add(frame.number, str(frame.payload))
+
+    def unasked(self, nodes: list[Node]) -> Iterator[tuple[Node, float]]:
+        """Behind the gap: who takes a state, and by how much it takes it for older than it is [s]."""
+        self.t = GAP[1]
+        self.frames.begin_first()
+        for vehicle in ("ocelot", "margay"):
+            self.bus.put(vehicle, "state", f"{STATE}new")
+            here = self.frames.announcement(vehicle, 2)
+            for node in nodes:
+                if node.vehicle == vehicle and here.state and (base := node.texts.get(here.base)):
+                    head, _ = wire.decode_frame(base64.b64decode(here.state), base)
+                    yield node, self.t - (node.ahead.earliest(head.now_s, self.t) - head.age_s)
+
+
+@pytest.mark.parametrize("rate", [0.083, -0.083])
+@pytest.mark.parametrize("until_s", [30.0, 58.0])
+async def test_of_several_vehicles_one_that_was_not_pulled_up_to_the_gap(until_s: float, rate: float) -> None:
+    agent = Agent(rate, until_s, GAP[0] - 1)
+    ocelot, margay = nodes = [Node("ocelot"), Node("margay")]
+    while agent.t < GAP[0]:
+        agent.t += 0.5
+        agent.pull(ocelot)
+        if agent.t <= until_s:
+            agent.pull(margay)
+    found = dict(agent.unasked(nodes))
+    assert ocelot in found, "one that was pulled up to the gap has its states at once"
+    assert min(found.values()) >= -READ_S
+
+
+@pytest.mark.parametrize("rate", [0.083, -0.083])
+async def test_of_several_nodes_one_whose_answers_were_lost_before_the_gap(rate: float) -> None:
+    agent = Agent(rate, 58.0, GAP[0])
+    nodes = [Node("ocelot"), Node("ocelot")]
+    while agent.t < GAP[0]:
+        agent.t += 0.5
+        for node in nodes:
+            agent.pull(node, is_answer_lost=agent.t > 58.0)
+    assert all(older_s >= -READ_S for _, older_s in agent.unasked(nodes))
+
+
+async def test_what_was_not_pulled_in_the_last_seconds_before_the_gap_is_left_to_a_pull() -> None:
+    agent = Agent(0.0, 0.0, 1.0)
+    ocelot, margay = Node("ocelot"), Node("margay")
+    for node in (ocelot, margay):
+        agent.pull(node)
+        agent.pull(node)
+    agent.t = 3.9
+    agent.pull(ocelot)
+    assert agent.frames.begin_first() == ["ocelot", "margay"]
+    agent.t = 4.1
+    agent.pull(ocelot)
+    assert agent.frames.begin_first() == ["ocelot"]
