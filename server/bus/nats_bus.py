@@ -21,10 +21,11 @@ NOTIFY_EVERY_S = 0.5
 REFUSED_FOR_S = FRAME_LIVES_S + wire.PULL_WAITS_S  # after the last refusal
 
 
-Read = Callable[[str, str, str | bytes, float], str | bytes]  # of vehicle, kind, payload, age [s]; raises Malformed
+# Of vehicle, kind, payload, age [s] at most, and by how much that is likely too great; raises Malformed.
+Read = Callable[[str, str, str | bytes, float, float], str | bytes]
 
 
-def as_it_is(vehicle: str, kind: str, payload: str | bytes, age_s: float) -> str | bytes:
+def as_it_is(vehicle: str, kind: str, payload: str | bytes, age_s: float, excess_s: float) -> str | bytes:
     return payload
 
 
@@ -190,9 +191,9 @@ class NatsBus:
         is_wanted = len(self.vehicles) > 1 or self._wanted.get((ALL, SUMMARY), 0) > 0
         return is_wanted and self._watchers.viewers(ALL) > 0
 
-    def _take_frame(self, vehicle: str, kind: str, payload: str | bytes, put_s: float) -> None:
+    def _take_frame(self, vehicle: str, kind: str, payload: str | bytes, put_s: float, excess_s: float) -> None:
         """Raises Malformed."""
-        payload = self._read_frame(vehicle, kind, payload, self._now() - put_s)
+        payload = self._read_frame(vehicle, kind, payload, self._now() - put_s, excess_s)
         whose, name = (ALL, vehicle) if kind == SUMMARY else (vehicle, kind)
         self._keep(whose, name, payload, put_s)
         self._refused.pop((vehicle, kind), None)

@@ -1,4 +1,5 @@
-"""By how much an agent's clock is ahead of the node's, at most: how old a frame is that was held up, or not pulled."""
+"""By how much an agent's clock is ahead of the node's: at most, by which a frame that was held up, or not pulled, is no
+older than stated, and likely, from which the time of an order counts."""
 
 from __future__ import annotations
 
@@ -58,3 +59,27 @@ class AgentAhead:
         if now_s > self._at_s and not self._steady.is_steady(now_s):
             return -math.inf
         return agent_s - self._most_s - (DRIFT * (now_s - self._at_s) + ROUNDING_S if now_s > self._at_s else 0.0)
+
+
+class LikelyAhead:
+    """Of one run of an agent, with times as those of `AgentAhead`: where the least way there takes as long as the least
+    way back. Both count for as long as no clock is slewed by more than `DRIFT`."""
+
+    def __init__(self) -> None:
+        self._least_s, self._most_s = -math.inf, math.inf
+        self._at_s = 0.0
+
+    def answered(self, requested_s: float, reached_s: float, sent_s: float, now_s: float) -> None:
+        """What was sent at `requested_s` reached the agent at `reached_s` of its clock, and its answer of `sent_s` is
+        here."""
+        drift_s = DRIFT * (now_s - self._at_s)
+        least_s, most_s = self._least_s - drift_s, self._most_s + drift_s
+        at_least_s, at_most_s = sent_s - now_s, reached_s - requested_s
+        if at_least_s > most_s or at_most_s < least_s:  # a clock was slewed, or stood still
+            least_s, most_s = -math.inf, math.inf
+        self._least_s, self._most_s = max(least_s, at_least_s), min(most_s, at_most_s)
+        self._at_s = now_s
+
+    def when(self, agent_s: float) -> float:
+        """When the agent's clock showed `agent_s`; after an answer."""
+        return agent_s - (self._least_s + self._most_s) / 2

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from nats.errors import Error as NatsError
 
 from server.bus import nats_wire as wire
-from server.bus.nats_clock import AgentAhead
+from server.bus.nats_clock import AgentAhead, LikelyAhead
 from server.bus.nats_questions import ANSWER_S, Questions
 
 MOST = 100  # pulls a second of one kind of frame, where an agent answers at once
@@ -26,7 +26,7 @@ SMOOTHING = 0.75
 MOST_UNDER_WAY = 6  # compressed, they are fewer bytes than one state is
 MOST_TEXTS = 20  # frames by which one may be compressed: those that were under way when an agent was lost, and ten
 LARGEST_UNASKED = 8000  # letters of one
-Keep = Callable[[str, str, str | bytes, float], None]
+Keep = Callable[[str, str, str | bytes, float, float], None]
 Refuse = Callable[[str, str, str], None]
 
 
@@ -39,6 +39,7 @@ class _Newest:
     run_requested_s: float = -math.inf  # when the pull was sent that brought the first one of this run
     texts: wire.Bases = field(default_factory=lambda: wire.Bases(MOST_TEXTS))  # none of a scan
     ahead: AgentAhead = field(default_factory=AgentAhead)
+    likely: LikelyAhead = field(default_factory=LikelyAhead)
 
 
 async def _ended(pulls: set[asyncio.Task[None]]) -> set[asyncio.Task[None]]:
@@ -48,7 +49,8 @@ async def _ended(pulls: set[asyncio.Task[None]]) -> set[asyncio.Task[None]]:
 
 
 class Pulls:
-    """`keep` gets vehicle, kind, payload, and when it was put by our clock `now`, in seconds: at the latest then.
+    """`keep` gets vehicle, kind, payload, when it was put by our clock `now`, in seconds, no later than it was, and how
+    long after that it likely was put.
 
     It raises Malformed. `refuse` gets vehicle, kind, and why there is no frame, as a sentence.
     """
@@ -141,20 +143,20 @@ class Pulls:
             if requested_s < newest.run_requested_s:  # of a run that has ended since, and comes late
                 return None
             newest.number, newest.run, newest.run_requested_s = 0, head.run, requested_s
-            newest.texts, newest.ahead = wire.Bases(MOST_TEXTS), AgentAhead()
+            newest.texts, newest.ahead, newest.likely = wire.Bases(MOST_TEXTS), AgentAhead(), LikelyAhead()
         waited_s, now_s = max(0.0, head.waited_s), self._now()
         trip_s = max(0.0, now_s - requested_s - waited_s)
         self._trips_s[vehicle] = trip_s + SMOOTHING * (self._trips_s.get(vehicle, trip_s) - trip_s)
         self._questions.set_clock(vehicle, head.run, head.now_s)
         newest.ahead.received(head.now_s, now_s)
         newest.ahead.answered(requested_s, head.now_s - waited_s, now_s)
+        newest.likely.answered(requested_s, head.now_s - waited_s, head.now_s, now_s)
         if head.refused:
             self._refuse(vehicle, kind, head.refused)
         # By our clock, and no later than it was: the pull was at the agent after `requested_s`.
         sent_s = max(requested_s + waited_s, newest.ahead.earliest(head.now_s, now_s))
-        put_s = min(sent_s, now_s) - max(0.0, head.age_s)
         try:
-            self._take(vehicle, kind, newest, head, payload, put_s)
+            self._take(vehicle, kind, newest, head, payload, min(sent_s, now_s))
         except wire.Malformed as why:
             await self._not_read(vehicle, kind, why)
 
@@ -169,22 +171,23 @@ class Pulls:
             head, payload = wire.decode_frame(base64.b64decode(here.state), base)
             now_s = self._now()
             newest.ahead.received(head.now_s, now_s)
-            put_s = newest.ahead.earliest(head.now_s, now_s) - max(0.0, head.age_s)
-            if head.run == newest.run and put_s > -math.inf:
-                self._take(vehicle, "state", newest, head, payload, min(put_s, now_s))
+            sent_s = newest.ahead.earliest(head.now_s, now_s)
+            if head.run == newest.run and sent_s > -math.inf:
+                self._take(vehicle, "state", newest, head, payload, min(sent_s, now_s))
         except ValueError as why:  # also of base64
             self._questions.refuse(wire.subject(vehicle, "here"), wire.Malformed(str(why)[:200]))
 
     def _take(
-        self, vehicle: str, kind: str, newest: _Newest, head: wire.FrameHead, payload: str | bytes, put_s: float
+        self, vehicle: str, kind: str, newest: _Newest, head: wire.FrameHead, payload: str | bytes, sent_s: float
     ) -> None:
-        """Raises Malformed."""
+        """`sent_s`: no later than it was sent. Raises Malformed."""
         if head.number <= newest.number:
             return
         newest.number = head.number
         if isinstance(payload, str):
             newest.texts.add(head.number, payload)
-        self._keep(vehicle, kind, payload, put_s)
+        likely_later_s = max(0.0, newest.likely.when(head.now_s) - sent_s)
+        self._keep(vehicle, kind, payload, sent_s - max(0.0, head.age_s), likely_later_s)
 
     async def _not_read(self, vehicle: str, kind: str, why: wire.Malformed) -> None:
         self._questions.refuse(wire.subject(vehicle, f"pull.{kind}"), why)

@@ -33,6 +33,7 @@ class ServerState(TypedDict):
     frames_skipped: Annotated[int, doc("replaced by newer ones before a page took them")]
     loop_lag_ms: NotRequired[float]
     challenge: NotRequired[Annotated[str, doc("of an agent: what a device signs with its next order")]]
+    excess_ms: NotRequired[Annotated[int, doc("of a web node: the state was likely made so long after `time_ms`")]]
 
 
 class HeldState(TypedDict):

@@ -40,19 +40,22 @@ class RemoteFrames:
     def __init__(self, wall_ms: Callable[[], int]) -> None:
         self._wall_ms = wall_ms
 
-    def __call__(self, vehicle: str, kind: str, payload: str | bytes, age_s: float) -> str | bytes:
-        """What pages get; `age_s`: since it was put, at most. Raises Malformed."""
+    def __call__(
+        self, vehicle: str, kind: str, payload: str | bytes, age_s: float, excess_s: float = 0.0
+    ) -> str | bytes:
+        """What pages get; `age_s`: since it was put, at most, and likely less by `excess_s`. Raises Malformed."""
         if kind == SUMMARY:
             return summary(payload, self._wall_ms() - round(1000 * age_s))
         if kind == "state":
-            return state(vehicle, payload, self._wall_ms() - round(1000 * age_s))
+            return state(vehicle, payload, self._wall_ms() - round(1000 * age_s), round(1000 * excess_s))
         return scan(payload)
 
 
-def state(vehicle: str, payload: str | bytes, time_ms: int) -> str:
+def state(vehicle: str, payload: str | bytes, time_ms: int, excess_ms: int = 0) -> str:
     """The state as if it had been made here: `time_ms` is the time of day by this node's clock when it was put.
 
-    The page reads the delay of a frame from it; the clock of the car may show another time. Raises Malformed.
+    The page reads the delay of a frame from it; the clock of the car may show another time. It was put no earlier than
+    that, likely `excess_ms` later: from there the page counts the time of an order. Raises Malformed.
     """
     found = _loaded(payload)
     if found.get("kind") != "state" or found.get("vehicle") != vehicle or not isinstance(found.get("server"), dict):
@@ -61,7 +64,7 @@ def state(vehicle: str, payload: str | bytes, time_ms: int) -> str:
     if wrong:
         raise wire.Malformed(f"a state with a wrong {', '.join(sorted(wrong))}"[:200])
     found = {name: found[name] for name in LiveState.__annotations__ if name in found}
-    found["server"]["time_ms"] = time_ms
+    found["server"] |= {"time_ms": time_ms, "excess_ms": excess_ms}
     if isinstance(slow_down := found.get("decelerate"), dict):
         _rename(slow_down, "state")
     try:

@@ -2151,6 +2151,8 @@ export interface ServerState {
   loop_lag_ms?: number;
   /** of an agent: what a device signs with its next order */
   challenge?: string;
+  /** of a web node: the state was likely made so long after `time_ms` */
+  excess_ms?: number;
 }
 
 export interface SessionState {

@@ -288,5 +288,5 @@ function ownBuild() {
 
 /** By which the server sees how long an order was on its way: the newest state that this page had, and how old it was. @param {string} kind @param {Store} store */
 function momentOf(kind, { frame, lag_s }) {
-  return kind === 'replay' || !frame || frame.replay ? {} : { heard_ms: frame.server.time_ms, held_s: lag_s };
+  return kind === 'replay' || !frame || frame.replay ? {} : { heard_ms: frame.server.time_ms, held_s: Math.max(0, lag_s - (frame.server.excess_ms ?? 0) / 1000) };
 }

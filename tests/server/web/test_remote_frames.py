@@ -45,8 +45,9 @@ def state(**more: Any) -> str:
 
 
 def test_a_state_gets_the_time_at_which_it_was_put_by_the_clock_of_the_node() -> None:
-    found = orjson.loads(READ("ocelot", "state", state(more=1, replay={"id": "x"}), 0.25))
-    assert found["server"] == {**SERVER, "time_ms": NOW_MS - 250}
+    sent = state(more=1, replay={"id": "x"}, server={**SERVER, "excess_ms": 9})
+    found = orjson.loads(READ("ocelot", "state", sent, 0.25, 0.12))
+    assert found["server"] == {**SERVER, "time_ms": NOW_MS - 250, "excess_ms": 120}
     assert found == orjson.loads(state(server=found["server"])), "what is not declared of a live state is left out"
 
 
