@@ -14,13 +14,31 @@ log = logging.getLogger("catgraph.web")
 MOST_WAITING = 100  # orders; then the reader waits as well, and so does the page
 # The lanes of what a page sends by itself: one of each at a time, more would only fill a slow radio.
 REPORTS, STATUS = "reports", "status"
+REPEATED = "slow_down"  # is pressed again where no answer comes
+
+
+class _Turns:
+    """Who has the turn of a lane, or waits for it."""
+
+    def __init__(self) -> None:
+        self._last: list[asyncio.Task[None]] = []  # at most one; those before it are over when it is
+        self._repeated: list[asyncio.Task[None]] = []  # orders of `REPEATED` since then
+
+    def waits_for(self, *, is_repeated: bool) -> list[asyncio.Task[None]]:
+        return [one for one in self._last + ([] if is_repeated else self._repeated) if not one.done()]
+
+    def add(self, task: asyncio.Task[None], *, is_repeated: bool) -> None:
+        if is_repeated:
+            self._repeated = [*(one for one in self._repeated if not one.done()), task]
+        else:
+            self._last, self._repeated = [task], []
 
 
 class PageOrders:
     """Of one page: its orders of a lane one after the other, as they came, and of its statuses the newest.
 
-    A car that is lost answers nothing for seconds: an order waits for no other lane. `carry_out` is called with an
-    order and how long it waited [s], `pass_on` with a status. `now` is a monotonic clock [s].
+    A car that is lost answers nothing for seconds: an order waits for no other lane, and one to slow for none to slow.
+    `carry_out` is called with an order and how long it waited [s], `pass_on` with a status. `now` is a monotonic clock.
     """
 
     def __init__(
@@ -33,9 +51,8 @@ class PageOrders:
         self._carry_out = carry_out
         self._pass_on = pass_on
         self._room = asyncio.Semaphore(MOST_WAITING)
-        self._calls: asyncio.Queue[tuple[tuple[str, str], Callable[[], Awaitable[None]]]] = asyncio.Queue()
-        # By lane and car; those who wait have it in turn.
-        self._turns: defaultdict[tuple[str, str], asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._calls: asyncio.Queue[tuple[tuple[str, str], bool, Callable[[], Awaitable[None]]]] = asyncio.Queue()
+        self._turns = defaultdict[tuple[str, str], _Turns](_Turns)  # by lane and car
         self._reports: dict[str, dict[str, Any]] = {}  # by id, those that wait
         self._status: Mapping[str, Any] | None = None  # waits for its turn
         self._unfinished = 0
@@ -61,14 +78,14 @@ class PageOrders:
             call = partial(self._carry_out_order, order, self._now())
         self._unfinished += 1
         await self._room.acquire()
-        self._calls.put_nowait(((lane, car), call))
+        self._calls.put_nowait(((lane, car), order.get("kind") == REPEATED, call))
 
     def add_status(self, status: Mapping[str, Any]) -> None:
         """To be passed on once the one before was answered, in place of one that still waits."""
         is_new = self._status is None
         self._status = status
         if is_new:
-            self._calls.put_nowait(((STATUS, ""), self._pass_on_newest))
+            self._calls.put_nowait(((STATUS, ""), False, self._pass_on_newest))
 
     async def finished(self) -> None:
         """Wait until all that came was carried out."""
@@ -78,13 +95,16 @@ class PageOrders:
         """Carries out what comes, without end."""
         async with asyncio.TaskGroup() as group:
             while True:
-                lane, call = await self._calls.get()
-                group.create_task(self._in_turn(lane, call), name="order of a page")
+                lane, is_repeated, call = await self._calls.get()
+                turns = self._turns[lane]
+                work = self._in_turn(turns.waits_for(is_repeated=is_repeated), call)
+                turns.add(group.create_task(work, name="order of a page"), is_repeated=is_repeated)
 
-    async def _in_turn(self, lane: tuple[str, str], call: Callable[[], Awaitable[None]]) -> None:
+    async def _in_turn(self, waits_for: list[asyncio.Task[None]], call: Callable[[], Awaitable[None]]) -> None:
         try:
-            async with self._turns[lane]:
-                await call()
+            if waits_for:
+                await asyncio.wait(waits_for)
+            await call()
         except Exception:  # a fault of ours: the other orders are carried out
             log.exception("an order of a page failed")
         finally:

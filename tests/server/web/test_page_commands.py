@@ -167,6 +167,32 @@ async def test_what_slows_the_car_waits_for_nothing_else() -> None:
     ]  # fmt: skip
 
 
+async def test_an_order_to_slow_that_is_pressed_again_waits_for_no_answer_and_no_release_overtakes_it() -> None:
+    reached: list[tuple[float, object]] = []
+    loop = asyncio.get_running_loop()
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        reached.append((round(loop.time() - began_s, 3), command["id"]))
+        await asyncio.sleep(0.5)
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=loop.time)
+    bus.serve("ocelot", car)
+    page = page_of(bus, now=loop.time)
+    page.begin({"kind": "hello"})
+    began_s = loop.time()
+    async with at_work(page):
+        for n, kind in enumerate(("arm", "slow_down", "slow_down", "release", "slow_down")):
+            await page.add({"kind": kind, "id": f"{kind} {n}"})
+        await asyncio.sleep(0.7)
+        await page.add({"kind": "slow_down", "id": "slow_down 5"})
+        await page.finished()
+    assert reached == [
+        (0.0, "arm 0"), (0.5, "slow_down 1"), (0.5, "slow_down 2"), (1.0, "release 3"),
+        (1.5, "slow_down 4"), (1.5, "slow_down 5"),
+    ]  # fmt: skip
+
+
 async def test_of_reports_that_wait_the_newest_of_an_id_is_passed_on_and_has_its_whole_time() -> None:
     reached: list[tuple[float, object, object]] = []
     loop = asyncio.get_running_loop()
