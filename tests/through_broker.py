@@ -1,4 +1,4 @@
-"""`python -m tests.through_broker serve …`: the same server in three parts, an agent, a real broker and a web node.
+"""`python -m tests.through_broker MODULE serve …`: a server in three parts, an agent, a real broker and a web node.
 
 The tests of the page run against it with CATGRAPH_THROUGH_BROKER=1. Its parts end with it, also when it is killed.
 """
@@ -75,14 +75,15 @@ async def drain(out: asyncio.StreamReader) -> None:
 
 
 async def main(arguments: list[str]) -> None:
-    assert arguments[0] == "serve"
-    of_agent, of_page, data = parted(arguments[1:])
+    module, command, *options = arguments
+    assert command == "serve"
+    of_agent, of_page, data = parted(options)
     at_port = free_port()
     broker = f"nats://127.0.0.1:{at_port}"
     store = tempfile.mkdtemp()
     await start(nats_server(), "-a", "127.0.0.1", "-p", str(at_port), "-js", "-sd", store, listens=False)
     await asyncio.sleep(0.3)
-    python = (sys.executable, "-m", "server")
+    python = (sys.executable, "-m", module)
     names = [argument.split("=")[0] for argument in of_agent if "=" in argument.split("://")[0]]
     expected = [argument for name in names or ["car"] for argument in ("--expect", name)]
     agent = (*python, "agent", "--no-require-signed", "--broker", broker)  # the tests' own requests sign nothing

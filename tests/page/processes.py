@@ -61,14 +61,16 @@ class Process:
         self.console = ""  # for a program beside the car: the agent's own address, where a server is parted
 
     @property
-    def _module(self) -> str:
-        return "tests.through_broker" if IS_PARTED and self._arguments[0] == "serve" else self._given
+    def _modules(self) -> tuple[str, ...]:
+        """The one that is started, and the one that it starts as agent and node."""
+        is_parted = IS_PARTED and self._arguments[0] == "serve"
+        return ("tests.through_broker", self._given) if is_parted else (self._given,)
 
     async def start(self) -> Process:
         """Starts it and waits until it prints its address."""
         with contextlib.ExitStack() as files:
             self._process = await asyncio.create_subprocess_exec(
-                *(*self._within, sys.executable, "-m", self._module, *self._arguments),
+                *(*self._within, sys.executable, "-m", *self._modules, *self._arguments),
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 stderr=files.enter_context(self._log.open("ab")) if self._log else asyncio.subprocess.DEVNULL,
