@@ -147,13 +147,14 @@ async def until(found: Callable[[], Any], what: str, within_s: float = PATIENCE_
 
 @dataclass
 class Round:
-    """One slow-down: from its order, or from the fault that lost the operator, to the first release."""
+    """One slow-down: from its order, or from the fault that lost the operator, to its release."""
 
     what: str
     ordered: When
     began_ms: float = 0.0
     pressed_ms: float = 0.0  # the order that came in time
-    released_ms: float = 0.0
+    released_ms: float = 0.0  # the first one that was pressed
+    over_ms: float = 0.0  # the last one: on a busy machine those before it may come too late, and are refused
 
 
 async def take(who: Person) -> None:
@@ -212,7 +213,8 @@ async def release(who: Person, car: Car, one: Round) -> None:
         assert time.monotonic() < ends_s, f"{one.what}: still held: {slowing}"
         number = held(slowing)
         if number is not None:
-            one.released_ms = one.released_ms or time.time() * 1000
+            one.over_ms = time.time() * 1000
+            one.released_ms = one.released_ms or one.over_ms
             await who.ask("release", vehicle="ocelot", number=number)
         await asyncio.sleep(0.2)
 
@@ -309,7 +311,7 @@ def check_car(lines: list[dict[str, Any]], done: list[Round]) -> None:
                 lowest = min(lowest, speed_mps)
         assert lowest == 0.0, f"{one.what}: never stopped"
     for at_ms in commands:
-        assert any(one.began_ms <= at_ms <= one.released_ms + WITHIN_MS for one in done), "a command after the release"
+        assert any(one.began_ms <= at_ms <= one.over_ms + WITHIN_MS for one in done), "a command after the release"
 
 
 def check_orders(journal: list[dict[str, Any]], people: list[Person]) -> None:
