@@ -137,7 +137,6 @@ class Decelerate(OfSlowing):
     http: ClassVar[str] = "Slow the car, and hold it until it is released; no emergency stop"
     path: ClassVar[str] = "/api/slow-down/order"
     has_body: ClassVar[bool] = False
-    acts_within_s: ClassVar[float] = 0.3
     kind: Literal["slow_down"]
 
 

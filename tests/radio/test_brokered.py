@@ -73,7 +73,7 @@ async def test_no_old_value_is_drawn_as_fresh_before_and_after_gaps(
             assert then.oldest_fresh_s <= FRESH_S + READ_S, (radio, row)
 
 
-WITHIN_S = {"take_over": 0.5, "pause": 0.5, "arm": 0.5, "slow_down": 0.3, "resume": 3.0}  # a resume only ends a pause
+WITHIN_S = {"take_over": 0.5, "pause": 0.5, "arm": 0.5, "slow_down": 0.5, "resume": 3.0}  # a resume only ends a pause
 SENDERS = 20
 PRESSED_WITHIN_MS = 500
 STRAGGLES_S = 12.0  # TCP repeats what is under way after that at the latest

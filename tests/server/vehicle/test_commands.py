@@ -88,7 +88,7 @@ OF_MOMENT = {
     "connect", "disconnect", "pause", "silence", "shelve", "control", "accept_control", "arm", "disarm", "slow_down",
     "release", "veto", "planned_stop",
 }  # fmt: skip
-OTHER_TIMES = {"slow_down": 0.3, "resume": 3.0}
+OTHER_TIMES = {"resume": 3.0}
 
 
 def test_what_is_for_the_moment_has_a_time() -> None:
@@ -108,7 +108,7 @@ def test_a_signed_command_that_has_the_time_of_a_state_needs_no_time_on_its_way(
         }
 
     assert comes_within_s(signed(heard_ms=5.0, held_s=0.1)) is None
-    assert comes_within_s(signed()) == comes_within_s({"kind": "slow_down", "heard_ms": 5.0}) == 0.3
+    assert comes_within_s(signed()) == comes_within_s({"kind": "slow_down", "heard_ms": 5.0}) == 0.5
     assert comes_within_s({"kind": "pause", "signed": "none"}) == 0.5
     assert comes_within_s({"kind": "acknowledge"}) is None
 
