@@ -124,11 +124,13 @@ class SentFrames:
                 self._note_clock(vehicle, frame.number)
         return data
 
-    def _note_clock(self, vehicle: str, number: int) -> None:
+    def _note_clock(self, vehicle: str, number: int, clock: Steady | None = None) -> None:
         clocks = self._clocks[vehicle]
-        if number not in clocks:
-            clocks[number] = Steady(self._slewed)
-            clocks[number].note(self._now())
+        if clock is None and number not in clocks:
+            clock = Steady(self._slewed)
+            clock.note(self._now())
+        if clock is not None:
+            clocks[number] = clock
         while len(clocks) > wire.MOST_BASES:
             del clocks[next(iter(clocks))]
 
@@ -175,7 +177,7 @@ class SentFrames:
         if len(data) > LARGEST_FIRST:
             return {}
         bases.add(frame.number, frame.payload)
-        self._note_clock(vehicle, frame.number)
+        self._note_clock(vehicle, frame.number, clock)  # that of its base: no pull was answered since
         return {"state": base64.b64encode(data).decode(), "base": base}
 
 

@@ -37,9 +37,9 @@ class BaseCommand(BaseModel):
 class Prompt(BaseCommand):
     """Is for the moment at which it was pressed: refused where it took longer than `acts_within_s` to come.
 
-    The page gives no time of day. `heard_ms` is the server's own time in the newest state that the page had, `held_s`
-    how old that state was then, by the bounds that the page has of the server's clock, less the `excess_ms` of a state
-    that came through a web node.
+    The page gives no time of day. `heard_ms` is when the newest state that the page had was likely made, by the clock
+    of the server: its `time_ms`, and `excess_ms` where it came through a web node. `held_s` is how old that state was
+    then, by the bounds that the page has of the server's clock.
     """
 
     acts_within_s: ClassVar[float] = 0.5

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections import defaultdict
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
@@ -15,30 +16,36 @@ MOST_WAITING = 100  # orders; then the reader waits as well, and so does the pag
 # The lanes of what a page sends by itself: one of each at a time, more would only fill a slow radio.
 REPORTS, STATUS = "reports", "status"
 REPEATED = "slow_down"  # is pressed again where no answer comes
+MOST_REPEATED = 3  # at once: more would only fill a slow radio
+OVER_S = 1.0  # after it came one of them is carried out no more: it has half of that
+
+Before = tuple[asyncio.Task[None], float]  # an order, and until when it is waited for, by a monotonic clock [s]
 
 
 class _Turns:
     """Who has the turn of a lane, or waits for it."""
 
     def __init__(self) -> None:
-        self._last: list[asyncio.Task[None]] = []  # at most one; those before it are over when it is
-        self._repeated: list[asyncio.Task[None]] = []  # orders of `REPEATED` since then
+        self._last: list[Before] = []  # at most one; those before it are over when it is
+        self._repeated: list[Before] = []  # orders of `REPEATED` since then
 
-    def waits_for(self, *, is_repeated: bool) -> list[asyncio.Task[None]]:
-        return [one for one in self._last + ([] if is_repeated else self._repeated) if not one.done()]
+    def waits_for(self, *, is_repeated: bool) -> list[Before]:
+        repeated = [one for one in self._repeated if not one[0].done()]
+        return self._last + (repeated[: 1 - MOST_REPEATED] if is_repeated else repeated)
 
-    def add(self, task: asyncio.Task[None], *, is_repeated: bool) -> None:
+    def add(self, task: asyncio.Task[None], now_s: float, *, is_repeated: bool) -> None:
         if is_repeated:
-            self._repeated = [*(one for one in self._repeated if not one.done()), task]
+            self._repeated = [*(one for one in self._repeated if not one[0].done()), (task, now_s + OVER_S)]
         else:
-            self._last, self._repeated = [task], []
+            self._last, self._repeated = [(task, math.inf)], []
 
 
 class PageOrders:
     """Of one page: its orders of a lane one after the other, as they came, and of its statuses the newest.
 
-    A car that is lost answers nothing for seconds: an order waits for no other lane, and one to slow for none to slow.
-    `carry_out` is called with an order and how long it waited [s], `pass_on` with a status. `now` is a monotonic clock.
+    A car that is lost answers nothing for seconds: an order waits for no other lane, one to slow for none to slow,
+    and a release for each of those only while it may be carried out. `carry_out` is called with an order and how long
+    it waited [s], `pass_on` with a status. `now` is a monotonic clock [s].
     """
 
     def __init__(
@@ -98,12 +105,13 @@ class PageOrders:
                 lane, is_repeated, call = await self._calls.get()
                 turns = self._turns[lane]
                 work = self._in_turn(turns.waits_for(is_repeated=is_repeated), call)
-                turns.add(group.create_task(work, name="order of a page"), is_repeated=is_repeated)
+                turns.add(group.create_task(work, name="order of a page"), self._now(), is_repeated=is_repeated)
 
-    async def _in_turn(self, waits_for: list[asyncio.Task[None]], call: Callable[[], Awaitable[None]]) -> None:
+    async def _in_turn(self, waits_for: list[Before], call: Callable[[], Awaitable[None]]) -> None:
         try:
-            if waits_for:
-                await asyncio.wait(waits_for)
+            for order, until_s in waits_for:
+                wait_s = None if until_s == math.inf else max(0.0, until_s - self._now())
+                await asyncio.wait({order}, timeout=wait_s)
             await call()
         except Exception:  # a fault of ours: the other orders are carried out
             log.exception("an order of a page failed")

@@ -286,7 +286,9 @@ function ownBuild() {
   return globalThis.document?.documentElement.dataset['build'] ?? '';
 }
 
-/** By which the server sees how long an order was on its way: the newest state that this page had, and how old it was. @param {string} kind @param {Store} store */
+/** By which the server sees how long an order was on its way: when the newest state was likely made, and how old it was. @param {string} kind @param {Store} store */
 function momentOf(kind, { frame, lag_s }) {
-  return kind === 'replay' || !frame || frame.replay ? {} : { heard_ms: frame.server.time_ms, held_s: Math.max(0, lag_s - (frame.server.excess_ms ?? 0) / 1000) };
+  if (kind === 'replay' || !frame || frame.replay) return {};
+  const later_ms = Math.min(1000 * lag_s, Math.max(0, frame.server.excess_ms ?? 0)); // than `time_ms` it was likely made
+  return { heard_ms: frame.server.time_ms + later_ms, held_s: Math.max(0, lag_s - later_ms / 1000) };
 }

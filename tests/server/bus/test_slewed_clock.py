@@ -53,13 +53,15 @@ class Agent:
     def now(self) -> float:
         return 1000.0 + self.t + self.slewed_s()
 
-    def pull(self, node: Node, *, is_answer_lost: bool = False) -> None:
+    def pull(self, node: Node, *, is_answer_lost: bool = False, is_new: bool = True) -> None:
+        """The node pulls, and gets a new state, or the one that another node got."""
         pull = wire.Pull(have=node.number, run="a", inflates=True, is_base=node.number > 0)
         self.frames.note_pull(node.vehicle, "state", pull)
         if is_answer_lost:
             return
-        self._made += 1
-        self.bus.put(node.vehicle, "state", f"{STATE}{self._made}")
+        if is_new:
+            self._made += 1
+            self.bus.put(node.vehicle, "state", f"{STATE}{self._made}")
         frame = self.bus.newest(node.vehicle, "state")
         assert frame is not None
         self.frames.compressed(node.vehicle, "state", self.frames.encoded(self.now(), frame), frame, pull)
@@ -70,13 +72,19 @@ class Agent:
     def unasked(self, nodes: list[Node]) -> Iterator[tuple[Node, float]]:
         """Behind the gap: who takes a state, and by how much it takes it for older than it is [s]."""
         self.t = GAP[1]
+        yield from self.behind(nodes)
+
+    def behind(self, nodes: list[Node]) -> Iterator[tuple[Node, float]]:
         self.frames.begin_first()
         for vehicle in ("ocelot", "margay"):
-            self.bus.put(vehicle, "state", f"{STATE}new")
+            self._made += 1
+            self.bus.put(vehicle, "state", f"{STATE}{self._made}")
             here = self.frames.announcement(vehicle, 2)
             for node in nodes:
                 if node.vehicle == vehicle and here.state and (base := node.texts.get(here.base)):
-                    head, _ = wire.decode_frame(base64.b64decode(here.state), base)
+                    head, payload = wire.decode_frame(base64.b64decode(here.state), base)
+                    node.number = head.number
+                    node.texts.add(head.number, str(payload))
                     yield node, self.t - (node.ahead.earliest(head.now_s, self.t) - head.age_s)
 
 
@@ -104,6 +112,35 @@ async def test_of_several_nodes_one_whose_answers_were_lost_before_the_gap(rate:
         for node in nodes:
             agent.pull(node, is_answer_lost=agent.t > 58.0)
     assert all(older_s >= -READ_S for _, older_s in agent.unasked(nodes))
+
+
+async def test_of_several_nodes_one_that_had_a_state_long_before_another_had_it() -> None:
+    agent = Agent(0.083, 58.1, 59.6)
+    early, late = nodes = [Node("ocelot"), Node("ocelot")]
+    while agent.t < 58.0:
+        agent.t += 0.5
+        agent.pull(late)
+        agent.pull(early)
+    agent.t = 59.7
+    agent.pull(late, is_new=False)
+    agent.pull(late, is_answer_lost=True)
+    assert early.number == late.number
+    assert all(older_s >= -READ_S for _, older_s in agent.unasked(nodes))
+
+
+async def test_behind_gaps_in_a_row_the_clock_counts_from_the_last_answer() -> None:
+    agent = Agent(0.00244, 60.0, 120.0)
+    node = Node("ocelot")
+    while agent.t < 60.0:
+        agent.t += 0.5
+        agent.pull(node)
+    found = []
+    for _ in range(5):
+        agent.t += 5.0
+        found += [older_s for _, older_s in agent.behind([node])]
+        agent.pull(node, is_answer_lost=True)
+    assert found, "the first gaps are short enough for a clock that is slewed so little"
+    assert min(found) >= -READ_S
 
 
 async def test_what_was_not_pulled_in_the_last_seconds_before_the_gap_is_left_to_a_pull() -> None:

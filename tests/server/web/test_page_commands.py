@@ -173,7 +173,7 @@ async def test_an_order_to_slow_that_is_pressed_again_waits_for_no_answer_and_no
 
     async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
         reached.append((round(loop.time() - began_s, 3), command["id"]))
-        await asyncio.sleep(0.5)
+        await asyncio.sleep(0.4 if command["id"] == "slow_down 1" else 0.3)
         return {"ok": True}
 
     bus = LocalBus(Journal(None), now=loop.time)
@@ -184,12 +184,41 @@ async def test_an_order_to_slow_that_is_pressed_again_waits_for_no_answer_and_no
     async with at_work(page):
         for n, kind in enumerate(("arm", "slow_down", "slow_down", "release", "slow_down")):
             await page.add({"kind": kind, "id": f"{kind} {n}"})
-        await asyncio.sleep(0.7)
+        await asyncio.sleep(0.5)
         await page.add({"kind": "slow_down", "id": "slow_down 5"})
         await page.finished()
     assert reached == [
-        (0.0, "arm 0"), (0.5, "slow_down 1"), (0.5, "slow_down 2"), (1.0, "release 3"),
-        (1.5, "slow_down 4"), (1.5, "slow_down 5"),
+        (0.0, "arm 0"), (0.3, "slow_down 1"), (0.3, "slow_down 2"), (0.7, "release 3"),
+        (1.0, "slow_down 4"), (1.0, "slow_down 5"),
+    ]  # fmt: skip
+
+
+async def test_of_orders_to_slow_that_are_not_answered_few_are_under_way_and_a_release_waits_for_none() -> None:
+    reached: list[tuple[float, str]] = []
+    loop = asyncio.get_running_loop()
+
+    async def car(command: Mapping[str, Any]) -> Mapping[str, Any]:
+        reached.append((round(loop.time() - began_s, 3), command["id"]))
+        await asyncio.sleep(60.0 if command["id"] < "5" else 0.1)
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=loop.time)
+    bus.serve("ocelot", car)
+    page = page_of(bus, now=loop.time)
+    page.begin({"kind": "hello"})
+    began_s = loop.time()
+    async with at_work(page):
+        for id in range(5):
+            await page.add({"kind": "slow_down", "id": str(id)})
+        await asyncio.sleep(0.9)
+        await page.add({"kind": "release", "id": "5"})
+        await asyncio.sleep(0.5)
+        await page.add({"kind": "release", "id": "6"})
+        await asyncio.sleep(0.5)
+    assert sorted(reached) == [
+        (0.0, "0"), (0.0, "1"), (0.0, "2"),
+        (1.0, "3"), (1.0, "4"), (1.0, "5"),  # of these the first two are refused by the car, as too late
+        (1.4, "6"),
     ]  # fmt: skip
 
 
