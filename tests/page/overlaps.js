@@ -10,7 +10,8 @@
     let at = within(box(one), { left: 0, top: 0, right: innerWidth, bottom: innerHeight });
     for (let up = one.parentElement; up && up !== document.body; up = up.parentElement) {
       if (up.matches('dialog:modal')) return within(at, box(up));
-      const { overflowX, overflowY } = getComputedStyle(up);
+      const { display, overflowX, overflowY } = getComputedStyle(up);
+      if (display === 'contents') continue; // it has no box
       if (overflowX !== 'visible') at = { ...at, left: Math.max(at.left, box(up).left), right: Math.min(at.right, box(up).right) };
       if (overflowY !== 'visible') at = { ...at, top: Math.max(at.top, box(up).top), bottom: Math.min(at.bottom, box(up).bottom) };
     }
@@ -33,6 +34,7 @@
   const isMeant = (over, { one, layer }) => {
     if (over === layer || over.contains(one) || layer.contains(over)) return true;
     const isSpeed = one.matches('.gauge .speed');
+    if (over.matches('.rail') && layer.matches('.ledge')) return one.contains(document.elementFromPoint((box(one).left + box(one).right) / 2, (box(one).top + box(one).bottom) / 2)); // it stands between its keys
     if (over.matches('.sheet.crit')) return layer.matches('#monitor > :is(.rail, .ledge, .scrub)') || (layer.matches('.pager, .screen') && !isSpeed) || one.matches(KEYS) && !layer.matches('.snack, .sheet.crit, .strip');
     if (over.matches('dialog[open]:not([data-docked])')) return over.matches('#sheet-countdown') || (layer.matches('.pager, .screen') && (!isSpeed || over.querySelector('.sheet-head')?.checkVisibility() === true));
     if (over.matches('.screen')) return layer.matches('.pager') && (!isSpeed || document.querySelector('#monitor :is(.head-speed, .bar-speed)')?.checkVisibility() === true);
@@ -46,11 +48,18 @@
       const px = area(within(at, item.at));
       if (!px || isMeant(over, item) || over.closest('.slot') && item.layer.matches('.pager')) continue;
       if (item.layer.matches('.snack, dialog[open]') && over.matches('#monitor > *')) continue; // the other way round it is found too
-      if (item.layer.matches('.screen, .pager') && rolls(item.one, over)) continue;
+      const isFloating = over.matches('.ledge') && getComputedStyle(over).backgroundColor === 'rgba(0, 0, 0, 0)'; // no bar under which a list ends
+      if (item.layer.matches('.screen, .pager') && rolls(item.one, over) && !(isFloating && item.one.matches(KEYS))) continue;
       wrong.push(`${name(over)} over ${name(item.one)} of ${name(item.layer)}: ${px} px`);
     }
     const box_ = box(over);
     if (over.matches('.snack, dialog') && (box_.left < -1 || box_.right > innerWidth + 1 || box_.top < -1 || box_.bottom > innerHeight + 1)) wrong.push(`${name(over)} outside`);
+  }
+  // beside a notice the distance of the nearest object is whole before anything is scrolled; a phone on its side has room for the speed alone
+  const near = document.querySelector('#monitor[data-front="home"] .near [data-f="distance"]');
+  if (near && (innerHeight > 520 || innerWidth >= 700) && all('.snack')[0] && !all('dialog[open], .view > .screen')[0]) {
+    const { width, height } = box(near);
+    if (area(shown(near)) < 0.98 * width * height) wrong.push(`${area(shown(near))} of ${Math.round(width * height)} px of the nearest object's distance are in sight`);
   }
   return wrong;
 }

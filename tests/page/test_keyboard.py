@@ -93,6 +93,43 @@ async def test_a_journey_by_keyboard_alone(phone: Phone, canned: Canned) -> None
     await until_received(canned, "replay")
 
 
+#: Of what has the focus: the part of the page it is in, and its place there, row before column [px].
+PLACE = """() => {
+  const one = document.activeElement;
+  const part = one.closest('#sheet-slow > .keys, #monitor > .rail, #monitor > .ledge');
+  const { left, top, height } = one.getBoundingClientRect();
+  return part && [part.id || part.className, Math.round((top + height / 2) / 16), Math.round(left)];
+}"""
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize("hand", ["right", "left"])
+@pytest.mark.parametrize(("width", "height"), [(412, 780), (1440, 900)])
+async def test_the_tab_key_goes_through_keys_as_they_stand(
+    phone: Phone, canned: Canned, hand: str, width: int, height: int
+) -> None:
+    canned.state = live() | {"decelerate": slow("not_armed")}
+    page = await desktop(phone, canned, width)
+    await page.set_viewport_size({"width": width, "height": height})
+    await page.evaluate(f"document.documentElement.dataset.hand = '{hand}'")
+    await expect(page.locator("link[href*='drawers']")).to_be_attached()
+    await page.locator("#monitor > .rail [data-f=slow]").tap()
+    await expect(page.locator("#sheet-slow .main")).to_be_visible()
+    await page.locator("#sheet-slow").evaluate(
+        "sheet => Promise.all(sheet.getAnimations().map((one) => one.finished)).then(() => {})"
+    )
+    places: dict[str, list[list[int]]] = {}
+    for _ in range(60):  # from the first key of the sheet on
+        place = await page.evaluate(PLACE)
+        if place and place[1:] not in places.setdefault(place[0], []):
+            places[place[0]].append(place[1:])
+        await page.keyboard.press("Tab")
+    assert len(places["keys"]) == 2
+    assert len(places["rail"]) == 3
+    for name, found in places.items():
+        assert found == sorted(found), name
+
+
 @pytest.mark.gate
 @pytest.mark.parametrize(
     ("speed_mps", "freshness", "reason"),

@@ -113,6 +113,19 @@ async def test_nor_beside_a_critical_alarm(phone: Phone, canned: Canned, tab: st
     await nothing_lies_over_another(phone, canned, SIZES[1::3], tab, is_critical=True)
 
 
+@pytest.mark.gate
+@pytest.mark.parametrize("hand", ["right", "left"])
+async def test_the_mark_key_lies_over_no_other_key_on_a_phone_on_its_side(
+    phone: Phone, canned: Canned, hand: str
+) -> None:
+    canned.state = live()
+    page = await opened(phone, canned)
+    await page.evaluate(f"document.documentElement.dataset.hand = '{hand}'")
+    for down in (0, 150, 300, 450):
+        await page.evaluate(f"document.querySelector('[data-panel=home]').scrollTo(0, {down})")
+        assert await walk(page, [(640, 360), (740, 360), (915, 412), (1000, 480), (1180, 412)]) == {}, down
+
+
 async def test_no_edge_of_the_slide_is_left_beside_a_critical_alarm(phone: Phone, canned: Canned) -> None:
     page = await opened(phone, canned)
     canned.state["alarms"] = [critical()]

@@ -77,9 +77,9 @@ class TakeOver {
       html('div', { class: 'mark-body', tabindex: '0', role: 'group', 'aria-label': 'The intervention' }, this.unread,
         html('div', { class: 'take-facts' }, ...this.facts.map(({ element }) => element)),
         html('p', { class: 'lab2' }, html('span', {}, 'What was the reason?'), html('span', {}, 'one tap is enough')),
-        html('div', { class: 'chip-rows', role: 'group', 'aria-label': 'Category' }, ...this.chips), this.words, this.#plot.element, // one tap is enough: on a low phone the plot is what scrolls
+        html('div', { class: 'chip-rows', role: 'group', 'aria-label': 'Category' }, ...this.chips), this.words,
         html('p', { class: 'lab2' }, html('span', {}, 'Started by'), html('span', {}, 'from the data; press to correct')),
-        html('div', { class: 'seg', role: 'group', 'aria-label': 'Started by' }, ...this.starters)),
+        html('div', { class: 'seg', role: 'group', 'aria-label': 'Started by' }, ...this.starters), this.#plot.element), // the keys first: on a low phone the plot is what scrolls
       this.bad, // not in the body, which scrolls
       html('div', { class: 'mark-keys' }, this.later, this.keep)));
   }
