@@ -27,8 +27,10 @@ ROOM = {
         " && at('#sheet-file').width === innerWidth"
         " && at('#sheet-file .bd').right <= at('#sheet-file .what').left }",
     ),
-    "the recipients of a mail are in sight on a phone on its side": (
-        "mail", 740, 360, f"() => {{ {RECT} return at('#mail-to').bottom <= at('#sheet-mail .keys').top + 1 }}",
+    "recipients and subject of a mail are in sight on a phone on its side, beside its keys": (
+        "mail", 740, 360,
+        f"() => {{ {RECT} return at('#mail-subject').bottom <= at('#sheet-mail').bottom"
+        " && at('#mail-subject').right <= at('#sheet-mail .keys').left }",
     ),
     "recipients and subject of a mail are in sight on a low phone": (
         "mail", 360, 640, f"() => {{ {RECT} return at('#mail-subject').bottom <= at('#sheet-mail .keys').top }}",
@@ -103,11 +105,10 @@ ROOM = {
         " const text = document.querySelector('#monitor > .rail .slide .tx');"
         " return text.textContent.length > 10 && text.scrollHeight <= text.clientHeight }",
     ),
-    "a topic to choose is in sight on a phone on its side": (
-        "topic",
-        740,
-        360,
-        f"() => {{ {RECT} return at('#sheet-topic li').bottom <= at('#sheet-topic .keys').top + 1 }}",
+    "two topics to choose are in sight on a phone on its side, beside the key": (
+        "topic", 740, 360,
+        f"() => {{ {RECT} return at('#sheet-topic li:nth-child(2)').bottom <= at('#sheet-topic').bottom"
+        " && at('#sheet-topic li').right <= at('#sheet-topic .keys').left + 1 }",
     ),
     "what arms is at the foot of a tablet's drawer": (
         "slow-down-arm", 820, 1180,
