@@ -55,11 +55,19 @@
     const box_ = box(over);
     if (over.matches('.snack, dialog') && (box_.left < -1 || box_.right > innerWidth + 1 || box_.top < -1 || box_.bottom > innerHeight + 1)) wrong.push(`${name(over)} outside`);
   }
-  // beside a notice the distance of the nearest object is whole before anything is scrolled; a phone on its side has room for the speed alone
-  const near = document.querySelector('#monitor[data-front="home"] .near [data-f="distance"]');
+  // beside a notice distance and age of the nearest object are whole before anything is scrolled, and the gauge is hardly smaller than the view allows;
+  // a phone on its side, or a view lower than their two lines, has room for the speed alone
+  const near = document.querySelector('#monitor[data-front="home"] [data-part="nearest"]');
   if (near && (innerHeight > 520 || innerWidth >= 700) && all('.snack')[0] && !all('dialog[open], .view > .screen')[0]) {
-    const { width, height } = box(near);
-    if (area(shown(near)) < 0.98 * width * height) wrong.push(`${area(shown(near))} of ${Math.round(width * height)} px of the nearest object's distance are in sight`);
+    const gauge = document.querySelector('.gauge');
+    const view = parseFloat(getComputedStyle(gauge).getPropertyValue('--view'));
+    for (const one of view < 48 ? [] : all('[data-f="distance"], [data-ink="stale"].age', near)) {
+      const { width, height } = box(one);
+      if (area(shown(one)) < (one.matches('.age') ? 0.8 : 0.98) * width * height) wrong.push(`${area(shown(one))} of ${Math.round(width * height)} px of the nearest object's ${one.dataset.f} are in sight`);
+    }
+    const most = Math.min(innerWidth - 32, 460, Math.max(90, (view - 12) * 1.52));
+    if (innerWidth < 700 && box(gauge).width < 0.88 * most) wrong.push(`the gauge is ${Math.round(box(gauge).width)} of ${Math.round(most)} px wide`);
   }
+  if (innerWidth < 1000) for (const key of all('.checks li > button')) if (box(key).height < 43) wrong.push(`${name(key)} is ${box(key).height} px high`);
   return wrong;
 }

@@ -112,7 +112,7 @@ async def test_the_tab_key_goes_through_keys_as_they_stand(
     page = await desktop(phone, canned, width)
     await page.set_viewport_size({"width": width, "height": height})
     await page.evaluate(f"document.documentElement.dataset.hand = '{hand}'")
-    await expect(page.locator("link[href*='drawers']")).to_be_attached()
+    await page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
     await page.locator("#monitor > .rail [data-f=slow]").tap()
     await expect(page.locator("#sheet-slow .main")).to_be_visible()
     await page.locator("#sheet-slow").evaluate(

@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 from playwright.async_api import Page, Route, expect
 
-from tests.page.canned import Canned, Json, alarm, live, slow
+from tests.page.canned import Canned, Json, alarm, live, slow, slowed
 from tests.page.conftest import Phone
 from tests.page.screenshots import car
 
 OVERLAPS = Path(__file__).with_name("overlaps.js").read_text(encoding="utf-8").split("\n", 1)[1].rstrip()
 WIDTHS = (320, 360, 412, 480, 640, 699, 700, 740, 820, 915, 999, 1000, 1180, 1199, 1200, 1440, 1799, 1800, 1920, 2560)
-HEIGHTS = (360, 412, 480, 600, 640, 720, 780, 900, 1059, 1180, 1440)
+HEIGHTS = (360, 412, 480, 560, 600, 640, 720, 780, 900, 1059, 1180, 1440)
 SIZES = [(width, height) for width in WIDTHS for height in HEIGHTS]
 GATE = [(360, 640), (820, 1180), (1440, 900)]
 DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
@@ -45,7 +45,7 @@ async def opened(phone: Phone, canned: Canned, tab: str = "home") -> Page:
     await phone.open("about:blank")
     await phone.open(f"{canned.address}/#{tab}")
     await phone.live()
-    await expect(phone.page.locator("link[href*='drawers']")).to_be_attached()
+    await phone.page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
     await expect(phone.page.locator("#monitor > .ledge > *").first).to_be_attached()
     return phone.page
 
@@ -101,6 +101,25 @@ async def test_no_notice_lies_over_a_key_a_gauge_or_another_alarm(phone: Phone, 
     await nothing_lies_over_another(phone, canned, GATE, "home")
 
 
+#: A slow-down as it stands beside a warning.
+ORDERS = {"none": lambda: slow("armed"), "slows": slowed, "not confirmed": lambda: slowed(False)}
+LOW = [(320, 600), (360, 560), (360, 640), (375, 667), (412, 700), (412, 740), (412, 780), (412, 830), (680, 600)]
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize("order", ORDERS)
+async def test_over_a_notice_speed_distance_and_a_stale_age_are_in_sight(
+    phone: Phone, canned: Canned, order: str
+) -> None:
+    canned.state = warned(decelerate=ORDERS[order]())
+    page = await opened(phone, canned)
+    for freshness in ("live", "stale"):
+        canned.state["signals"]["distance"] |= {"freshness": freshness, "age_s": 123.4}
+        await phone.drawn()
+        await expect(page.locator("[data-part=nearest] .age[data-ink=stale]")).to_have_count(int(freshness == "stale"))
+        assert await walk(page, LOW) == {}, freshness
+
+
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("tab", ["home", "map", "scan", "files", "settings"])
 async def test_none_does_in_any_window(phone: Phone, canned: Canned, tab: str) -> None:
@@ -124,6 +143,28 @@ async def test_the_mark_key_lies_over_no_other_key_on_a_phone_on_its_side(
     for down in (0, 150, 300, 450):
         await page.evaluate(f"document.querySelector('[data-panel=home]').scrollTo(0, {down})")
         assert await walk(page, [(640, 360), (740, 360), (915, 412), (1000, 480), (1180, 412)]) == {}, down
+
+
+#: What of the slide and of the speed is in the window, and not under the panel of the fresh mark.
+BESIDE_THE_MARK = """() => {
+  const at = (one) => document.querySelector(one).getBoundingClientRect();
+  const [mark, slide, speed] = ['.fresh', '#monitor > .rail .slide', '.gauge .speed'].map(at);
+  const isFree = ({ left, right, top, bottom }) =>
+    left >= mark.right || right <= mark.left || top >= mark.bottom || bottom <= mark.top;
+  return mark.height > 0 && slide.bottom <= innerHeight && mark.top >= 0 && isFree(slide) && isFree(speed);
+}"""
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize(("width", "height"), [(568, 320), (640, 360), (667, 375)])
+async def test_a_fresh_mark_leaves_slide_and_speed_in_sight_on_a_phone_on_its_side(
+    phone: Phone, canned: Canned, width: int, height: int
+) -> None:
+    canned.state = live() | {"decelerate": slow("armed")}
+    page = await opened(phone, canned)
+    await page.set_viewport_size({"width": width, "height": height})
+    await page.locator(".mark-key").tap()
+    await page.wait_for_function(BESIDE_THE_MARK)
 
 
 async def test_no_edge_of_the_slide_is_left_beside_a_critical_alarm(phone: Phone, canned: Canned) -> None:

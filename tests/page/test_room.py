@@ -105,6 +105,18 @@ ROOM = {
         " const text = document.querySelector('#monitor > .rail .slide .tx');"
         " return text.textContent.length > 10 && text.scrollHeight <= text.clientHeight }",
     ),
+    "Pause is beside the slide, which is read whole, in a narrow window on its side": (
+        "slow-down-armed", 700, 360,
+        f"() => {{ {RECT} const text = document.querySelector('#monitor > .rail .slide .tx');"
+        " return at('#monitor > .rail [data-f=pause]').right < at('#monitor > .rail .slide').left"
+        " && text.scrollHeight <= text.clientHeight && text.scrollWidth <= text.clientWidth }",
+    ),
+    "the row of the Mark key is as wide as the rail within the edge of a paused page": (
+        "paused", 740, 360,
+        f"() => {{ {RECT} const [row, rail] = [at('#monitor > .ledge'), at('#monitor > .rail')];"
+        " return document.documentElement.hasAttribute('data-framed')"
+        " && Math.abs(row.left - rail.left) < 1 && Math.abs(row.right - rail.right) < 1 }",
+    ),
     "two topics to choose are in sight on a phone on its side, beside the key": (
         "topic", 740, 360,
         f"() => {{ {RECT} return at('#sheet-topic li:nth-child(2)').bottom <= at('#sheet-topic').bottom"
