@@ -66,7 +66,7 @@
       if (area(shown(one)) < (one.matches('.age') ? 0.8 : 0.98) * width * height) wrong.push(`${area(shown(one))} of ${Math.round(width * height)} px of the nearest object's ${one.dataset.f} are in sight`);
     }
     const most = Math.min(innerWidth - 32, 460, Math.max(90, (view - 12) * 1.52));
-    if (innerWidth < 700 && box(gauge).width < 0.88 * most) wrong.push(`the gauge is ${Math.round(box(gauge).width)} of ${Math.round(most)} px wide`);
+    if (innerWidth < 700 && box(gauge).width < 0.9 * most) wrong.push(`the gauge is ${Math.round(box(gauge).width)} of ${Math.round(most)} px wide`);
   }
   if (innerWidth < 1000) for (const key of all('.checks li > button')) if (box(key).height < 43) wrong.push(`${name(key)} is ${box(key).height} px high`);
   return wrong;

@@ -8,7 +8,7 @@ import re
 from typing import Any
 
 import pytest
-from playwright.async_api import expect
+from playwright.async_api import Route, expect
 
 from tests.page.canned import Canned, alarm
 from tests.page.conftest import Phone
@@ -137,6 +137,29 @@ async def test_a_list_longer_than_the_screen_is_turned_and_no_row_is_sliced(phon
     await phone.page.locator('[data-tab="scan"]').tap()  # the tabs stay in sight, and lead out of it
     await expect(phone.page.locator("ul[data-f=alarms]")).to_have_count(0)
     await expect(phone.page.locator('[data-tab="scan"]')).to_have_attribute("aria-selected", "true")
+
+
+@pytest.mark.gate
+@pytest.mark.own_phone
+async def test_the_list_fetches_the_style_of_a_narrow_phone_that_failed_to_load(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    canned.state["alarms"] = seven()
+    refused = asyncio.Event()
+
+    async def refuse(route: Route) -> None:
+        await route.abort()
+        refused.set()
+
+    await page.route("**/drawers*.css*", refuse)
+    await page.set_viewport_size({"width": 320, "height": 640})
+    await phone.open(canned.address)
+    await phone.live()
+    await refused.wait()
+    await expect(page.locator("link[href*='drawers']")).to_have_count(0)
+    await page.unroute("**/drawers*.css*")
+    await phone.f("strip").tap()
+    await expect(page.locator(".alarms-head h2")).to_have_css("font-size", "17px")
+    phone.complaints.clear()  # of what was refused
 
 
 @pytest.mark.gate

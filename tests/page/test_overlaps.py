@@ -25,6 +25,13 @@ KEPT = """() => {
   const twin = note.cloneNode(true);
   note.replaceWith(twin);
 }"""
+#: So does a fresh mark, which takes its room as before.
+KEPT_MARK = """() => {
+  const panel = document.querySelector('.fresh:not([hidden])');
+  const twin = panel.cloneNode(true);
+  panel.replaceWith(twin);
+  new ResizeObserver(() => document.body.style.setProperty('--fresh', `${twin.offsetHeight}px`)).observe(twin);
+}"""
 LONG = "The newest fix of the phone (Ann-Kathrin, of 3 phones) is 12 s old and comes too late over the radio. " * 2
 
 
@@ -103,7 +110,17 @@ async def test_no_notice_lies_over_a_key_a_gauge_or_another_alarm(phone: Phone, 
 
 #: A slow-down as it stands beside a warning.
 ORDERS = {"none": lambda: slow("armed"), "slows": slowed, "not confirmed": lambda: slowed(False)}
-LOW = [(320, 600), (360, 560), (360, 640), (375, 667), (412, 700), (412, 740), (412, 780), (412, 830), (680, 600)]
+LOW = [
+    (320, 600), (320, 704), (360, 560), (360, 640), (375, 667), (412, 700), (412, 740), (412, 780), (412, 830),
+    (680, 600),
+]  # fmt: skip
+
+
+SPEED_IN_SIGHT = """() => {
+  const at = (one) => document.querySelector(one).getBoundingClientRect();
+  const [speed, notice] = ['.gauge .speed', '.snack:not([hidden])'].map(at);
+  return speed.height > 12 && speed.bottom <= notice.top;
+}"""
 
 
 @pytest.mark.gate
@@ -118,6 +135,9 @@ async def test_over_a_notice_speed_distance_and_a_stale_age_are_in_sight(
         await phone.drawn()
         await expect(page.locator("[data-part=nearest] .age[data-ink=stale]")).to_have_count(int(freshness == "stale"))
         assert await walk(page, LOW) == {}, freshness
+    for width, height in ((320, 568), (360, 560)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.wait_for_function(SPEED_IN_SIGHT)
 
 
 @pytest.mark.timeout(600)
@@ -165,6 +185,24 @@ async def test_a_fresh_mark_leaves_slide_and_speed_in_sight_on_a_phone_on_its_si
     await page.set_viewport_size({"width": width, "height": height})
     await page.locator(".mark-key").tap()
     await page.wait_for_function(BESIDE_THE_MARK)
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize("kind", ["warning", "note"])
+async def test_a_notice_that_comes_to_a_fresh_mark_lies_over_nothing_on_a_phone_on_its_side(
+    phone: Phone, canned: Canned, kind: str
+) -> None:
+    canned.state = live() | {"decelerate": slow("armed")}
+    page = await opened(phone, canned)
+    await page.set_viewport_size({"width": 568, "height": 320})
+    await page.locator(".mark-key").tap()
+    await page.evaluate(KEPT_MARK)
+    if kind == "warning":
+        canned.state = warned(decelerate=slow("armed"))
+    else:
+        await noticed(page, canned)
+    await expect(page.locator(f".snacks > {'[data-f=warning]' if kind == 'warning' else '.note'}")).to_be_visible()
+    assert await walk(page, [(568, 320), (640, 360), (667, 375), (740, 360), (915, 412), (1180, 480)]) == {}
 
 
 async def test_no_edge_of_the_slide_is_left_beside_a_critical_alarm(phone: Phone, canned: Canned) -> None:

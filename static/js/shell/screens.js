@@ -14,7 +14,7 @@ import { styled } from '../core/style-sheet.js';
 
 // Each is fetched when it is first opened: a page that begins has enough to load.
 const SCREENS = /** @type {Record<string, {title: string, hasHead?: boolean, load: () => Promise<Mount>}>} */ ({
-  alarms: { title: 'Alarms', hasHead: true, load: async () => (await import('../alarms/alarms.js')).mount },
+  alarms: { title: 'Alarms', hasHead: true, load: async () => (await Promise.all([import('../alarms/alarms.js'), styled('drawers')]))[0].mount },
   check: { title: 'Check', hasHead: true, load: async () => (await Promise.all([import('../alarms/check.js'), styled('check')]))[0].mount },
   departure: { title: 'Departure check', load: async () => (await import('../drive/departure-check.js')).mount },
   log: { title: 'Alarm log', load: async () => (await Promise.all([import('../alarms/log.js'), styled('menu')]))[0].mount },
