@@ -168,10 +168,11 @@ async def test_the_mark_key_lies_over_no_other_key_on_a_phone_on_its_side(
 #: What of the slide and of the speed is in the window, and not under the panel of the fresh mark.
 BESIDE_THE_MARK = """() => {
   const at = (one) => document.querySelector(one).getBoundingClientRect();
-  const [mark, slide, speed] = ['.fresh', '#monitor > .rail .slide', '.gauge .speed'].map(at);
+  const [mark, slide, speed, view] = ['.fresh', '#monitor > .rail .slide', '.gauge .speed', '#monitor > .view'].map(at);
   const isFree = ({ left, right, top, bottom }) =>
     left >= mark.right || right <= mark.left || top >= mark.bottom || bottom <= mark.top;
-  return mark.height > 0 && slide.bottom <= innerHeight && mark.top >= 0 && isFree(slide) && isFree(speed);
+  const isWhole = slide.bottom <= innerHeight && mark.top >= 0 && speed.bottom <= view.bottom;
+  return mark.height > 0 && isWhole && isFree(slide) && isFree(speed);
 }"""
 
 
