@@ -1,15 +1,20 @@
-"""By how much an agent's clock is ahead of the node's: at most, by which a frame that was held up, or not pulled, is no
-older than stated, and likely, from which the time of an order counts."""
+"""The offset of an agent's clock from the node's: its upper bound and its likely value.
+
+By the bound no frame is shown younger than it is, also one that was held up or not pulled. The age of an order counts
+from the likely value.
+"""
 
 from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable
 
 SLEWS = 0.1  # a clock, by so much: chrony by 0.083 at most
 DRIFT = 1e-3  # of two monotonic clocks that are not slewed otherwise: each by 500 ppm, as the kernel corrects it
 ROUNDING_S = 0.01  # of a comparison of two clocks
+LIKELY_FROM = 50  # answers: 6 s over a bad radio; by fewer the jitter counts, by more a slew counts for longer
 
 
 def slewed_s() -> float:
@@ -62,24 +67,29 @@ class AgentAhead:
 
 
 class LikelyAhead:
-    """Of one run of an agent, with times as those of `AgentAhead`: where the least way there takes as long as the least
-    way back. Both count for as long as no clock is slewed by more than `DRIFT`."""
+    """The likely offset of the clock of one run of an agent, with times as those of `AgentAhead`.
+
+    It is exact where the least delay to the agent and the least delay back are equal. Only the last `LIKELY_FROM`
+    answers count: a slew or a pause of less than a round trip contradicts none of the earlier ones.
+    """
 
     def __init__(self) -> None:
-        self._least_s, self._most_s = -math.inf, math.inf
-        self._at_s = 0.0
+        self._bounds_s: deque[tuple[float, float]] = deque(maxlen=LIKELY_FROM)  # of the offset, by each answer
 
     def answered(self, requested_s: float, reached_s: float, sent_s: float, now_s: float) -> None:
-        """What was sent at `requested_s` reached the agent at `reached_s` of its clock, and its answer of `sent_s` is
-        here."""
-        drift_s = DRIFT * (now_s - self._at_s)
-        least_s, most_s = self._least_s - drift_s, self._most_s + drift_s
+        """Count an answer of `sent_s` that is here, to a request that reached the agent at `reached_s` of its clock."""
+        least_s, most_s = self._within_s()
         at_least_s, at_most_s = sent_s - now_s, reached_s - requested_s
         if at_least_s > most_s or at_most_s < least_s:  # a clock was slewed, or stood still
-            least_s, most_s = -math.inf, math.inf
-        self._least_s, self._most_s = max(least_s, at_least_s), min(most_s, at_most_s)
-        self._at_s = now_s
+            self._bounds_s.clear()
+        self._bounds_s.append((at_least_s, at_most_s))
 
     def when(self, agent_s: float) -> float:
-        """When the agent's clock showed `agent_s`; after an answer."""
-        return agent_s - (self._least_s + self._most_s) / 2
+        """Return when the agent's clock showed `agent_s`; after an answer."""
+        return agent_s - sum(self._within_s()) / 2
+
+    def _within_s(self) -> tuple[float, float]:
+        return (
+            max((least_s for least_s, _ in self._bounds_s), default=-math.inf),
+            min((most_s for _, most_s in self._bounds_s), default=math.inf),
+        )

@@ -136,6 +136,36 @@ async def test_a_late_answer_of_a_run_that_has_ended_is_left_out() -> None:
     assert newest.run == "new"
 
 
+async def test_the_likely_offset_of_an_agents_clock_begins_anew_with_its_run() -> None:
+    clock, later_s = Clock(), []
+    run, ahead_s = "old", 1000.0
+
+    async def request(subject: str, body: bytes, timeout: float) -> Any:
+        clock.ahead_s += 0.3
+        head = wire.FrameHead(run=run, number=1, now_s=clock() + ahead_s)
+        clock.ahead_s += 0.3
+        return SimpleNamespace(data=wire.encode_frame(head, "x"))
+
+    questions = Questions(now=clock)
+    questions.client = cast(Client, SimpleNamespace(request=request))
+    pulls = Pulls(questions, lambda *frame: later_s.append(frame[4]), lambda *_: None, now=clock)
+    newest = _Newest()
+    await pulls._request("ocelot", "state", newest)
+    run, ahead_s = "new", 1000.2  # by less than a round trip: this contradicts nothing of the earlier run
+    await pulls._request("ocelot", "state", newest)
+    assert later_s == pytest.approx([0.3, 0.3], abs=0.02)
+
+
+async def test_no_state_was_likely_put_before_the_moment_that_is_certain() -> None:
+    later_s: list[float] = []
+    clock = Clock()
+    pulls = Pulls(Questions(now=clock), lambda *frame: later_s.append(frame[4]), lambda *_: None, now=clock)
+    newest = _Newest()
+    newest.likely.answered(0.0, 1000.5, 1000.5, 0.6)  # likely put at 0.3, but 0.4 is certain by an earlier pull
+    pulls._take("ocelot", "state", newest, wire.FrameHead(run="a", number=1, now_s=1000.5), "x", 0.4)
+    assert later_s == [0.0]
+
+
 async def test_an_agent_that_waits_for_its_next_frame_has_one_pull_of_it() -> None:
     time_s = 0.0
     requests = under_way = most = 0
