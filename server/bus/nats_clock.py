@@ -14,7 +14,7 @@ from collections.abc import Callable
 SLEWS = 0.1  # a clock, by so much: chrony by 0.083 at most
 DRIFT = 1e-3  # of two monotonic clocks that are not slewed otherwise: each by 500 ppm, as the kernel corrects it
 ROUNDING_S = 0.01  # of a comparison of two clocks
-LIKELY_FROM = 50  # answers: 6 s over a bad radio; by fewer the jitter counts, by more a slew counts for longer
+LIKELY_FROM = 50  # answers: 8 s over a bad radio; by fewer the jitter counts, by more a slew counts for longer
 
 
 def slewed_s() -> float:
