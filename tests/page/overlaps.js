@@ -58,7 +58,7 @@
   // beside a notice distance and age of the nearest object are whole before anything is scrolled, and the gauge is hardly smaller than the view allows;
   // a phone on its side, or a view lower than their two lines, has room for the speed alone
   const near = document.querySelector('#monitor[data-front="home"] [data-part="nearest"]');
-  if (near && (innerHeight > 520 || innerWidth >= 700) && all('.snack')[0] && !all('dialog[open], .view > .screen')[0]) {
+  if (near && matchMedia('(height > 32.5em), (width >= 43.75em)').matches && all('.snack')[0] && !all('dialog[open], .view > .screen')[0]) {
     const gauge = document.querySelector('.gauge');
     const view = parseFloat(getComputedStyle(gauge).getPropertyValue('--view'));
     for (const one of view < 48 ? [] : all('[data-f="distance"], [data-ink="stale"].age', near)) {
