@@ -188,6 +188,31 @@ async def test_a_fresh_mark_leaves_slide_and_speed_in_sight_on_a_phone_on_its_si
     await page.wait_for_function(BESIDE_THE_MARK)
 
 
+#: Whether a press at the middle of Stop, Pause and slide is for them, and the Mark key is no higher than they are.
+RAIL_ACTS = """() => {
+  const rail = document.querySelector('#monitor > .rail');
+  const [mark, top] = [document.querySelector('.mark-key'), rail.getBoundingClientRect().top];
+  return [...rail.querySelectorAll('[data-f=stop], [data-f=pause], .slide')].every((key) => {
+    const at = key.getBoundingClientRect();
+    return key.contains(document.elementFromPoint((at.left + at.right) / 2, (at.top + at.bottom) / 2));
+  }) && (!mark.checkVisibility() || mark.getBoundingClientRect().top >= top - 1);
+}"""
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize(("width", "height"), [(640, 360), (740, 360), (915, 412), (1250, 500)])
+async def test_a_screen_that_is_opened_over_home_leaves_the_keys_of_a_phone_on_its_side_free(
+    phone: Phone, canned: Canned, width: int, height: int
+) -> None:
+    canned.state = live() | {"decelerate": slow("armed")}
+    page = await opened(phone, canned)
+    await page.set_viewport_size({"width": width, "height": height})
+    await page.evaluate("document.querySelector('#monitor [data-f=link]').click()")
+    await expect(page.get_by_role("heading", name="Signals")).to_be_visible()
+    await page.evaluate(DRAWN)
+    assert await page.evaluate(RAIL_ACTS)
+
+
 @pytest.mark.gate
 @pytest.mark.parametrize("kind", ["warning", "note"])
 async def test_a_notice_that_comes_to_a_fresh_mark_lies_over_nothing_on_a_phone_on_its_side(

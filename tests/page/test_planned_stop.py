@@ -10,6 +10,8 @@ from playwright.async_api import expect
 
 from tests.page.canned import Canned, alarm
 from tests.page.conftest import Phone
+from tests.page.test_overlaps import noticed
+from tests.page.test_overlaps import opened as opened_whole
 from tests.page.test_parts import opened, sent, until_sent
 
 pytestmark = pytest.mark.gate
@@ -85,6 +87,15 @@ async def test_a_refusal_is_said(phone: Phone, canned: Canned) -> None:
     await phone.page.locator("[data-f=planned-stop-end]").tap()
     await expect(phone.page.locator(".snack.note")).to_contain_text("The session is busy.")
     assert sent(canned, "end_planned_stop")
+
+
+@pytest.mark.parametrize(("width", "height"), [(320, 568), (412, 590), (820, 1180), (1000, 600), (1440, 600)])
+async def test_a_note_leaves_the_planned_stop_in_sight(phone: Phone, canned: Canned, width: int, height: int) -> None:
+    await phone.page.set_viewport_size({"width": width, "height": height})
+    canned.state["session"]["planned_stop"] = stop()
+    page = await opened_whole(phone, canned)
+    await noticed(page, canned)
+    await expect(page.locator(LINE)).to_be_in_viewport()
 
 
 async def test_on_a_low_phone_a_warning_leaves_the_speed_in_sight(phone: Phone, canned: Canned) -> None:
