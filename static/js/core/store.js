@@ -289,6 +289,6 @@ function ownBuild() {
 /** By which the server sees how long an order was on its way: when the newest state was likely made, and how old it was. @param {string} kind @param {Store} store */
 function momentOf(kind, { frame, lag_s }) {
   if (kind === 'replay' || !frame || frame.replay) return {};
-  const later_ms = Math.min(1000 * lag_s, Math.max(0, frame.server.excess_ms ?? 0)); // than `time_ms` it was likely made
-  return { heard_ms: frame.server.time_ms + later_ms, held_s: Math.max(0, lag_s - later_ms / 1000) };
+  const later_s = Math.min(lag_s, Math.max(0, (frame.server.excess_ms ?? 0) / 1000)); // than `time_ms` it was likely made
+  return { heard_ms: frame.server.time_ms + 1000 * later_s, held_s: lag_s - later_s };
 }
