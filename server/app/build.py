@@ -200,6 +200,7 @@ def _fleet(
     name = f"catgraph agent {' '.join(v.name for v in config.vehicles)}"
     # The agent last: it announces itself once all that a node may then request is subscribed to.
     link = BrokerLink(config.broker, kept, agent, name=name, unsent=lambda: agent.unsent, spares=SPARES)
+    agent.beside = link.beside
     return bus, link, None
 
 

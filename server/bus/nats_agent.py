@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any
@@ -55,6 +56,7 @@ class NatsAgent:
         self._admit = admit
         self._on_late = on_late
         self._is_limited = is_limited
+        self.beside: Callable[[], list[Client]] = list  # connections for copies of first states
         self._bus = bus
         self._client: Client | None = None
         self._run = run
@@ -152,18 +154,18 @@ class NatsAgent:
         await self._respond(message, data)
 
     def _look(self, vehicle: str, kind: str) -> Looked:
-        looked = self._looked.get((vehicle, kind))
-        if looked is None:
+        if (looked := self._looked.get((vehicle, kind))) is None:
             looked = self._looked[vehicle, kind] = Looked(self._bus, vehicle, kind)
         looked.until_s = self._now() + wire.PULL_WAITS_S + WANTED_FOR_S
         return looked
 
     async def _send_first_states(self, client: Client) -> None:
-        """With announcements: a pull brings one a round trip later."""
+        """With announcements, a round trip before a pull brings one; by others as well, for lost packets."""
         for vehicle in self._frames.begin_first():
             self._look(vehicle, "state")  # else none is made
-        while self._client is client and (due := self._frames.first_due):
-            await self._announce(due)
+        copies = itertools.cycle([(one,) for one in self.beside()] or [()])
+        while self._client is client and client.is_connected and (due := self._frames.first_due):
+            await self._announce(due, *next(copies), is_first=True)
             await asyncio.sleep(FIRST_EVERY_S)
 
     # -- events --------------------------------------------------------------------------------------------------------
@@ -178,9 +180,14 @@ class NatsAgent:
             self._published[vehicle] = events[-1]["n"]
             await self._publish(vehicle, "events", wire.Events(run=self._run, events=events))
 
-    async def _announce(self, vehicles: Iterable[str]) -> None:
+    async def _announce(self, vehicles: Iterable[str], *also_by: Client, is_first: bool = False) -> None:
         for vehicle in [*vehicles]:
-            await self._publish(vehicle, "here", self._frames.announcement(vehicle, self._connection))
+            here = self._frames.announcement(vehicle, self._connection, is_first=is_first)
+            await self._publish(vehicle, "here", here)
+            copy = here.model_copy(update={"is_copy": True})
+            for client in also_by:
+                with contextlib.suppress(Exception):  # whatever it was: it came by ours
+                    await client.publish(wire.subject(vehicle, "here"), wire.encode(copy))
 
     async def _be_here(self) -> None:
         while True:
@@ -233,11 +240,9 @@ class NatsAgent:
         if len(data) > self._largest:
             self._note_too_large(f"answer to {ask.do}", vehicle, len(data))
             refusal = f"the answer of {vehicle} is too large for the broker ({len(data) // 1000} kB)"
-            data = wire.encode(
-                wire.Answer(
-                    run=body.run, now_s=body.now_s, last=body.last, refused=refusal, is_unknown=ask.do == "command"
-                )
-            )
+            is_unknown = ask.do == "command"
+            body = wire.Answer(run=body.run, now_s=body.now_s, last=body.last, refused=refusal, is_unknown=is_unknown)
+            data = wire.encode(body)
         await self._respond(message, data)
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import logging
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Callable
 from typing import Any
 
@@ -19,10 +19,12 @@ log = logging.getLogger("catgraph.bus")
 LOG_AGAIN_S = 60.0  # the same complaint is logged no more often
 MOST_READERS = 100
 FIRST_EVERY_S = 0.1  # a state is made
-LARGEST_FIRST = 4000  # bytes of one: by the state that the node has it is 0.6 to 1.1 kB
+LARGEST_FIRST = 4000  # bytes of one: by the state that the node has it is 0.6 to 0.9 kB
+MOST_RETURNS = 9  # in a row, without an answer between
+LEVEL_FIRST = 9  # of zlib, so that an announcement with a state of before the gap is one packet: 1.3 kB instead of 1.6
 LOOKED_AT_S = 600.0  # before the return, at most: of others none is made
 LOOKED_LAST_S = 4.0  # before the last pull of any vehicle: a node repeats one that was lost after 3.5 s
-MOST_FIRST = 10  # states: the first pull comes a round trip after the announcement, or later where a packet was lost
+MOST_FIRST = 20  # states: over a bad radio an answer to the first pulls that waits behind a lost packet comes by then
 
 
 class Looked:
@@ -85,8 +87,8 @@ class Looked:
 class SentFrames:
     """Frames as nodes get them: encoded, compressed by one that the node has, and the first ones behind a gap unasked.
 
-    The unasked ones are states of vehicles whose states were pulled before it, until the first pull: a few and no more,
-    so that a hop that stalls finds nothing old. `now`: a monotonic clock in seconds.
+    The unasked ones are states of vehicles whose states were pulled before it, beside the first answers: a few and no
+    more, so that a hop that stalls finds nothing old. `now`: a monotonic clock in seconds.
     """
 
     def __init__(
@@ -98,10 +100,12 @@ class SentFrames:
         self._bases = defaultdict[tuple[str, str], wire.Bases](wire.Bases)
         self._have: dict[str, tuple[int, float]] = {}  # the state that the node had at the last pull, and when that was
         self._left: dict[str, int] = {}  # so many go unasked
+        self._last: dict[str, int] = {}  # the last one that did
         self._slewed = slewed
         # Noted when each of the states was sent by which others are compressed: from its answer on a node that has it
         # may know the age of a state by this clock alone.
         self._clocks = defaultdict[str, dict[int, Steady]](dict)
+        self._returns = deque[Steady](maxlen=MOST_RETURNS)  # what was answered since allows for less drift
 
     def encoded(self, came_s: float, frame: Frame | None, refused: str = "") -> bytes:
         """A frame as it is sent now; None: that there is no newer one, or why it is refused. The pull came then."""
@@ -136,6 +140,8 @@ class SentFrames:
 
     def begin_first(self) -> list[str]:
         """The agent is back; `first_due`."""
+        self._returns.append(returned := Steady(self._slewed))
+        returned.note(self._now())
         last_s = max((at_s for _, at_s in self._have.values()), default=0.0)
         from_s = max(last_s - LOOKED_LAST_S, self._now() - LOOKED_AT_S)
         self._left = {one: MOST_FIRST for one, (_, at_s) in self._have.items() if at_s >= from_s}
@@ -144,7 +150,6 @@ class SentFrames:
     def note_pull(self, vehicle: str, kind: str, pull: wire.Pull) -> None:
         if kind != "state":
             return
-        self._left.pop(vehicle, None)
         if pull.inflates and pull.is_base and pull.run == self._run:
             self._have[vehicle] = pull.have, self._now()
 
@@ -153,10 +158,10 @@ class SentFrames:
         """Vehicles of which a state goes unasked now."""
         return [*self._left]
 
-    def announcement(self, vehicle: str, connection: int) -> wire.Here:
-        """Of the agent, with the state that goes unasked now."""
-        last = self._bus.last_event(vehicle)
-        return wire.Here(run=self._run, last=last, resumes=True, connection=connection, **self._first(vehicle))
+    def announcement(self, vehicle: str, connection: int, *, is_first: bool = False) -> wire.Here:
+        """Of the agent; `is_first`: with the state that goes unasked now."""
+        last, more = self._bus.last_event(vehicle), self._first(vehicle) if is_first else {}
+        return wire.Here(run=self._run, last=last, resumes=True, connection=connection, **more)
 
     def _first(self, vehicle: str) -> dict[str, Any]:
         """Its newest state as fields of an announcement; empty where none is due, or none that is small."""
@@ -169,16 +174,21 @@ class SentFrames:
         if frame is None or not isinstance(frame.payload, str) or not (text := bases.get(base)):
             return {}
         clock = self._clocks[vehicle].get(base)
-        if clock is None or not clock.is_steady(self._now()):
+        if clock is None or not self._is_steady_since(clock):
             return {}
-        if bases.get(frame.number):  # none was made since
+        if frame.number in (base, self._last.get(vehicle)):  # none was made since
             return {}
-        data = wire.compressed(self.encoded(self._now(), frame), text)
+        data = wire.compressed(self.encoded(self._now(), frame), text, LEVEL_FIRST)
         if len(data) > LARGEST_FIRST:
             return {}
+        self._last[vehicle] = frame.number
         bases.add(frame.number, frame.payload)
-        self._note_clock(vehicle, frame.number, clock)  # that of its base: no pull was answered since
+        self._note_clock(vehicle, frame.number, clock)  # that of its base: the node may have no answer since
         return {"state": base64.b64encode(data).decode(), "base": base}
+
+    def _is_steady_since(self, clock: Steady) -> bool:
+        since = [one for one in self._returns if one.at_s >= clock.at_s]
+        return len(since) < MOST_RETURNS and all(one.is_steady(self._now()) for one in (clock, *since))
 
 
 class TooLarge:

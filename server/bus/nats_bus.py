@@ -122,11 +122,10 @@ class NatsBus:
         except wire.Malformed as why:
             return self._questions.refuse(message.subject, why)
         vehicle = wire.vehicle_of(message.subject)
-        if (is_again := self._agents.connects(vehicle, here)) is not None:
+        if not here.is_copy and (is_again := self._agents.connects(vehicle, here)) is not None:
             self._logs.note_resuming(vehicle, is_able=here.resumes)
             self._meet(vehicle, here.run, here.last, is_again=is_again)
-            self._pulls.take_unasked(vehicle, here)
-        return None
+        return self._pulls.take_unasked(vehicle, here)
 
     def _meet(self, vehicle: str, run: str, last: int, *, is_again: bool = False) -> None:
         is_new, is_back = vehicle not in self._logs, is_again or self._agents.is_gone(vehicle)

@@ -27,13 +27,13 @@ class Steady:
 
     def __init__(self, slewed: Callable[[], float] = slewed_s) -> None:
         self._slewed = slewed
-        self._at_s = self._slewed_s = 0.0
+        self.at_s = self._slewed_s = 0.0
 
     def note(self, now_s: float) -> None:
-        self._at_s, self._slewed_s = now_s, self._slewed()
+        self.at_s, self._slewed_s = now_s, self._slewed()
 
     def is_steady(self, now_s: float) -> bool:
-        return abs(self._slewed() - self._slewed_s) <= ROUNDING_S + DRIFT / 2 * (now_s - self._at_s)
+        return abs(self._slewed() - self._slewed_s) <= ROUNDING_S + DRIFT / 2 * (now_s - self.at_s)
 
 
 class AgentAhead:

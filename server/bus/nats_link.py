@@ -23,7 +23,7 @@ from server.system.supervision import Supervisor
 
 log = logging.getLogger("catgraph.bus")
 
-SPARES = 2  # of an agent, which a radio may be before
+SPARES = 4  # of an agent, which a radio may be before: one is taken, two have copies of states, one is pinged or unused
 RETRY_S = 1.0
 MOST_AT_ONCE = 4  # connections in a row that are taken without a pause, though none worked for long
 WORKS_S = 2.0
@@ -110,6 +110,10 @@ class BrokerLink:
         if self._is_started and self._is_connected:
             return None
         return f"The broker {self._broker.address} is not connected: {self._why}."
+
+    def beside(self) -> list[Client]:
+        """As `Spares.beside`."""
+        return self._spares.beside()
 
     @property
     def _is_connected(self) -> bool:

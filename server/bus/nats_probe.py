@@ -12,7 +12,7 @@ from collections.abc import Callable
 from server.system.loopback import is_ip
 from server.system.supervision import cancel
 
-EVERY_S = 0.25  # a dial into the last moment of a gap is lost, and the system repeats it after 1 or 3 s
+EVERY_S = 0.1  # a dial into the last moment of a gap is lost, and the system repeats it after 1 or 3 s
 SLOWLY_S = 1.0  # where the broker was away for a minute
 SLOWLY_AFTER_S = 60.0
 SPREAD = 0.1  # of that time: the agents of a broker that was lost are not to dial it in step

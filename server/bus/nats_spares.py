@@ -14,13 +14,14 @@ from urllib.parse import urlsplit
 
 from nats.aio.client import Client
 
-from server.bus.nats_probe import EVERY_S, PortProbe
+from server.bus.nats_probe import PortProbe
 from server.system.supervision import cancel
 
 PORT = 4222
 RETRY_S = 1.0  # after a dial that the broker refused
 SPARE_RETRY_S = 10.0  # where it is not needed now
 PROBED_FOR_S = 60.0  # then a dial is tried as well
+GAP_S = 0.5  # where the port answers no sooner, the first packet of a dial is lost
 TRIED_ANYWAY_S = 600.0  # in a gap an idle connection that is tried is lost
 MOST_DIALS = 6  # at once, with those that settle, and in RETRY_S
 SETTLES_S = 3.0  # a broker pings a new connection after 2.0 to 2.4 s: lost in a gap, that holds up all that follows
@@ -89,7 +90,7 @@ class Spares:
             # In a gap it would be lost as the one before; where no new connection is let through, it is the only one.
             wait_s = TRIED_ANYWAY_S if self.is_any else None
             await asyncio.wait({probing, dialled}, timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
-            if probing.done() and asyncio.get_running_loop().time() - began_s > 2 * EVERY_S:
+            if probing.done() and asyncio.get_running_loop().time() - began_s > GAP_S:
                 self._begin(1 + self._count)  # beside those whose first packet waits to be repeated
             while True:
                 while self._idle:
@@ -104,6 +105,14 @@ class Spares:
             self._changed.set()  # one is missing now
             dialled.cancel()
             self._probe.end()
+
+    def beside(self) -> list[Client]:
+        """Two idle ones, or one, for copies of what is sent by the one that was taken. Where there are more, one stays
+        unused: the next gap may begin at once."""
+        self._forget_ended()
+        used = self._idle[: min(2, max(1, len(self._idle) - 1))]
+        self._idle = [*self._idle[len(used) :], *used]
+        return used
 
     def works(self) -> None:
         """The one that was taken last answers."""

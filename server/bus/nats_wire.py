@@ -12,8 +12,8 @@ A request about a command has its id in the header `Catgraph-Trace`, for the log
 
 A frame is pulled, never pushed: one is under way to a node at a time, over a slow radio a few (`nats_pulls.py`), so
 that a stalled hop finds nothing old. Where the pull allows it, the answer is compressed by zlib, and by the frame that
-the node has as the preset dictionary. Behind a gap a few states come unasked with the announcements of the agent, until
-its first pull: an agent may publish no other subject. All times are of the agent's monotonic clock, in seconds.
+the node has as the preset dictionary. Behind a gap a few states come unasked with the announcements of the agent, by
+two of its connections: it may publish no other subject. All times are of the agent's monotonic clock, in seconds.
 """
 
 from __future__ import annotations
@@ -88,6 +88,7 @@ class Here(Body):
     last: Number
     resumes: bool = False  # the agent answers `resume`
     connection: Number = 0  # of this run to the broker; what still comes from an earlier one is old
+    is_copy: bool = False  # by an idle connection: only its state counts, no request finds the agent by it
     state: str = ""  # base64 of a frame, compressed by frame `base`
     base: Number = 0
 
@@ -194,10 +195,10 @@ class Bases:
         return self._texts.get(number, b"")
 
 
-def compressed(frame: bytes, base: bytes = b"") -> bytes:
+def compressed(frame: bytes, base: bytes = b"", level: int = ZLIB_LEVEL) -> bytes:
     """An encoded frame for a node that inflates it, and has `base`: a state has 14 packets, compressed 4, and one where
     it is compressed by another state. Over a radio that loses one in ten, one of 14 is nearly always lost."""
-    deflater = zlib.compressobj(ZLIB_LEVEL, zdict=base) if base else zlib.compressobj(ZLIB_LEVEL)
+    deflater = zlib.compressobj(level, zdict=base) if base else zlib.compressobj(level)
     return deflater.compress(frame) + deflater.flush()
 
 

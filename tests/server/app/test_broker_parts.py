@@ -24,5 +24,6 @@ async def test_an_agent_announces_itself_once_all_else_is_subscribed_to(tmp_path
         *_, last = running.link._parts  # type: ignore[union-attr]
         assert isinstance(last, NatsAgent)
         assert last._is_limited == has_key
+        assert last.beside == running.link.beside, "by which it sends its first states as well"  # type: ignore[union-attr]
     finally:
         storage.close()

@@ -262,6 +262,28 @@ class Idle:
         self.is_connected = False
 
 
+async def test_of_idle_connections_two_have_copies_and_one_stays_unused_and_is_given_next() -> None:
+    def idle() -> str:
+        return "".join(cast(Any, one).name for one in spares._idle)
+
+    spares = Spares(cast(Any, None), "nats://127.0.0.1:1", 4)
+    for names, used, then in (
+        ("abcd", "ab", "cdab"),
+        ("abc", "ab", "cab"),
+        ("ab", "a", "ba"),
+        ("a", "a", "a"),
+        ("", "", ""),
+    ):
+        spares._idle = [cast(Client, Idle(name, [])) for name in names]
+        assert "".join(cast(Any, one).name for one in spares.beside()) == used
+        assert idle() == then
+    ended, lives = Idle("a", []), Idle("b", [])
+    ended.is_connected = False
+    spares._idle = [cast(Client, ended), cast(Client, lives)]
+    assert spares.beside() == [lives]
+    await spares.close()
+
+
 @pytest.mark.virtual_time
 async def test_spare_connections_are_pinged_in_turn_and_the_one_that_was_silent_for_longest_is_given_first() -> None:
     made: list[Idle] = []

@@ -12,7 +12,7 @@ import pytest
 from server.bus import nats_wire as wire
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
-from server.bus.nats_agent_frames import SentFrames
+from server.bus.nats_agent_frames import MOST_FIRST, MOST_RETURNS, SentFrames
 from server.bus.nats_clock import AgentAhead, Steady
 
 STATE = random.Random(1).randbytes(2000).hex()
@@ -59,7 +59,7 @@ class Agent:
         self.frames.note_pull(node.vehicle, "state", pull)
         if is_answer_lost:
             return
-        if is_new:
+        if is_new or self.bus.newest(node.vehicle, "state") is None:
             self._made += 1
             self.bus.put(node.vehicle, "state", f"{STATE}{self._made}")
         frame = self.bus.newest(node.vehicle, "state")
@@ -76,10 +76,13 @@ class Agent:
 
     def behind(self, nodes: list[Node]) -> Iterator[tuple[Node, float]]:
         self.frames.begin_first()
+        yield from self.first_states(nodes)
+
+    def first_states(self, nodes: list[Node]) -> Iterator[tuple[Node, float]]:
         for vehicle in ("ocelot", "margay"):
             self._made += 1
             self.bus.put(vehicle, "state", f"{STATE}{self._made}")
-            here = self.frames.announcement(vehicle, 2)
+            here = self.frames.announcement(vehicle, 2, is_first=True)
             for node in nodes:
                 if node.vehicle == vehicle and here.state and (base := node.texts.get(here.base)):
                     head, payload = wire.decode_frame(base64.b64decode(here.state), base)
@@ -140,6 +143,61 @@ async def test_behind_gaps_in_a_row_the_clock_counts_from_the_last_answer() -> N
         found += [older_s for _, older_s in agent.behind([node])]
         agent.pull(node, is_answer_lost=True)
     assert found, "the first gaps are short enough for a clock that is slewed so little"
+    assert min(found) >= -READ_S
+
+
+@pytest.mark.parametrize("rate", [0.083, -0.083])
+@pytest.mark.parametrize("slewed_s", [0.1, 0.3])
+@pytest.mark.parametrize("first_gap_s", [30.0, 590.0])
+async def test_behind_a_long_gap_and_one_that_begins_at_once(first_gap_s: float, slewed_s: float, rate: float) -> None:
+    """A state that was sent unasked behind the first one has the clock of before it, which drifts for long."""
+    agent = Agent(rate, 70.0 + first_gap_s, 70.0 + first_gap_s + slewed_s / 0.083)
+    node = Node("ocelot")
+    while agent.t < 60.0:
+        agent.t += 0.5
+        agent.pull(node)
+    agent.t += first_gap_s
+    agent.frames.begin_first()
+    for _ in range(10):
+        agent.t += 0.1
+        assert [*agent.first_states([node])]
+        agent.pull(node, is_new=False)
+    agent.t += 30.0
+    assert all(older_s >= -READ_S for _, older_s in agent.behind([node]))
+
+
+async def test_none_goes_unasked_behind_more_gaps_in_a_row_than_are_kept() -> None:
+    agent = Agent(0.0, 0.0, 1.0)
+    node = Node("ocelot")
+    agent.pull(node)
+    agent.pull(node)
+    for _ in range(MOST_RETURNS - 1):
+        agent.t += 0.3
+        assert [*agent.behind([node])]
+    agent.t += 0.3
+    assert not [*agent.behind([node])]
+
+
+@pytest.mark.parametrize("seed", range(30))
+async def test_beside_answers_of_which_some_are_lost(seed: int) -> None:
+    chance = random.Random(seed)
+    from_s = chance.uniform(GAP[0] - 2.0, GAP[1] + 2.0)
+    agent = Agent(chance.choice([0.083, -0.083]), from_s, from_s + chance.uniform(0.2, 3.0))
+    nodes = [Node("ocelot"), Node("ocelot"), Node("margay")]
+    found = []
+    while agent.t < GAP[0]:
+        agent.t += 0.1
+        agent.pull(chance.choice(nodes), is_new=chance.random() < 0.7)
+    for _ in range(3):
+        agent.t += GAP[1] - GAP[0]
+        agent.frames.begin_first()
+        for _ in range(MOST_FIRST):
+            agent.t += 0.1
+            reached = [node for node in nodes if chance.random() < 0.7]
+            found += [older_s for _, older_s in agent.first_states(reached)]
+            for node in reached:
+                agent.pull(node, is_answer_lost=chance.random() < 0.5, is_new=chance.random() < 0.5)
+    assert found, "where no clock is slewed between"
     assert min(found) >= -READ_S
 
 
