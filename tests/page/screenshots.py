@@ -272,6 +272,12 @@ async def slow_down_not_confirmed_seen(server: Canned, page: Page) -> None:
     server.state["alarms"][0]["state"] = "ACKED"
 
 
+@scene("slow-down-not-confirmed-warned")
+async def slow_down_not_confirmed_warned(server: Canned, page: Page) -> None:
+    await slow_down_not_confirmed_seen(server, page)
+    server.state["alarms"].append(alarm("phone_missing", "Phone position missing", text="No fix for 12 s."))
+
+
 @scene("slow-down-in-dialog")
 async def slow_down_in_dialog(server: Canned, page: Page) -> None:
     await home_fault(server, page)

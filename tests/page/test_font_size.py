@@ -10,10 +10,11 @@ import pytest_asyncio
 from playwright.async_api import Browser, Page, async_playwright, expect
 
 from tests.chromium import FLAGS
-from tests.page.canned import Canned
+from tests.page.canned import Canned, live
 from tests.page.conftest import Phone, new_phone
+from tests.page.screenshots import at_a_planned_stop
 from tests.page.screenshots import several as many
-from tests.page.test_overlaps import DRAWN, critical, noticed, opened, several, walk
+from tests.page.test_overlaps import DRAWN, critical, noticed, opened, several, walk, warned
 
 SIZES: list[tuple[float, float]] = [(360, 740), (412, 915), (820, 1180), (1440, 900)]
 LARGER = 1.5
@@ -119,6 +120,32 @@ async def test_all_of_the_page_grows_with_the_browsers_font(grown: Phone, phone:
 @pytest.mark.own_phone
 async def test_each_key_is_in_reach_with_a_large_font(grown: Phone, canned: Canned) -> None:
     await all_is_in_reach(grown, canned, [SIZES[0], SIZES[3]], "home")
+
+
+@pytest.mark.gate
+@pytest.mark.own_phone
+async def test_with_a_large_font_a_warning_leaves_a_planned_stop_and_the_distance_in_sight(
+    grown: Phone, canned: Canned
+) -> None:
+    canned.state = at_a_planned_stop(live())
+    page = await opened(grown, canned)
+    await expect(page.locator("body[data-snack]")).to_be_attached()
+    for width, height in ((360, 800), (412, 915)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.wait_for_function(
+            """() => {
+              const at = (one) => document.querySelector(one).getBoundingClientRect();
+              const parts = ['.planned-stop', '.near [data-f=distance]', '.snack:not([hidden])'];
+              const [stop, distance, notice] = parts.map(at);
+              const isSeen = stop.height > 20 && distance.height > 12;
+              return isSeen && stop.bottom <= distance.top && distance.bottom <= notice.top;
+            }"""
+        )
+    canned.state = warned()
+    canned.state["signals"]["distance"] |= {"freshness": "stale", "age_s": 123.4}
+    await expect(page.locator("[data-part=nearest] .age[data-ink=stale]")).to_be_attached()
+    found = await walk(page, [(360, 800), (375, 812), (412, 915)])
+    assert [what for wrong in found.values() for what in wrong if "nearest object" in what] == []
 
 
 @pytest.mark.gate

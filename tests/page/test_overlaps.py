@@ -165,27 +165,97 @@ async def test_the_mark_key_lies_over_no_other_key_on_a_phone_on_its_side(
         assert await walk(page, [(640, 360), (740, 360), (915, 412), (1000, 480), (1180, 412)]) == {}, down
 
 
-#: What of the slide and of the speed is in the window, and not under the panel of the fresh mark.
-BESIDE_THE_MARK = """() => {
-  const at = (one) => document.querySelector(one).getBoundingClientRect();
-  const [mark, slide, speed, view] = ['.fresh', '#monitor > .rail .slide', '.gauge .speed', '#monitor > .view'].map(at);
-  const isFree = ({ left, right, top, bottom }) =>
-    left >= mark.right || right <= mark.left || top >= mark.bottom || bottom <= mark.top;
-  const isWhole = slide.bottom <= innerHeight && mark.top >= 0 && speed.bottom <= view.bottom;
-  return mark.height > 0 && isWhole && isFree(slide) && isFree(speed);
+#: Whether the name of a stale distance is more than its first letters, and each press at its age is for it.
+AGE_ACTS = """() => {
+  const age = document.querySelector('[data-part=nearest] .age');
+  const name = document.querySelector('[data-part=nearest] .head > span');
+  const { left, top, right, bottom } = age.getBoundingClientRect();
+  const x = Math.min(right - 2, left + 30);
+  const isFree = [top + 1, (top + bottom) / 2, bottom - 3].every((y) => document.elementFromPoint(x, y) === age);
+  return age.dataset.ink === 'stale' && isFree && name.clientWidth > 56;
 }"""
 
 
 @pytest.mark.gate
-@pytest.mark.parametrize(("width", "height"), [(568, 320), (640, 360), (667, 375)])
-async def test_a_fresh_mark_leaves_slide_and_speed_in_sight_on_a_phone_on_its_side(
+async def test_beside_the_gauge_a_stale_distance_is_named_and_its_age_acts(phone: Phone, canned: Canned) -> None:
+    canned.state = warned(decelerate=slow("armed"))
+    canned.state["signals"]["distance"] |= {"freshness": "stale", "age_s": 123.4}
+    page = await opened(phone, canned)
+    for width, height in ((375, 667), (412, 700)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.wait_for_function(AGE_ACTS)
+
+
+#: Whether these parts are in the window, and not under the panel of the fresh mark.
+BESIDE_THE_MARK = """(names) => {
+  const at = (one) => document.querySelector(one).getBoundingClientRect();
+  const [mark, view] = ['.fresh', '#monitor > .view'].map(at);
+  const isFree = ({ left, right, top, bottom }) =>
+    left >= mark.right || right <= mark.left || top >= mark.bottom || bottom <= mark.top;
+  const isCut = (one) => at(one).width < 12 || (/gauge|near/.test(one) && at(one).bottom > view.bottom);
+  return mark.height > 0 && mark.top >= 0 && at('#monitor > .rail .slide').bottom <= innerHeight
+    && names.every((one) => isFree(at(one)) && !isCut(one));
+}"""
+LEFT_FREE = ["#monitor > .rail .slide", ".gauge .speed", "#monitor > .strip"]
+WITH_DISTANCE = ((360, 640), (375, 667), (412, 740), (740, 360), (915, 412))
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize(
+    ("width", "height"), [(320, 568), (375, 560), (568, 320), (640, 360), (667, 375), *WITH_DISTANCE]
+)
+async def test_a_fresh_mark_leaves_slide_and_speed_in_sight_on_a_small_phone(
     phone: Phone, canned: Canned, width: int, height: int
 ) -> None:
     canned.state = live() | {"decelerate": slow("armed")}
     page = await opened(phone, canned)
     await page.set_viewport_size({"width": width, "height": height})
     await page.locator(".mark-key").tap()
-    await page.wait_for_function(BESIDE_THE_MARK)
+    await page.evaluate(KEPT_MARK)
+    near = [".near [data-f=distance]"] if (width, height) in WITH_DISTANCE else []
+    await page.wait_for_function(BESIDE_THE_MARK, arg=LEFT_FREE + near)
+
+
+#: Whether the keys of the fresh mark stand beside one another, each as wide as its text.
+KEYS_APART = """() => {
+  const keys = [...document.querySelectorAll('.fresh-keys .key')];
+  const at = keys.map((one) => one.getBoundingClientRect());
+  const isApart = at.every(({ right, top }, one) => !at[one + 1] || right <= at[one + 1].left || top < at[one + 1].top);
+  return keys.length === 3 && at[0].width > 0 && isApart && keys.every((one) => one.scrollWidth <= one.clientWidth);
+}"""
+
+
+@pytest.mark.gate
+async def test_the_keys_of_a_fresh_mark_lie_over_none_of_each_other(phone: Phone, canned: Canned) -> None:
+    canned.state = live() | {"decelerate": slow("armed")}
+    page = await opened(phone, canned)
+    await page.set_viewport_size({"width": 1180, "height": 480})
+    await page.locator(".mark-key").tap()
+    await page.evaluate(KEPT_MARK)
+    for width, height in ((1180, 480), (800, 500), (1180, 412), (568, 320), (360, 640)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.wait_for_function(KEYS_APART)
+
+
+#: Whether the warning's name stands whole.
+NAMED = """(name) => {
+  const title = document.querySelector('.snack[data-f=warning] .tx > b');
+  const isWhole = title.scrollHeight <= title.clientHeight + 1 && title.scrollWidth <= title.clientWidth;
+  return title.textContent.includes(name) && title.clientHeight > 12 && isWhole;
+}"""
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize(("width", "height"), [(320, 568), (568, 320), (640, 360), (740, 360)])
+async def test_the_name_of_a_warning_is_whole_on_a_small_phone(
+    phone: Phone, canned: Canned, width: int, height: int
+) -> None:
+    canned.state = warned()
+    page = await opened(phone, canned)
+    await page.set_viewport_size({"width": width, "height": height})
+    for name in ("Phone position missing", "Sources of the speed disagree", "Sources of the position disagree"):
+        canned.state["alarms"] = [alarm(name, name, text=LONG)]
+        await page.wait_for_function(NAMED, arg=name)
 
 
 #: Whether a press at the middle of Stop, Pause and slide is for them, and the Mark key is no higher than they are.

@@ -10,7 +10,7 @@ from playwright.async_api import expect
 
 from tests.page.canned import Canned, alarm
 from tests.page.conftest import Phone
-from tests.page.test_overlaps import noticed
+from tests.page.test_overlaps import noticed, walk
 from tests.page.test_overlaps import opened as opened_whole
 from tests.page.test_parts import opened, sent, until_sent
 
@@ -98,11 +98,26 @@ async def test_a_note_leaves_the_planned_stop_in_sight(phone: Phone, canned: Can
     await expect(page.locator(LINE)).to_be_in_viewport()
 
 
+@pytest.mark.parametrize(("width", "height"), [(568, 320), (640, 340), (740, 340), (820, 1100)])
+async def test_a_warning_leaves_the_planned_stop_in_sight(
+    phone: Phone, canned: Canned, width: int, height: int
+) -> None:
+    await phone.page.set_viewport_size({"width": width, "height": height})
+    canned.state["session"]["planned_stop"] = stop()
+    canned.state["alarms"] = [alarm("gps_drift", "GPS drift", sound="none", planned_stop=True)]
+    page = await opened_whole(phone, canned)
+    if width >= 700:  # there the pane of the alarms has the warning, unless a notice is beside it
+        await noticed(page, canned)
+    await expect(page.locator("body[data-snack]")).to_be_attached()
+    await expect(page.locator(LINE)).to_be_in_viewport(ratio=0.98)
+    assert await walk(page, [(width, height)]) == {}
+
+
 async def test_on_a_low_phone_a_warning_leaves_the_speed_in_sight(phone: Phone, canned: Canned) -> None:
     await phone.page.set_viewport_size({"width": 320, "height": 568})
     canned.state["session"]["planned_stop"] = stop()
     canned.state["alarms"] = [alarm("gps_drift", "GPS drift at standstill", sound="none", planned_stop=True)]
-    await opened(phone, canned)
+    await opened_whole(phone, canned)
     snack, line = phone.page.locator(".snack[data-f=warning]"), phone.page.locator(LINE)
     await expect(snack).to_be_visible()
     await expect(line).to_contain_text("Planned stop: in the workshop")

@@ -70,6 +70,28 @@ ROOM = {
         f"() => {{ {RECT} const end = at('.near').bottom;"
         " return document.querySelector('.ledge').hidden && end <= at('#monitor > .rail').top }",
     ),
+    "the distance is beside the gauge on a small phone on its side": (
+        "home", 640, 360,
+        f"() => {{ {RECT} const [near, gauge] = [at('.near'), at('.gauge')];"
+        " return near.bottom <= at('#monitor > .rail').top && gauge.right <= near.left"
+        " && at('.near [data-f=stops]').right <= innerWidth }",
+    ),
+    "the car is in the picture of the scan on a small phone on its side": (
+        "scan", 640, 360, f"() => {{ {RECT} return at('.scanc').bottom <= at('#monitor > .rail').top + 1 }}",
+    ),
+    "two cars are whole over a notice of one of them on a low phone": (
+        "cars", 360, 640,
+        f"() => {{ {RECT} return at('#sheet-cars > .cars li:nth-child(2)').bottom <= at('.snack.other').top }}",
+    ),
+    "a warning covers no distance beside a slow-down that fails, on a phone on its side": (
+        "slow-down-not-confirmed-warned", 740, 360,
+        f"() => {{ {RECT} return at('.near [data-f=distance]').bottom <= at('.snack').top + 1 }}",
+    ),
+    "a warning covers no sentence of a slow-down that fails, and the speed is whole, on a small phone on its side": (
+        "slow-down-not-confirmed-warned", 568, 320,
+        f"() => {{ {RECT} const [order, snack, speed] = ['.under > .order p', '.snack', '.gauge .speed'].map(at);"
+        " return order.height > 12 && order.bottom < snack.top && speed.bottom <= at('#monitor > .view').bottom }",
+    ),
     "no car in alarm is behind the edge of the list of cars": (
         "cars",
         1024,
