@@ -15,7 +15,11 @@ import pytest
 from websockets.sync.client import connect
 from websockets.sync.server import serve
 
+from server.judge.unit_evidence import new_evidence
+from server.judge.units import rule_for
+from server.simulator.messages import VEL
 from tests.bench.__main__ import main
+from tests.bench.car import PROBES_MPS, Car
 from tests.bench.child import Child, Failed
 from tests.bench.line import fitted
 from tests.bench.program import Program, used
@@ -208,6 +212,21 @@ def test_commands_are_timed_as_they_come_to_the_port_and_nothing_else_is() -> No
     arrived = wire.published("/ours")
     assert len(arrived) == 2
     assert began_ns < arrived[0] <= arrived[1] < ended_ns
+
+
+async def test_no_speed_above_the_limit_looks_like_another_unit_of_the_drives_speed() -> None:
+    """Else a server judges the speed no more, and no alarm comes."""
+    car = Car(None)
+    speeds = sorted({round(message["linear"]["x"], 2) for _, topic, message in car.tape if topic == VEL.topic})
+    rule = rule_for("speed", VEL.type)
+    assert rule is not None
+    for calm_mps in speeds:
+        for fast_mps in PROBES_MPS:
+            evidence = new_evidence("speed", rule)
+            for _ in range(20):
+                evidence.add(calm_mps, rule.units)
+                evidence.add(fast_mps, rule.units)
+            assert not evidence.alternates, (calm_mps, fast_mps)
 
 
 def test_alarms_are_matched_with_their_speeds() -> None:

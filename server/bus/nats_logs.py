@@ -38,15 +38,19 @@ class EventCache:
         self.run = run
         self.newest = max(self.newest, last)
 
-    def take(self, events: Sequence[dict[str, Any]]) -> bool:
-        """Events in order; those that were there are left out. True where there are new ones; see `is_behind`."""
+    def take(self, events: Sequence[dict[str, Any]], *, are_all: bool = False) -> bool:
+        """Events in order; those that were there are left out. True where there are new ones; see `is_behind`.
+
+        `are_all`: they follow `last`, or an earlier one, and the agent has no others among them: a number that is
+        missing is of an event that its log has lost.
+        """
         before = self.last
         for event in events:
             n = event.get("n")
             if type(n) is not int:
                 return self.last != before
             self.newest = max(self.newest, n)
-            if n == self.last + 1:
+            if n == self.last + 1 or (are_all and n > self.last):
                 self._recent.append(event)
                 self.last = n
         return self.last != before
@@ -126,9 +130,9 @@ class RemoteLogs:
         common, after, new_after = answer.resumed
         return Resumed(common=common, after=after, new_after=new_after)
 
-    def take(self, vehicle: str, events: list[dict[str, Any]]) -> None:
-        """Events that were published or requested."""
-        if self._caches[vehicle].take(events):
+    def take(self, vehicle: str, events: list[dict[str, Any]], *, are_all: bool = False) -> None:
+        """Events that were published; or requested, and so all that the agent has from where the cache was."""
+        if self._caches[vehicle].take(events, are_all=are_all):
             self._changed.set()
             self._changed = asyncio.Event()
             self._on_new(vehicle)
@@ -148,7 +152,7 @@ class RemoteLogs:
                 answer = await self._questions.ask(vehicle, wire.Ask(do="after", n=before))
                 if answer.run != cache.run:  # it announces its new run itself; the rest is of another log
                     return
-                self.take(vehicle, answer.events)
+                self.take(vehicle, answer.events, are_all=True)
                 if cache.last == before:
                     return
 

@@ -1,7 +1,9 @@
 """The bench's car: twenty seconds of the simulated one, made beforehand and played round and round on a rosbridge.
 
-So the process's load is the bridge's and not the simulation's. Every speed message tells in `angular.x`, which the real
-car leaves at zero, when it was published [s, CLOCK_MONOTONIC].
+So the process's load is the bridge's and not the simulation's. They are of a part of the drive where no speed is a
+probe's divided by 3.6: a server that sees such pairs again and again takes them for m/s and km/h of two publishers, and
+judges the speed no more. Every speed message tells in `angular.x`, which the real car leaves at zero, when it was
+published [s, CLOCK_MONOTONIC].
 """
 
 from __future__ import annotations
@@ -18,9 +20,10 @@ from server.simulator.car import SimulatedCar
 from server.simulator.messages import CMD_VEL, VEL
 from tests.bench.orders import execute_orders, options
 
+BEGINS_S = 11.0  # of the drive: 6.5 to 8 m/s from there on
 TAPE_S = 20.0
-CALM_MPS = 9.0  # all the drive stays below, and so clears the alarm
-PROBE_SPEEDS = 80  # a probe's speed identifies it: 12.0, 12.1 … 19.9 m/s, and again
+CALM_MPS = 9.0  # all the tape stays below, and so clears the alarm
+PROBES_MPS = tuple(12.0 + k / 10 for k in range(80))  # a probe's speed identifies it; then they begin again
 SOON_S = 0.0005
 
 
@@ -29,16 +32,18 @@ class Car:
 
     def __init__(self, beams: int | None) -> None:
         drive = SimulatedCar(scan_beams=beams)
-        self._tape: list[tuple[float, str, Json]] = []
+        self.tape: list[tuple[float, str, Json]] = []
         for step in drive.steps():
-            if drive.elapsed_s >= TAPE_S:
+            at_s = drive.elapsed_s - BEGINS_S
+            if at_s >= TAPE_S:
                 break
-            self._tape += [(drive.elapsed_s, message.topic, message.message) for message in step.messages]
+            if at_s >= 0.0:
+                self.tape += [(at_s, message.topic, message.message) for message in step.messages]
         self.bridge = RosBridge(node="/bench_car")
         for published in drive.published:
             self.bridge.advertise(published.topic, published.type)
         self.topics = [published.topic for published in drive.published]
-        self.messages_per_s = len(self._tape) / TAPE_S
+        self.messages_per_s = len(self.tape) / TAPE_S
         self._calm = asyncio.Event()  # a calm speed was published since
         self._commanded: dict[str, list[tuple[int, float]]] = {}  # topic → when a command arrived [ns], and its speed
         self.bridge.on_publish.append(self._hear)
@@ -48,7 +53,7 @@ class Car:
         loop = asyncio.get_running_loop()
         lap_began_s = loop.time()
         while True:
-            for offset_s, topic, message in self._tape:
+            for offset_s, topic, message in self.tape:
                 wait_s = lap_began_s + offset_s - loop.time()
                 if wait_s > SOON_S:
                     await asyncio.sleep(wait_s)
@@ -67,7 +72,7 @@ class Car:
             await asyncio.sleep(every_s * moments.uniform(0.6, 1.4))
             await self._calm.wait()
             self._calm.clear()
-            speed_mps = 12.0 + k % PROBE_SPEEDS / 10
+            speed_mps = PROBES_MPS[k % len(PROBES_MPS)]
             sent.append([speed_mps, time.monotonic_ns()])
             self._publish_speed(speed_mps)
         return sent

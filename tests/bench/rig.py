@@ -18,6 +18,7 @@ class Pace:
 
     probes: int  # alarms a series
     probe_every_s: float
+    rounds: int  # series in turn, where one figure is another's difference
     load_s: float  # how long load is measured
     held_s: float  # how long an order is: of 200 commands three decide on p99, and each late one spoils two gaps
     gap_s: float  # how long a page reads nothing
@@ -38,6 +39,7 @@ class Pace:
 FULL = Pace(
     probes=240,
     probe_every_s=0.08,
+    rounds=5,
     load_s=10.0,
     held_s=40.0,
     gap_s=10.0,
@@ -57,6 +59,7 @@ FULL = Pace(
 QUICK = Pace(
     probes=20,
     probe_every_s=0.06,
+    rounds=1,
     load_s=0.8,
     held_s=0.8,
     gap_s=2.0,

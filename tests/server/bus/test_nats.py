@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import sqlite3
 from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import orjson
 import pytest
 
+from server.bus import journal
 from server.bus import nats_wire as wire
 from server.bus.bus import ALL, FRAME_LIVES_S, NotServed, PageBus
 from server.bus.journal import Journal
@@ -173,6 +176,27 @@ async def test_a_broker_that_is_killed_loses_and_doubles_no_event() -> None:
         both.session.put("ocelot", "state", "drives")
         await until(lambda: both.page.newest("ocelot", "state"))
         assert {one["what"] for one in both.commands} == {"again"}
+
+
+async def test_events_arrive_behind_those_that_a_full_disk_has_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(journal, "MAX_UNSAVED", 50)
+    clock = Clock()
+    bus = LocalBus(Journal(tmp_path / "events.sqlite"), now=clock)
+    bus.serve("ocelot", lambda _: asyncio.sleep(0.0, {}))
+    async with running_broker() as broker, node(broker.address, clock) as page:
+        async with offering(bus, broker.address, "run-1", clock):
+            bus.append("ocelot", [event()] * 5)
+            await until(lambda: page.last_event("ocelot") == 5)
+        with contextlib.closing(sqlite3.connect(tmp_path / "events.sqlite", isolation_level=None)) as other:
+            other.execute("BEGIN IMMEDIATE")
+            bus.append("ocelot", [event()] * 300)
+            async with offering(bus, broker.address, "run-1", clock):
+                await until(lambda: page.last_event("ocelot") == 305)
+                assert numbers(await page.events_after("ocelot", 4, 400)) == [5, *range(256, 306)]
+                bus.append("ocelot", [event()])
+                await until(lambda: page.last_event("ocelot") == 306)
 
 
 @pytest.mark.parametrize("body", [b"", b"\xff\xfe", b"[]", b'{"run": 1}', b"{" * 200, b'{"events": [{"n": "x"}]}'])

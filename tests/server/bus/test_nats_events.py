@@ -36,6 +36,18 @@ def test_nothing_of_another_run_is_taken_for_this_one(last: int) -> None:
     assert cache.after(last, 9) == events(last + 1)
 
 
+def test_what_an_agent_has_lost_is_not_waited_for() -> None:
+    """Published events with a gap wait for the missing ones; of requested ones the agent has no others."""
+    cache = EventCache()
+    cache.begin("a", 3)
+    assert not cache.take(events(7))
+    assert cache.take(events(6, 7), are_all=True)
+    assert (cache.last, cache.is_behind, cache.after(3, 9)) == (7, False, None)
+    assert cache.take(events(8))
+    assert cache.after(5, 9) == events(6, 7, 8)
+    assert not cache.take(events(6, 7, 8), are_all=True)
+
+
 @pytest.mark.parametrize(
     "more", ['"age_s": 1e308', '"age_s": 1e30', '"waited_s": NaN', '"now_s": 1e300', '"number": -1']
 )
