@@ -176,9 +176,14 @@ class Phone:
         await self.page.evaluate(DRAWN, states)
 
     async def live(self) -> None:
-        """Waits until the values are live."""
+        """Waits until the values are live, and the page complete."""
         await expect(self.f("link-state")).to_have_text(LIVE, timeout=40_000)
         await expect(self.f("veil")).not_to_have_attribute("data-on", re.compile("."))
+        await self.complete()
+
+    async def complete(self) -> None:
+        """Waits until all parts are mounted, which is after the first values: what a part listens to is lost before."""
+        await expect(self.page.locator("#monitor [data-late][hidden]")).to_have_count(0, timeout=40_000)
 
     async def acknowledge_all(self) -> None:
         """Acknowledges what the car raises of its own, as an operator does."""

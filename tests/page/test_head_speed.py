@@ -78,6 +78,7 @@ async def test_no_speed_of_a_recording_stands_in_a_head(phone: Phone, canned: Ca
     canned.state, canned.timeline = replayed(live()), replayed_timeline()
     await phone.page.goto(f"{canned.address}/?replay=car_0&t=246#home")
     await phone.page.wait_for_selector("#monitor:not([hidden])")
+    await phone.complete()
     await phone.page.evaluate(OPEN, "log")
     await expect(phone.page.locator("#monitor > .titlebar")).to_contain_text("Alarm log of the live car")
     await expect(phone.page.locator("#monitor > .titlebar .head-speed")).to_be_hidden()

@@ -360,6 +360,23 @@ async def test_of_a_copy_only_its_state_counts() -> None:
     await at.bus.stop()
 
 
+async def test_of_a_late_announcement_by_an_earlier_connection_only_its_state_counts() -> None:
+    """The system delivers it after the connection was lost; it is as old as it is."""
+    at = Node()
+    await at.here(connection=2)
+    at.bus.watch("ocelot", lambda _: None)
+    await until(lambda: _newest(at.bus) == f"{STATE}1")
+    at.clock.ahead_s += 30.0
+    at.answers = 1
+    await at.unasked(2, connection=1, late_s=0.6)
+    assert _newest(at.bus) == f"{STATE}2"
+    assert at.age_s >= 0.65 + at.there_s
+    assert at.bus.link_trouble("ocelot")
+    await asyncio.sleep(0.01)
+    assert at.answers == 1, "nothing is requested again"
+    await at.bus.stop()
+
+
 async def test_what_nobody_looks_at_is_not_taken() -> None:
     at = Node()
     await at.here()
