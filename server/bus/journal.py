@@ -168,12 +168,14 @@ class Journal:
         recent = self.recent_after(vehicle, n, limit)
         return self.stored_after(vehicle, n, limit) if recent is None else recent
 
-    def stored_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
-        """As `after`, from the disk and what waits for it."""
+    def stored_after(self, vehicle: str, n: int, limit: int = 100, *, is_whole: bool = False) -> list[dict[str, Any]]:
+        """As `after`, from the disk and what waits for it; `is_whole`: raises OSError where the disk cannot be read."""
         waiting = self._waiting(vehicle)
         found = self._read("vehicle = ? AND n > ? ORDER BY n LIMIT ?", (vehicle, n, limit))
+        if found is None and is_whole:
+            raise OSError(self.why_refused)
         newest = found[-1]["n"] if found else n
-        return [*found, *(event for event in waiting if event["n"] > newest)][:limit]
+        return [*(found or []), *(event for event in waiting if event["n"] > newest)][:limit]
 
     def recent_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]] | None:
         """As `after`, from memory alone; None where the disk must be read. For the thread that appends."""
@@ -222,7 +224,7 @@ class Journal:
             and (since_ms is None or event["at_ms"] >= since_ms)
             and (until_ms is None or event["at_ms"] < until_ms)
         ]
-        found = self._read(f"{' AND '.join(conditions)} ORDER BY n DESC LIMIT ?", (*values, limit))
+        found = self._read(f"{' AND '.join(conditions)} ORDER BY n DESC LIMIT ?", (*values, limit)) or []
         written = {event["n"] for event in found}
         return [*(event for event in waiting if event["n"] not in written), *found][:limit]
 
@@ -255,12 +257,12 @@ class Journal:
             with self._connection:
                 self._database.close()
 
-    def _read(self, which: str, values: Iterable[str | int]) -> list[dict[str, Any]]:
+    def _read(self, which: str, values: Iterable[str | int]) -> list[dict[str, Any]] | None:
         database = self._database
         if database is None:
             return []
-        query = f"SELECT body FROM event WHERE {which}"  # its conditions are ours
-        return self._try(lambda: [orjson.loads(body) for (body,) in database.execute(query, tuple(values))], [])
+        query = f"SELECT body FROM event WHERE {which}"  # its conditions are ours; None: it cannot be read
+        return self._try(lambda: [orjson.loads(body) for (body,) in database.execute(query, tuple(values))], None)
 
     def _try(self, work: Callable[[], T], else_: T) -> T:
         """What the database answers; where it does not, why is kept, and `else_` is the answer."""

@@ -84,12 +84,21 @@ class LocalBus:
         events = self._journal.recent_after(vehicle, n, limit)
         return None if events is None else self._released(vehicle, events)
 
-    async def events_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
-        """The events after number `n` that pages may have, in order, at most `limit`."""
+    async def events_after(
+        self, vehicle: str, n: int, limit: int = 100, *, is_whole: bool = False
+    ) -> list[dict[str, Any]]:
+        """The events after number `n` that pages may have, in order, at most `limit`.
+
+        `is_whole`: raises NotServed where the disk cannot be read; else there is only what waits for it.
+        """
         recent = self.recent_events(vehicle, n, limit)
         if recent is not None:
             return recent
-        return self._released(vehicle, await self._read(lambda: self._journal.stored_after(vehicle, n, limit)))
+        try:
+            found = await self._read(lambda: self._journal.stored_after(vehicle, n, limit, is_whole=is_whole))
+        except OSError as why:
+            raise NotServed(f"the alarm log of {vehicle} cannot be read: {why}") from None
+        return self._released(vehicle, found)
 
     async def find_events(self, vehicle: str, **filters: Any) -> list[dict[str, Any]]:
         """As `Journal.find`: all there are, whether or not the disk has them yet."""

@@ -221,7 +221,7 @@ class NatsAgent:
             if ask.do == "command":
                 found["answer"] = dict(await self._command(vehicle, ask))
             elif ask.do == "after":
-                found["events"] = await self._bus.events_after(vehicle, ask.n, ask.limit)
+                found["events"] = await self._bus.events_after(vehicle, ask.n, ask.limit, is_whole=True)
             elif ask.do == "find":
                 filters = {name: value for name, value in ask.filters.items() if name in FILTERS}
                 found["events"] = await self._bus.find_events(vehicle, **filters, limit=ask.limit)

@@ -41,8 +41,8 @@ class EventCache:
     def take(self, events: Sequence[dict[str, Any]], *, are_all: bool = False) -> bool:
         """Events in order; those that were there are left out. True where there are new ones; see `is_behind`.
 
-        `are_all`: they follow `last`, or an earlier one, and the agent has no others among them: a number that is
-        missing is of an event that its log has lost.
+        `are_all`: the agent has no others after `last`, as it was when they were requested: a number that is missing is
+        of an event that its log has lost.
         """
         before = self.last
         for event in events:
@@ -148,9 +148,9 @@ class RemoteLogs:
         cache = self._caches[vehicle]
         with contextlib.suppress(NotServed):
             while cache.is_behind:
-                before = cache.last
+                before, run = cache.last, cache.run
                 answer = await self._questions.ask(vehicle, wire.Ask(do="after", n=before))
-                if answer.run != cache.run:  # it announces its new run itself; the rest is of another log
+                if not answer.run == run == cache.run:  # it announces its new run itself; the rest is of another log
                     return
                 self.take(vehicle, answer.events, are_all=True)
                 if cache.last == before:

@@ -1,8 +1,8 @@
 """The bench's car: twenty seconds of the simulated one, made beforehand and played round and round on a rosbridge.
 
-So the process's load is the bridge's and not the simulation's. They are of a part of the drive where no speed is a
-probe's divided by 3.6: a server that sees such pairs again and again takes them for m/s and km/h of two publishers, and
-judges the speed no more. Every speed message tells in `angular.x`, which the real car leaves at zero, when it was
+So the process's load is the bridge's and not the simulation's. The seconds are of a part of the drive where no speed is
+a probe's divided by 3.6: a server that sees such pairs again and again takes them for m/s and km/h of two publishers,
+and judges the speed no more. Every speed message tells in `angular.x`, which the real car leaves at zero, when it was
 published [s, CLOCK_MONOTONIC].
 """
 

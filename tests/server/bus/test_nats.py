@@ -199,6 +199,28 @@ async def test_events_arrive_behind_those_that_a_full_disk_has_lost(
                 await until(lambda: page.last_event("ocelot") == 306)
 
 
+async def test_a_log_that_cannot_be_read_is_not_one_that_has_lost_events(tmp_path: Path) -> None:
+    """A node that is behind waits for it: what it would skip is on the disk."""
+    clock, kept = Clock(), Journal(tmp_path / "events.sqlite")
+    bus = LocalBus(kept, now=clock)
+    bus.serve("ocelot", lambda _: asyncio.sleep(0.0, {}))
+    async with running_broker() as broker, node(broker.address, clock) as page:
+        async with offering(bus, broker.address, "run-1", clock):
+            bus.append("ocelot", [event()] * 5)
+            await until(lambda: page.last_event("ocelot") == 5)
+        bus.append("ocelot", [event()] * 300)
+        assert kept._database is not None
+        kept._database.set_progress_handler(lambda: 1, 1)  # SQLite's own way to interrupt what runs
+        bus.append("ocelot", [event()])
+        async with offering(bus, broker.address, "run-1", clock):
+            with pytest.raises(NotServed, match="the alarm log of ocelot cannot be read"):
+                await page._questions.ask("ocelot", wire.Ask(do="after", n=5))
+            kept._database.set_progress_handler(None, 0)
+            bus.append("ocelot", [event()])
+            await until(lambda: page.last_event("ocelot") == 307)
+            assert numbers(await page.events_after("ocelot", 5, 400)) == [*range(6, 308)]
+
+
 @pytest.mark.parametrize("body", [b"", b"\xff\xfe", b"[]", b'{"run": 1}', b"{" * 200, b'{"events": [{"n": "x"}]}'])
 async def test_nonsense_harms_neither_side(body: bytes) -> None:
     async with running_broker() as broker, nats_buses(broker.address, broker.address) as both:
