@@ -273,7 +273,7 @@ function mountScreens(page, arming) {
   mountStart(start, store);
   if (start.querySelector('[data-f="who"]')) mountChip(start, cars); // the requested car may never answer: another one may be chosen
   mountConnect(need(document, '#connect'), store, router, arming);
-  const contents = tabContents(monitor, store, say, (name) => router.isMonitorShown && tabs.shows(name) && screens.open === null);
+  const contents = tabContents(monitor, store, say, (name) => router.isMonitorShown && tabs.shows(name) && (screens.open === null || matchMedia('(width >= 112.5em)').matches));
   const screens = new Screens(monitor, store, () => page.front(), say);
   mountSheets();
   mountInstall(say);
@@ -319,7 +319,7 @@ function listenEverywhere(page, arming) {
 
 /** Fetches and mounts what only a wide window, a keyboard or Back uses. @param {Page} page */
 function mountDesk({ monitor, say, store, tabs }) {
-  import('./shell/desk.js').then(({ mount }) => mount(monitor, store, tabs, say)).catch(() => say('The list of alarms and the log beside the values, and the keys of a keyboard, could not be loaded from the server. Reload the page.', 'Not complete'));
+  import('./shell/desk.js').then(({ mount }) => mount(monitor, store, tabs, say)).catch(() => say('The panes and the keys of a keyboard could not be loaded from the server. Reload the page.', 'Not complete'));
 }
 
 /** Fetches the screens that an operator may want when the server is gone. */

@@ -130,6 +130,9 @@ const strip = (frame, more = {}) => stripOf(frame, { isSilent: false, paused_s: 
 test('the strip shows the worst standing alarm', () => {
   const checks = /** @type {any} */ ([{ id: 'a', label: 'A', verdict: 'ok' }, { id: 'b', label: 'B', verdict: 'unknown' }]);
   assert.deepEqual([strip(state({ checks })).text, strip(state({ checks })).end], ['No alarms', '1 OK · 1 not checked']);
+  const fault = /** @type {any} */ ({ id: 'c', label: 'C', verdict: 'fault' });
+  const quiet = strip(state({ checks: [...checks, fault] }));
+  assert.deepEqual([quiet.icon, quiet.end], ['info', '1 FAULT · 1 not checked'], 'its alarm is suppressed');
   assert.deepEqual(strip(state({ alarms: [alarm()] })), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: '2.3 s', hasReturned: false, isKnown: false, opens: 'alarms' });
   assert.equal(strip(state({ alarms: [alarm({ state: 'ACKED' })] })).isKnown, true, 'outlined');
   assert.equal(strip(state({ alarms: [alarm()], suppressed: [{}] })).end, '1 of 2', 'of all in the list');

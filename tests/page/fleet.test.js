@@ -178,6 +178,9 @@ test('each car has one place in the grid, named by its number where that tells i
   assert.deepEqual(labelsOf(['Ocelot', 'C02']), ['Ocelot', 'C02']);
   const rows = carRows(seen({ b: null, a: needy(), c: summary() }), ['a', 'b'], false);
   assert.deepEqual(placesOf(rows).map(({ name, kind, title }) => `${name} ${kind} ${title}`), ['a crit a, Speed above limit', 'b lost b, no data', 'c  c, driving']);
+  const [known] = placesOf(carRows(seen({ a: summary({ worst: worst({ state: 'ACKED' }) }) }), [], false));
+  assert.deepEqual([known?.kind, known?.isKnown], ['crit', true], 'it stands, though it was acknowledged');
+  assert.equal(placesOf(rows)[0]?.isKnown, false);
 });
 
 test('a range names a row of numbers, else the first few', () => {

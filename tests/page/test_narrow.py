@@ -105,7 +105,7 @@ async def test_that_an_order_is_not_confirmed_is_read_whole_on_the_slide(phone: 
     await phone.open(canned.address)
     await phone.live()
     slide = phone.page.locator(".board > .rail .slide")
-    await expect(slide).to_have_text("Not confirmed physical stop!", use_inner_text=True)
+    await expect(slide).to_have_text("Not confirmed: physical stop", use_inner_text=True)
     assert await phone.page.evaluate(CUT, [".board > .rail .slide .tx"]) == []
 
 

@@ -140,6 +140,66 @@ async def test_over_a_notice_speed_distance_and_a_stale_age_are_in_sight(
         await page.wait_for_function(SPEED_IN_SIGHT)
 
 
+#: Whether these parts of the nearest object are in the view, and neither under the notice nor beyond the gauge's edge.
+BESIDE_THE_NOTICE = """(names) => {
+  const at = (one) => document.querySelector(one).getBoundingClientRect();
+  const [notice, view] = ['.snack:not([hidden])', '#monitor > .view'].map(at);
+  return notice.height > 0 && names.every((name) => {
+    const { left, right, top, bottom, height } = at(`[data-part=nearest] ${name}`);
+    return height > 10 && left >= 0 && right <= innerWidth && top >= view.top - 4 && bottom <= view.bottom + 1
+      && (right <= notice.left || bottom <= notice.top + 1);
+  });
+}"""
+LYING = ((568, 320), (640, 360), (740, 360))
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize("order", ["none", "not confirmed"])
+async def test_over_a_notice_the_time_gap_is_in_sight(phone: Phone, canned: Canned, order: str) -> None:
+    canned.state = warned(decelerate=ORDERS[order]())
+    canned.state["nearest"] = {"time_gap_s": 2.3, "stopping_m": 9.9}
+    page = await opened(phone, canned)
+    for width, height in ((320, 568), (412, 740), *LYING) if order == "none" else LYING:
+        await page.set_viewport_size({"width": width, "height": height})
+        stops = [] if order != "none" else ["[data-f=stops]"]
+        await page.wait_for_function(BESIDE_THE_NOTICE, arg=["[data-f=distance]", "[data-f=gap]", *stops])
+    canned.state["signals"]["distance"] |= {"freshness": "stale", "age_s": 123.4}
+    await expect(page.locator("[data-part=nearest] .age[data-ink=stale]")).to_be_attached()
+    for width, height in LYING:
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.wait_for_function(BESIDE_THE_NOTICE, arg=["[data-f=distance]", ".age"])
+
+
+@pytest.mark.gate
+async def test_a_request_for_control_beside_a_slow_down_leaves_strip_and_distance_in_sight(
+    phone: Phone, canned: Canned
+) -> None:
+    canned.state = live() | {"decelerate": slowed()}
+    canned.state["control"] |= {"requests": [{"name": "Ben", "page": "other", "left_s": 22.0}]}
+    page = await opened(phone, canned)
+    await expect(page.locator(".snacks > .prompt")).to_be_visible()
+    for width, height in (*LYING, (915, 412)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.wait_for_function(BESIDE_THE_NOTICE, arg=["[data-f=distance]"])
+    assert await walk(page, [*LYING, (915, 412)]) == {}
+
+
+@pytest.mark.gate
+@pytest.mark.own_phone
+async def test_a_warning_is_one_row_before_the_style_of_the_drive_comes(phone: Phone, canned: Canned) -> None:
+    async def refuse(route: Route) -> None:
+        await route.abort()
+
+    await phone.page.route("**/drive*.css*", refuse)
+    canned.state = warned()
+    page = await opened(phone, canned)
+    assert await page.locator("link[href*=drive]").count() == 0
+    for width, height in ((320, 568), (568, 320), (640, 360), (740, 360)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.wait_for_function("() => document.querySelector('.snack[data-f=warning]').offsetHeight < 76")
+    phone.complaints.clear()  # of what was refused
+
+
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("tab", ["home", "map", "scan", "files", "settings"])
 async def test_none_does_in_any_window(phone: Phone, canned: Canned, tab: str) -> None:
@@ -299,6 +359,35 @@ async def test_a_notice_that_comes_to_a_fresh_mark_lies_over_nothing_on_a_phone_
         await noticed(page, canned)
     await expect(page.locator(f".snacks > {'[data-f=warning]' if kind == 'warning' else '.note'}")).to_be_visible()
     assert await walk(page, [(568, 320), (640, 360), (667, 375), (740, 360), (915, 412), (1180, 480)]) == {}
+
+
+# What is read of the gauge below the count-down, whether all its words and keys are whole, and the size of its key.
+COUNTS = """() => {
+  const box = (one) => document.querySelector(one).getBoundingClientRect();
+  const [banner, veto] = [box('#sheet-countdown'), box('#sheet-countdown [data-f=veto]')];
+  const cut = [...document.querySelectorAll('#sheet-countdown :is(h2, p, button), #sheet-alarm .slide .tx')]
+    .filter((one) => one.checkVisibility())
+    .filter((one) => one.scrollWidth > one.clientWidth + 1 || one.scrollHeight > one.clientHeight + 2);
+  return {
+    covered: Math.max(0, Math.round(banner.bottom - box('#panel-home .gauge .speed').top)),
+    cut: cut.map((one) => one.textContent.trim()),
+    isVetoLarge: veto.height >= 44 && veto.width >= 80 && veto.bottom <= banner.bottom,
+  };
+}"""
+
+
+@pytest.mark.gate
+async def test_a_count_down_covers_no_digit_of_the_speed(phone: Phone, canned: Canned) -> None:
+    page = await opened(phone, canned)
+    countdown = {"trigger": "speed", "title": "Speed above limit", "text": "12.6 m/s, limit 11.0 m/s", "left_s": 1.4}
+    canned.state = live() | {"decelerate": slow("armed", countdown=countdown), "alarms": [critical()]}
+    await expect(page.locator("#sheet-countdown")).to_be_visible()
+    await expect(page.locator("#sheet-alarm")).to_be_visible()
+    upright, low = [(320, 568), (360, 640), (360, 740), (412, 915)], [(568, 320), (640, 360), (740, 360), (915, 412)]
+    for width, height in [*upright, *low, (820, 1180), (1180, 820), (1440, 900), (1920, 1080)]:
+        await page.set_viewport_size({"width": width, "height": height})
+        await phone.drawn()
+        assert await page.evaluate(COUNTS) == {"covered": 0, "cut": [], "isVetoLarge": True}, (width, height)
 
 
 async def test_no_edge_of_the_slide_is_left_beside_a_critical_alarm(phone: Phone, canned: Canned) -> None:

@@ -92,6 +92,51 @@ ROOM = {
         f"() => {{ {RECT} const [order, snack, speed] = ['.under > .order p', '.snack', '.gauge .speed'].map(at);"
         " return order.height > 12 && order.bottom < snack.top && speed.bottom <= at('#monitor > .view').bottom }",
     ),
+    "the distance is read whole over the Mark key on the smallest phone": (
+        "home", 320, 568, f"() => {{ {RECT} return at('.near').bottom <= at('.ledge').top + 1 }}",
+    ),
+    "a choice and the key that closes are in sight in the preferences of a small phone on its side": (
+        "preferences", 640, 360,
+        f"() => {{ {RECT} const end = at('#monitor > .rail').top + 1;"
+        " return at('#sheet-preferences .seg').top >= at('#sheet-preferences .sheet-head').bottom - 1"
+        " && at('#sheet-preferences .seg').height > 40 && at('#sheet-preferences .seg').bottom <= end"
+        " && at('#sheet-preferences > .keys > *').bottom <= end }",
+    ),
+    "three choices of the preferences are in sight on a phone on its side": (
+        "preferences", 740, 360,
+        f"() => {{ {RECT} return at('#sheet-preferences .seg:nth-of-type(3)').height > 40"
+        " && at('#sheet-preferences .seg:nth-of-type(3)').bottom <= at('#monitor > .view').bottom }",
+    ),
+    "a line of the menu and the key that closes it are in sight on a small phone on its side": (
+        "menu", 640, 360,
+        f"() => {{ {RECT} const end = at('#monitor > .rail').top + 1;"
+        " return at('#sheet-menu li').top >= at('#sheet-menu .sheet-head').bottom - 1"
+        " && at('#sheet-menu li').bottom <= end && at('#sheet-menu > .keys > *').bottom <= end }",
+    ),
+    "six reasons of an intervention are in sight on a low phone": (
+        "take-over", 360, 640,
+        f"() => {{ {RECT} return at('.chip-rows .key:nth-child(6)').bottom <= at('.take-over .mark-keys').top }}",
+    ),
+    "three are on the smallest": (
+        "take-over", 320, 568,
+        f"() => {{ {RECT} return at('.chip-rows .key:nth-child(3)').bottom <= at('.take-over .mark-keys').top }}",
+    ),
+    "a critical alarm cuts no key of a planned stop on a phone on its side": (
+        "planned-stop-critical", 740, 360,
+        f"() => {{ {RECT} const line = at('.planned-stop').height;"
+        " return at('#sheet-alarm').height > 0 && line > 20 && line < 32"
+        " && at('[data-f=planned-stop-end]').height === undefined }",
+    ),
+    "what is known of a silent car is beside the notice at a planned stop": (
+        "planned-stop-stale", 740, 360,
+        f"() => {{ {RECT} const [text, words] = ['.veil .plate p', '.veil .plate dl'].map(at);"
+        " return text.right <= at('.snack').left && words.right <= at('.snack').left"
+        " && words.bottom <= at('#monitor > .view').bottom }",
+    ),
+    "the head of a lost connection leaves its text the room on a small phone on its side": (
+        "server-silent", 640, 360,
+        f"() => {{ {RECT} return at('#sheet-lost > h2').height < 44 }}",
+    ),
     "no car in alarm is behind the edge of the list of cars": (
         "cars",
         1024,

@@ -116,13 +116,14 @@ export function stripOf(frame, { isSilent, chain, paused_s }) {
   const ok = tiles.filter((tile) => tile.verdict === 'ok').length;
   const isFuelAbsent = frame.signals.fuel?.freshness === 'not_published' && !tiles.some((tile) => tile.label === 'Fuel'); // counted as its tile is
   const unknown = tiles.filter((tile) => tile.verdict === 'unknown').length + Number(isFuelAbsent);
-  const counts = `${ok} OK · ${unknown} not checked`;
+  const faults = tiles.filter((tile) => tile.verdict === 'fault').length; // their alarms may be suppressed
+  const counts = `${faults ? `${faults} FAULT` : `${ok} OK`} · ${unknown} not checked`;
   if (worst) {
     const end = listed > 1 ? amongWords(listed) : unknown ? `${unknown} not checked` : `${ok} OK`;
     return { kind: '', icon: 'info', text: worst.title, end, opens: 'alarms' };
   }
   if (order) return { ...order, icon: 'slow', opens: 'alarms' };
-  return { kind: '', icon: 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${unknown} not checked` : counts, opens: 'alarms' };
+  return { kind: '', icon: faults ? 'info' : 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${unknown} not checked` : counts, opens: 'alarms' };
 }
 
 /** Of how many in the list this is one. @param {number} listed */

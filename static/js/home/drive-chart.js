@@ -179,7 +179,7 @@ class DriveChart {
   #draw() {
     const { answer } = this.feed;
     const picture = `${this.view} ${this.cursor_s} ${this.feed.end_s}`;
-    if (picture !== this.#drawn) {
+    if (picture !== this.#drawn && this.panes.area.width > 1) { // panes that were built anew have no place yet
       this.#drawn = picture; // between two answers hardly anything moves
       this.panes.move();
       this.brush.draw(this.view, this.feed.end_s);

@@ -18,7 +18,7 @@ const HEADLINES = /** @type {Record<string, (value: any) => [string, string]>} *
   accelerator: (value) => [fixed(value.percent), '%'],
   steering: (value) => [fixed(value.percent), '%'],
   distance: (value) => (value.none_in_range ? ['none', ''] : [fixed(value.distance_m), 'm']),
-  bearing: (value) => [fixed(value.bearing_rad, 3), ''],
+  bearing: (value) => [fixed(value.bearing_rad, 3), 'rad'],
   position: (value) => (value.status < 0 ? ['no', 'fix'] : [value.alt_m === null ? '2D' : '3D', 'fix']),
   odometry: (value) => speedWords(value.speed_mps, 2),
   heading: (value) => [value.heading_deg === null ? NOTHING : `${fixed(value.heading_deg, 0)}°`, ''],

@@ -35,7 +35,7 @@ import { age, distanceWords, fixed, heading } from '../core/format.js';
 /** A phone's fix older than this tells where it was, not where it is; as the server has it [s]. */
 const PHONE_LIVES_S = 5;
 /** A comparison older than this is of another moment [s]. */
-const COMPARED_LIVES_S = 5;
+export const COMPARED_LIVES_S = 5;
 
 /**
  * The car as the newest frame has it.

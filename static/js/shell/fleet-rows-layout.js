@@ -162,15 +162,15 @@ export function rowsAPage(count, height_px, row_px, below_px) {
 /**
  * The fixed place of each car, and what stands there.
  * @param {Row[]} rows
- * @returns {{name: string, label: string, kind: 'crit' | 'warn' | 'lost' | '', isDriving: boolean, title: string}[]}
+ * @returns {{name: string, label: string, kind: 'crit' | 'warn' | 'lost' | '', isKnown: boolean, isDriving: boolean, title: string}[]} isKnown: its alarm stands, and was acknowledged
  */
 export function placesOf(rows) {
   const sorted = [...rows].sort((a, b) => natural(a.name, b.name));
   const labels = labelsOf(sorted.map(({ name }) => name));
   return sorted.map((row, i) => {
-    const kind = row.isLost || (row.isAsking && row.icon === 'link-off') ? 'lost' : row.isAsking ? row.kind : '';
+    const kind = row.isLost || (row.kind !== '' && row.icon === 'link-off') ? 'lost' : row.kind;
     const state = row.isLost ? 'no data' : row.text === '–' ? row.mode : row.text;
-    return { name: row.name, label: labels[i] ?? row.name, kind, isDriving: row.mode === 'driving', title: `${row.name}, ${state}` };
+    return { name: row.name, label: labels[i] ?? row.name, kind, isKnown: kind !== '' && kind !== 'lost' && !row.isAsking, isDriving: row.mode === 'driving', title: `${row.name}, ${state}` };
   });
 }
 

@@ -158,6 +158,7 @@ export class Places {
       const cell = this.#cells.get(place.name) ?? this.#made(place.name);
       setText(cell.label, place.label);
       setAttribute(cell.link, 'data-kind', place.kind || null);
+      setAttribute(cell.link, 'data-known', place.isKnown);
       setAttribute(cell.link, 'data-drives', place.isDriving);
       setAttribute(cell.link, 'aria-label', place.title);
       show(cell.mark, place.kind !== '');

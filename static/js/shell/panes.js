@@ -5,6 +5,7 @@ import { field, html, icon, listen, setAttribute, setText, setSentence, textNode
 import { eventWords, gapLine } from '../alarms/log-layout.js';
 import { fixed, timeOfDay } from '../core/format.js';
 import { alarmInHead } from './dialogs.js';
+import { COMPARED_LIVES_S } from '../map/map-text.js';
 import { areAlarmsInSight } from './layout.js';
 import { scale } from '../core/scale.js';
 import { styled } from '../core/style-sheet.js';
@@ -19,15 +20,18 @@ const LINE_PX = 24;
 /**
  * What stands at the right of a pane's head.
  * @param {import('../core/protocol-types.js').State} frame
+ * @param {boolean} isChecked messages of the car are judged
+ * @param {number} lag_s how old the frame is by now
  */
-export function headsOf({ phone, signals, alarms, suppressed, replay }) {
-  const { apart_m, explained_m } = phone ?? {};
+export function headsOf({ phone, signals, alarms, suppressed, replay, session }, isChecked, lag_s) {
+  const isCompared = phone?.used && (phone.compared_age_s ?? Infinity) + lag_s <= COMPARED_LIVES_S; // else it is only drawn
+  const { apart_m = null, explained_m = null } = isCompared ? phone : {};
   const beams = signals.scan?.value;
   const rows = rowsOf(alarms, suppressed ?? [], false);
   return {
-    map: apart_m == null ? '' : `Distance apart ${fixed(apart_m)}${explained_m == null ? '' : ` of ${fixed(explained_m)}`} m`,
+    map: apart_m === null ? '' : `Distance apart ${fixed(apart_m)}${explained_m === null ? '' : ` of ${fixed(explained_m)}`} m`,
     scan: beams && signals.scan?.freshness !== 'stale' ? `${beams.usable} of ${beams.beams} beams` : signals.scan?.freshness === 'stale' ? 'stale' : '',
-    alarms: replay ? 'as recorded' : rows.length ? countWords(rows) : 'none active',
+    alarms: replay ? 'as recorded' : rows.length ? countWords(rows) : session.paused ? 'paused' : isChecked ? 'none active' : 'not checked',
   };
 }
 
@@ -74,11 +78,11 @@ class Panes {
     void this.list.want(isInSight);
     if (!isInSight) return;
     if (this.wall.matches) this.dress ??= styled('wall');
-    const heads = headsOf(frame);
+    const heads = headsOf(frame, store.chain.state === 'Live', store.lag_s);
     const covered = veilOf(this.store);
     for (const { name, element } of this.heads) setSentence(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // a covered pane has no text
     this.log.draw();
-    const more = this.signals.draw(() => signalLines(frame.signals));
+    const more = this.signals.draw(() => signalLines(frame.signals, store.lag_s));
     const shown = this.signals.list.children.length;
     setSentence(field(this.monitor, 'head-signals'), more ? `Signals, ${shown} of ${shown + more}` : 'Signals');
     const { head, lines } = peopleLines(store.isSilent ? null : frame.replay ? frame.live?.reach : frame.reach, store.control, store.page);

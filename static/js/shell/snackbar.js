@@ -1,6 +1,7 @@
 // Warnings: one snackbar at a time over the rail, until it is acknowledged, shelved or over. The list of alarms needs none.
 
 import { layOut } from '../alarms/alarm-layout.js';
+import { titleOf } from '../alarms/alarm-title.js';
 import { html, icon, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
 import { areAlarmsInSight } from './layout.js';
 import { Meant } from '../core/meant.js';
@@ -44,7 +45,8 @@ export function mount(root, store, say) {
     if (!shown) return;
     setAttribute(bar, 'data-priority', shown.priority);
     setIcon(mark, shown.priority === 'advisory' ? 'info' : 'warn');
-    setSentence(title, waiting.length > 1 ? `${shown.title} (${waiting.length} alarms)` : shown.title);
+    setAttribute(bar, 'data-ended', !shown.active);
+    setSentence(title, `${titleOf(shown)}${waiting.length > 1 ? ` (${waiting.length} alarms)` : ''}`);
     setSentence(text, [snackWords(shown), markWords(shown)].filter(Boolean).join(' · '));
     show(shelve, shown.active && shown.priority !== 'critical' && shown.actions.includes('shelve'));
     setText(acknowledge, 'Acknowledge');

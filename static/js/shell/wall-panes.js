@@ -2,6 +2,7 @@
 
 import { html, setAttribute, setSentence } from '../core/dom.js';
 import { age, counted, fixed, NOTHING } from '../core/format.js';
+import { freshnessStyle } from '../core/freshness.js';
 import { ABSENT, isAbsent } from '../core/ink.js';
 import { scale } from '../core/scale.js';
 
@@ -18,19 +19,20 @@ const LINE_PX = 26;
 /**
  * Rate and age of each signal that is published: what is not fresh first, for the pane may not have room for all.
  * @param {State['signals']} signals
+ * @param {number} lag_s how old the frame is by now
  * @returns {Line[]}
  */
-export function signalLines(signals) {
-  const published = Object.entries(signals).filter(([, signal]) => signal.freshness !== 'not_published');
-  const isLate = (/** @type {string} */ freshness) => Number(freshness === 'fresh');
-  return published.sort(([, a], [, b]) => isLate(a.freshness) - isLate(b.freshness)).map(([name, { label, rate_hz, age_s, freshness }]) => ({
-    key: name, ink: freshness, of: name,
-    cells: [label, isAbsent(freshness) ? ABSENT[freshness] : `${rate_hz === null || rate_hz === undefined ? NOTHING : fixed(rate_hz)} Hz`, age_s === null ? NOTHING : `${freshness === 'stale' ? 'STALE ' : ''}${age(age_s, 2)} s`],
+export function signalLines(signals, lag_s) {
+  const published = Object.entries(signals).filter(([, signal]) => signal.freshness !== 'not_published').map(([name, signal]) => ({ name, signal, ...freshnessStyle(signal, lag_s) }));
+  const isFresh = (/** @type {string} */ ink) => Number(ink === 'fresh');
+  return published.sort((a, b) => isFresh(a.ink) - isFresh(b.ink)).map(({ name, signal: { label, rate_hz }, ink, age_s }) => ({
+    key: name, ink, of: name,
+    cells: [label, isAbsent(ink) ? ABSENT[ink] : `${rate_hz === null || rate_hz === undefined ? NOTHING : fixed(rate_hz)} Hz`, age_s === null ? NOTHING : `${ink === 'stale' ? 'STALE ' : ''}${age(age_s, 2)} s`],
   }));
 }
 
 /**
- * Who has this car on a page: who is in control first, then this page.
+ * Who has this car on a page: who is in control first, then who hears no alarm, then this page; the pane may not have room for all.
  * @param {Reach | null | undefined} reach
  * @param {Control | null} control
  * @param {string} page of this screen
@@ -38,8 +40,8 @@ export function signalLines(signals) {
  */
 export function peopleLines(reach, control, page) {
   if (!reach) return { head: 'unknown', lines: [] };
-  const rank = (/** @type {string} */ one) => (one === control?.page ? 0 : one === page ? 1 : 2);
-  const lines = [...reach.pages].sort((a, b) => rank(a.page) - rank(b.page)).map((one) => ({
+  const rank = (/** @type {Reach['pages'][number]} */ one) => (one.page === control?.page ? 0 : !one.can ? 1 : one.page === page ? 2 : 3);
+  const lines = [...reach.pages].sort((a, b) => rank(a) - rank(b)).map((one) => ({
     key: one.page,
     cells: [`${one.name}${one.page === page ? ', you' : ''}`, one.page === control?.page ? 'in control' : 'watching', one.can ? 'alarms audible' : one.why_text ?? 'alarms not audible', one.heard_s === null ? NOTHING : `${age(one.heard_s)} s`],
   }));
