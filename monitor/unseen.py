@@ -55,7 +55,7 @@ def unseen_m(speed_mps: float | None, age_s: float | None, acceleration_mps2: fl
 def unseen_words(metres: float | None) -> str:
     """A bound as text, never rounded down: "≤ 2.8 m unseen"."""
     if metres is None:
-        return "metres unseen not known"
+        return "distance driven unknown"
     if metres > 999.0:
         return f"≤ {_up(metres / 1000):.1f} km unseen"
     return f"≤ {math.ceil(metres):.0f} m unseen" if metres > 99.9 else f"≤ {_up(metres):.1f} m unseen"

@@ -91,7 +91,9 @@ async function run() {
 async function begin() {
   const release = holdTaps();
   const page = new Page();
+  await breath();
   mountGlance(page);
+  await breath();
   page.store.start();
   await glanced(page.store);
   page.store.sync.greet();
@@ -123,9 +125,9 @@ async function begin() {
   release();
   // What outlasts this visit, and what nobody presses at once, is loaded when the page is complete.
   const wide = new Promise((resolve) => { floorQuery().addEventListener('change', resolve, { once: true }); });
-  const due = new Promise((resolve) => { setTimeout(resolve, matchMedia('(width >= 43.75em)').matches ? 0 : 2000); });
-  void Promise.race([wide, due]).then(() => mountDesk(page)); // elsewhere there are no panes
+  void Promise.race([wide, new Promise((resolve) => { setTimeout(resolve, matchMedia('(width >= 43.75em)').matches ? 0 : 2000); })]).then(() => mountDesk(page)); // elsewhere there are no panes
   setTimeout(() => import('./drive/ledge.js').then(({ mount }) => mount(page.monitor, page.store, page.say)).catch(() => page.say('The Mark key could not be loaded from the server. Reload the page.', 'Not complete')), 3000);
+  setTimeout(() => import('./control/duty-notices.js').then(({ mount }) => mount(page.store, page.say)).catch(() => page.say('This page shows no hand-over, end of a duty or alarms left behind: that part could not be loaded from the server. Reload the page.', 'Not complete')), 2000);
   setTimeout(() => import('./boot/service-worker.js').then(({ Shell }) => new Shell(page.store, page.say)).catch(() => {}), 2000);
   setTimeout(() => import('./shell/sheet-head.js').then(({ mount }) => mount(page.monitor, page.store)).catch(() => {}), 2000);
   setTimeout(prefetch, 10_000);
@@ -304,10 +306,7 @@ function listenEverywhere(page, arming) {
     closeSheet(/** @type {HTMLDialogElement} */ (need(document, '#sheet-menu')));
     page.openPhone();
   });
-  store.on('became', ({ kind, became, reason, cut }) => {
-    const { text, title } = laterWords(kind, became, reason, cut);
-    say(text, title);
-  });
+  store.on('became', ({ kind, became, reason, cut }) => { const { text, title } = laterWords(kind, became, reason, cut); say(text, title); });
   store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
   listen(document, 'keydown', () => { document.documentElement.dataset['keys'] = ''; }, { capture: true });
   listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });

@@ -45,7 +45,7 @@ def test_what_is_not_known_is_not_zero(odd: float | None) -> None:
     assert unseen_m(1.0, odd, 3.0) is None
     assert unseen_m(1.0, 1.0, odd) is None
     assert unseen_m(odd, 0.0, 3.0) is None
-    assert unseen_words(None) == "metres unseen not known"
+    assert unseen_words(None) == "distance driven unknown"
 
 
 @given(st.floats(0.0, 1e6))

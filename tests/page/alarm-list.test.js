@@ -1,7 +1,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { standingWords } from '../../static/js/alarms/standing.js';
-import { countWords, latelyWords, noneWords, pagesOf, rowsOf, silentWords, together } from '../../static/js/alarms/alarms-layout.js';
+import { latelyWords, noneWords, pagesOf, together } from '../../static/js/alarms/alarm-pages.js';
+import { countWords, rowsOf, silentWords } from '../../static/js/alarms/alarms-layout.js';
 
 /** @param {string} id @param {any} [more] @returns {any} */
 const alarm = (id, more) => ({

@@ -144,6 +144,23 @@ test('the strip shows the worst standing alarm', () => {
   assert.equal(strip(state({ alarms: [alarm({ state: 'SHELVED', priority: 'warning' })] })).text, 'No alarms');
 });
 
+test('no tick stands in the strip while a value is stale, and checks at fault are counted whatever else stands there', () => {
+  const ok = /** @type {any} */ ({ id: 'a', label: 'A', verdict: 'ok' });
+  const [fault, unknown] = ['fault', 'unknown'].map((verdict) => ({ ...ok, id: verdict, label: verdict, verdict }));
+  const read = (/** @type {any} */ frame, more = {}) => [strip(frame, more).icon, strip(frame, more).text, strip(frame, more).end];
+  assert.deepEqual(read(state({ checks: [ok, unknown] }), { stale: 0 }), ['ok', 'No alarms', '1 OK · 1 not checked']);
+  assert.deepEqual(read(state({ checks: [ok, unknown] }), { stale: 9 }), ['info', 'No alarms', '9 stale · 1 not checked']);
+  const decelerate = { state: 'armed' };
+  assert.deepEqual(read(state({ checks: [ok], decelerate })), ['slow', 'Armed', 'an aid, not an emergency stop']);
+  assert.deepEqual(read(state({ checks: [ok, fault], decelerate })), ['slow', 'Armed', '1 FAULT']);
+  assert.deepEqual(read(state({ checks: [ok], decelerate }), { stale: 9 }), ['slow', 'Armed', '9 stale']);
+  const alarms = [alarm({ state: 'SHELVED', priority: 'warning' })];
+  assert.deepEqual(read(state({ checks: [ok, fault, unknown], alarms })), ['info', 'No alarms', '1 shelved · 1 FAULT']);
+  assert.deepEqual(read(state({ checks: [ok, unknown], alarms })), ['ok', 'No alarms', '1 shelved · 1 not checked']);
+  const advisory = [warning({ priority: 'advisory', title: 'Component warns' })];
+  assert.deepEqual(read(state({ checks: [ok, fault, unknown], alarms: advisory })), ['info', 'Component warns', '1 FAULT']);
+});
+
 test('what still stands comes before what has returned, and the strip shows which it is', () => {
   const returned = alarm({ state: 'RTN_UNACKED', active: false });
   const both = strip(state({ alarms: [returned, warning({ active: true })] }));

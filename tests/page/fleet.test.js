@@ -181,6 +181,8 @@ test('each car has one place in the grid, named by its number where that tells i
   const [known] = placesOf(carRows(seen({ a: summary({ worst: worst({ state: 'ACKED' }) }) }), [], false));
   assert.deepEqual([known?.kind, known?.isKnown], ['crit', true], 'it stands, though it was acknowledged');
   assert.equal(placesOf(rows)[0]?.isKnown, false);
+  const cut = (/** @type {any} */ state) => placesOf(carRows(seen({ a: summary({ phase: 'lost', worst: worst({ state }) }) }), [], false)).map(({ kind, isKnown }) => [kind, isKnown])[0];
+  assert.deepEqual([cut('UNACKED'), cut('ACKED')], [['lost', false], ['lost', true]], 'also of a car whose connection is lost');
 });
 
 test('a range names a row of numbers, else the first few', () => {

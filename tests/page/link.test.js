@@ -50,10 +50,13 @@ test('the text of the server’s problem is used where it has any', () => {
 test('a car that never spoke is awaited for a while, then silent', () => {
   const fresh = (/** @type {number} */ connected_for_s) => chainOf({ ...now, frame: state({ session: { connected_for_s }, link: { car_age_s: null, topics_heard: 0 } }) });
   assert.equal(fresh(1).state, 'Waiting');
+  assert.deepEqual([fresh(1).known, fresh(1).nodes.map((node) => node.isKnown)], [2, [true, true, true, false]], 'nothing has come from the car');
   assert.deepEqual([fresh(5).state, fresh(5).cut, fresh(5).nodes[3]?.mark], ['Silent', 2, 'silent 5.1 s']);
 });
 
 test('before the first frame the server does not answer; after a sleep nobody is accused', () => {
   assert.equal(chainOf({ ...now, frame: null, isSilent: true, heard_ms: null }).sentence, 'The server does not answer.');
   assert.deepEqual([chainOf({ ...now, frame: state(), isSilent: true, silence_s: 0.3 })].map(({ state, cut }) => [state, cut]), [['Waking', null]]);
+  const waking = chainOf({ ...now, frame: state(), isSilent: true, silence_s: 0.3 });
+  assert.deepEqual([waking.known, waking.nodes.map(({ mark, isKnown, isBad }) => [mark, isKnown, isBad])], [0, [['here', true, false], ['', false, false], ['', false, false], ['', false, false]]], 'nothing has come since');
 });

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { distance_m, offsetOf, placeAt } from '../../static/js/core/geodesy.js';
 import {
-  CLOSEST, FIRST, WIDEST, between, bounded, clearBox, clearTop, ellipseOf, fitted, gridPaths, gridStep_m, groundMatrix, metresOf, overlap, panned, pictureMatrix, pixelOf, scaleBar_m, tileScale,
+  CLOSEST, FIRST, WIDEST, between, bounded, clearBox, clearTop, ellipseOf, fitted, gridPaths, gridStep_m, groundMatrix, linesOf, metresOf, overlap, panned, pictureMatrix, pixelOf, scaleBar_m, tileScale,
   upOf, zoomed,
 } from '../../static/js/map/map-layout.js';
 import { besideWay, inside } from '../../static/js/map/map-figure.js';
@@ -380,4 +380,11 @@ test('the bar of the scale keeps to the room that the keys leave', () => {
     for (const room of [150, 134, 72]) assert.ok(scaleBar_m(mpp, room) / mpp <= room, `${mpp} ${room}`);
   }
   assert.equal(scaleBar_m(FIRST, 134), 10);
+});
+
+test('a name that is wider than the map has as few lines as it needs, about equally long', () => {
+  const name = 'Car, accuracy unknown, heading 12.0 s old';
+  assert.deepEqual(linesOf(name, 42), [name]);
+  assert.deepEqual(linesOf(name, 36), ['Car, accuracy unknown,', 'heading 12.0 s old']);
+  assert.deepEqual(linesOf('Car ±5 m', 3), ['Car', '±5', 'm']);
 });

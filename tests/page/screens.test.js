@@ -69,6 +69,7 @@ test('found vehicles are listed once, and an answer of another shape is none', (
 
 test('the headline of each signal; unknown is a dash and never 0', () => {
   assert.deepEqual(headline('speed', { speed_mps: 4.2 }), ['4.2', 'm/s']);
+  assert.deepEqual(headline('scan', { beams: 181 }), ['181', 'beams']);
   assert.deepEqual(headline('distance', { distance_m: null, none_in_range: true }), ['none', '']);
   assert.deepEqual(headline('position', { status: -1, alt_m: 1 }), ['no', 'fix']);
   assert.deepEqual(headline('diagnostics', { worst: 2 }), ['ERROR', '']);

@@ -1,4 +1,4 @@
-"""`make screenshots`: the page in each of its states, both themes, at the size of a phone, into out/screenshots."""
+"""`make screenshots`: the page in each of its states, on phones, a tablet and desks, in both themes."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from playwright.async_api import Browser, Page, async_playwright
+from playwright.async_api import Browser, Error, Page, async_playwright
 
 from tests.chromium import FLAGS, find_chromium
 from tests.page import canned_fleet
@@ -30,7 +31,9 @@ PHONE: dict[str, Any] = {
     "is_mobile": True,
     "reduced_motion": "reduce",  # so that nothing stands half-way
 }
-SIZES = ((320, 640), (360, 740), (412, 915), (915, 412), (820, 1180), (1180, 820), (1440, 900), (1920, 1080))
+# The windows of each picture, width by height; those of a row share a load of the page, which is resized.
+THEMES: tuple[Literal["dark", "light"], ...] = ("dark", "light")
+WINDOWS = (((412, 915), (360, 740), (740, 360)), ((1440, 900), (1920, 1080), (820, 1180)))
 # The pictures of the drawing: which scene, in a window of which size, in which theme.
 WATCH: dict[str, tuple[str, int, int, str]] = {
     "watch-desk": ("home", 1440, 900, "dark"),
@@ -992,10 +995,12 @@ async def show(server: Canned, page: Page, name: str) -> None:
     await SCENES[name](server, page)
 
 
-async def take(browser: Browser, name: str, theme: str, size: dict[str, int] | None = None) -> Path:
-    """One picture."""
+@asynccontextmanager
+async def opened(browser: Browser, name: str, theme: str, width: int, height: int) -> AsyncIterator[Page]:
+    """A page of its own in this state."""
     server = Canned()
-    options = PHONE | ({"viewport": size} if size else {})
+    scale = 2 if min(width, height) < 600 else 1
+    options = PHONE | {"viewport": {"width": width, "height": height}, "device_scale_factor": scale}
     async with server.running():
         context = await browser.new_context(
             **options, color_scheme="dark" if theme == "dark" else "light", permissions=[]
@@ -1003,38 +1008,54 @@ async def take(browser: Browser, name: str, theme: str, size: dict[str, int] | N
         page = await context.new_page()
         page.on("console", lambda message: print(name, "console:", message.text) if message.type != "log" else None)
         page.on("pageerror", lambda error: print(name, "error:", error))
-        await show(server, page, name)
-        await page.wait_for_function(COMPLETE)
-        await page.wait_for_timeout(700)
-        path = OUT / (f"{name}-{theme}.png" if size is None else f"{name}-{theme}-{size['width']}.png")
-        await page.screenshot(path=path)
-        await context.close()
-    return path
+        try:
+            await show(server, page, name)
+            await page.wait_for_function(COMPLETE)
+            await page.wait_for_timeout(700)
+            yield page
+        finally:
+            await context.close()
 
 
-async def take_watch(browser: Browser, name: str) -> Path:
+async def take(browser: Browser, name: str) -> None:
+    """The pictures of a scene."""
+    for windows in WINDOWS:
+        async with opened(browser, name, "dark", *windows[0]) as page:
+            for width, height in windows:
+                await page.set_viewport_size({"width": width, "height": height})
+                await page.wait_for_timeout(900)
+                for theme in THEMES:
+                    await page.emulate_media(color_scheme=theme, reduced_motion="reduce")
+                    await page.wait_for_timeout(350)
+                    path = OUT / f"{name}-{theme}-{width}.png"
+                    await page.screenshot(path=path)
+                    print(path)
+
+
+async def take_watch(browser: Browser, name: str) -> None:
     """One picture of the drawing, from the running page."""
     what, width, height, theme = WATCH[name]
-    taken = await take(browser, what, theme, {"width": width, "height": height})
-    return taken.rename(OUT / f"{name}.png")
+    async with opened(browser, what, theme, width, height) as page:
+        path = OUT / f"{name}.png"
+        await page.screenshot(path=path)
+        print(path)
 
 
-async def take_all(names: list[str], fonts: Path) -> None:
-    """All pictures, or those whose names are given; with --sizes first, on other screens."""
+async def take_all(names: list[str], fonts: Path) -> list[str]:
+    """All pictures, or those whose names are given, into out/screenshots; returns the names of those that failed."""
+    failed = []
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(
             executable_path=find_chromium(), args=[*FLAGS], env={**os.environ, "FONTCONFIG_FILE": str(fonts)}
         )
-        sizes = [{"width": width, "height": height} for width, height in SIZES] if names[:1] == ["--sizes"] else [None]
-        for name in [one for one in names if one in WATCH] if names else WATCH:
-            print(await take_watch(browser, name))
-        for name in [one for one in names if one not in ("--sizes", *WATCH)] or (
-            [] if names and names != ["--sizes"] else SCENES
-        ):
-            for theme in ("dark", "light"):
-                for size in sizes:
-                    print(await take(browser, name, theme, size))
+        for name in names or [*WATCH, *SCENES]:
+            try:
+                await (take_watch if name in WATCH else take)(browser, name)
+            except Error as why:  # the others are taken all the same
+                print(f"{name}: {why}")
+                failed.append(name)
         await browser.close()
+    return failed
 
 
 def main(names: list[str]) -> None:
@@ -1043,7 +1064,8 @@ def main(names: list[str]) -> None:
     with tempfile.TemporaryDirectory(prefix="catgraph-fonts-") as folder:
         fonts = Path(folder, "fonts.conf")
         fonts.write_text(FONTS.format(cache=Path(folder, "cache")), encoding="utf-8")
-        asyncio.run(take_all(names, fonts))
+        if failed := asyncio.run(take_all(names, fonts)):
+            sys.exit(f"Not taken: {', '.join(failed)}")
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
   assert.equal(label(null), 'off: State unknown no answer');
   assert.equal(label(ordered()), 'go: Slowing to 0.0 m/s');
   assert.equal(label(ordered({ confirmed: null })), 'go: Ordered to 0.0 m/s', 'not confirmed yet is not "slowing"');
-  assert.equal(label(ordered({ confirmed: false })), 'go: Not confirmed: physical stop');
+  assert.equal(label(ordered({ confirmed: false })), 'go: Use the physical stop');
   assert.equal(label(ordered({ sending: false })), 'go: Not sending to the car now');
   assert.equal(label(ordered({}, 'holding')), 'go: Holding at 0.0 m/s');
   assert.equal(label(slow('something new', { why: null })), 'off: Slow-down off not available');

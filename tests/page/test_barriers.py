@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from playwright.async_api import expect
 
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.canned import Canned, check
@@ -32,6 +33,17 @@ async def test_nothing_keeps_anybody_out(phone: Phone, canned: Canned, states: s
         await show(canned, phone.page, name)
         await no_barrier(phone.page, name)
         await fits_all(phone.page, name)
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize("size", [(412, 915), (820, 1180), (1024, 768), (1440, 900), (1920, 1080)], ids=str)
+async def test_a_screen_reader_says_what_a_check_found(phone: Phone, canned: Canned, size: tuple[int, int]) -> None:
+    """A tile shows it by its mark alone where it has one line."""
+    await phone.page.set_viewport_size({"width": size[0], "height": size[1]})
+    await show(canned, phone.page, "home")
+    tile = next(one for one in canned.state["checks"] if one["label"] == "Laser")
+    tile |= {"verdict": "fault", "brief": "FAULT 12 Hz"}
+    await expect(phone.page.get_by_role("button", name="Laser FAULT 12 Hz")).to_be_visible()
 
 
 SCREENS = (

@@ -146,6 +146,16 @@ async def test_with_a_large_font_a_warning_leaves_a_planned_stop_and_the_distanc
     await expect(page.locator("[data-part=nearest] .age[data-ink=stale]")).to_be_attached()
     found = await walk(page, [(360, 800), (375, 812), (412, 915)])
     assert [what for wrong in found.values() for what in wrong if "nearest object" in what] == []
+    for width, height in ((360, 640), (360, 740), (375, 667)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.wait_for_function(
+            """() => {
+              const at = (one) => document.querySelector(one).getBoundingClientRect();
+              const notice = at('.snack:not([hidden])').top;
+              return at('.near [data-f=distance]').bottom <= notice
+                && at('[data-part=nearest] .age').top + 24 <= notice;
+            }"""
+        )
 
 
 @pytest.mark.gate

@@ -13,6 +13,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Page
 
+from tests.page.canned import Canned
 from tests.page.conftest import PHONE
 from tests.page.processes import Process, running, server, simulate
 
@@ -37,6 +38,14 @@ WATCH = """() => {
     else requestAnimationFrame(look);
   };
   requestAnimationFrame(look);
+}"""
+
+
+#: The names of the files that the document itself requests.
+FIRST = """() => {
+  const name = (one) => (one.src || one.href).replace(/.*\\//, '');
+  const names = (query) => [...document.head.querySelectorAll(query)].map(name);
+  return { styles: names('link[rel=stylesheet]').slice(0, 1), scripts: names('script[src], link[rel=modulepreload]') };
 }"""
 
 
@@ -125,6 +134,29 @@ async def test_no_script_forces_a_style_or_layout_before_the_first_values(
         if (frames := stack_of(event)) and watch.address in frames[0]["url"]
     }
     assert not forced
+
+
+@pytest.mark.gate
+async def test_what_the_first_picture_needs_comes_before_the_scripts(browser: Browser, canned: Canned) -> None:
+    """On a slow radio they share the bytes with the style sheet otherwise, and the window stays empty for longer."""
+    page = await browser.new_page(**PHONE)
+    try:
+        cdp = await page.context.new_cdp_session(page)
+        await cdp.send("Network.enable")
+        priority: dict[str, str] = {}
+
+        def note(event: dict[str, Any]) -> None:
+            request = event["request"]
+            priority[request["url"].rpartition("/")[2]] = request["initialPriority"]
+
+        cdp.on("Network.requestWillBeSent", note)
+        await page.goto(canned.address)
+        await page.wait_for_function("document.querySelectorAll('link[rel=modulepreload]').length > 0")
+        first = await page.evaluate(FIRST)
+        assert {priority[name] for name in first["styles"]} == {"VeryHigh"}
+        assert {priority[name] for name in first["scripts"]} == {"Low"}
+    finally:
+        await page.close()
 
 
 def stack_of(event: dict[str, Any]) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ from playwright.async_api import expect
 
 from tests.page.canned import Canned, Json, alarm, live, slowed
 from tests.page.conftest import Phone
-from tests.page.screenshots import car, too_fast
+from tests.page.screenshots import at_a_planned_stop, car, too_fast
 
 # What is wider or higher than its own room.
 CUT = """(names) => names.filter((name) => [...document.querySelectorAll(name)].some((one) => one.offsetParent
@@ -99,13 +99,13 @@ async def test_an_order_on_a_standing_car_is_shown_whole_and_in_the_colour_of_an
         await expect(phone.page.locator(".order li").first).to_be_hidden()
 
 
-async def test_that_an_order_is_not_confirmed_is_read_whole_on_the_slide(phone: Phone, canned: Canned) -> None:
+async def test_what_to_do_of_an_order_without_effect_is_read_whole_on_the_slide(phone: Phone, canned: Canned) -> None:
     await phone.page.set_viewport_size({"width": 360, "height": 640})
     canned.state = live() | {"decelerate": slowed(False)}
     await phone.open(canned.address)
     await phone.live()
     slide = phone.page.locator(".board > .rail .slide")
-    await expect(slide).to_have_text("Not confirmed: physical stop", use_inner_text=True)
+    await expect(slide).to_have_text("Use the physical stop", use_inner_text=True)
     assert await phone.page.evaluate(CUT, [".board > .rail .slide .tx"]) == []
 
 
@@ -160,3 +160,26 @@ async def test_a_critical_alarm_leaves_no_empty_band_over_its_sheet(phone: Phone
         return document.querySelector('#sheet-alarm').getBoundingClientRect().top - bottom; }"""
     )
     assert 0 <= under <= 48, under
+
+
+#: Of each pedal: is its bar drawn, and is all of it in the view of Home?
+BARS = """() => [...document.querySelectorAll('.pedals .bar')].map((bar) => {
+  const [box, view] = [bar, bar.closest('.panel')].map((one) => one.getBoundingClientRect());
+  return [getComputedStyle(bar).opacity !== '0', box.top >= view.top - 1 && box.bottom <= view.bottom + 1];
+})"""
+
+
+async def test_the_bar_of_a_pedal_is_whole_or_not_drawn(phone: Phone, canned: Canned) -> None:
+    """One without its foot is read as 0."""
+    page = phone.page
+    await page.set_viewport_size({"width": 360, "height": 740})
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    await page.locator("#monitor .top .rec").tap()  # the notice that the page cannot sound takes room
+    await page.wait_for_function(f"() => ({BARS})().every(([isDrawn, isWhole]) => isDrawn && isWhole)")
+    canned.state = at_a_planned_stop(canned.state)  # whose notice leaves less of the view
+    await expect(page.locator(".snack:not([hidden])")).to_be_visible()
+    await page.set_viewport_size({"width": 412, "height": 915})
+    await page.wait_for_function(f"() => ({BARS})().every(([isDrawn, isWhole]) => !isDrawn && !isWhole)")
+    await page.evaluate("document.querySelector('.panel[data-panel=home]').scrollTo(0, 120)")
+    await page.wait_for_function(f"() => ({BARS})().every(([isDrawn, isWhole]) => isDrawn && isWhole)")

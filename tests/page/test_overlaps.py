@@ -11,7 +11,7 @@ from playwright.async_api import Page, Route, expect
 
 from tests.page.canned import Canned, Json, alarm, live, slow, slowed
 from tests.page.conftest import Phone
-from tests.page.screenshots import car
+from tests.page.screenshots import at_a_planned_stop, car, show
 
 OVERLAPS = Path(__file__).with_name("overlaps.js").read_text(encoding="utf-8").split("\n", 1)[1].rstrip()
 WIDTHS = (320, 360, 412, 480, 640, 699, 700, 740, 820, 915, 999, 1000, 1180, 1199, 1200, 1440, 1799, 1800, 1920, 2560)
@@ -106,6 +106,90 @@ async def nothing_lies_over_another(
 @pytest.mark.gate
 async def test_no_notice_lies_over_a_key_a_gauge_or_another_alarm(phone: Phone, canned: Canned) -> None:
     await nothing_lies_over_another(phone, canned, GATE, "home")
+
+
+@pytest.mark.gate
+async def test_over_two_notices_the_distance_is_in_sight(phone: Phone, canned: Canned) -> None:
+    sizes = [(360, 900), (412, 915), (480, 900), (480, 945), (640, 900), (1000, 600), (1180, 600)]
+    await nothing_lies_over_another(phone, canned, sizes, "home")
+
+
+@pytest.mark.gate
+async def test_over_a_warning_the_distance_is_in_sight_and_the_gauge_is_large(phone: Phone, canned: Canned) -> None:
+    canned.state = warned()
+    page = await opened(phone, canned)
+    assert await walk(page, [(412, 915), (480, 900), (699, 900)]) == {}
+
+
+@pytest.mark.gate
+async def test_over_two_notices_beside_a_planned_stop_and_a_question_the_speed_is_read(
+    phone: Phone, canned: Canned
+) -> None:
+    await show(canned, phone.page, "question")
+    warning = alarm("phone_missing", "Phone position missing", text=LONG)
+    canned.state = at_a_planned_stop(canned.state)
+    canned.state["alarms"] += [warning]
+    await expect(phone.page.locator("[data-f=warning]")).to_be_visible()
+    await phone.page.wait_for_function("() => document.querySelector(\"link[href*='drive']\")?.sheet")
+    await noticed(phone.page, canned)
+    for width, height in ((360, 900), (412, 915)):
+        await phone.page.set_viewport_size({"width": width, "height": height})
+        await phone.page.evaluate(DRAWN)
+        box = await phone.page.locator("#panel-home .gauge").bounding_box()
+        assert box is not None
+        assert box["width"] >= 120, (width, height, box)
+
+
+#: Whether the name of the waiting warning and both its keys are whole in the list of the floor, and no letter is cut.
+LISTED = """() => {
+  const [list] = document.querySelectorAll('.alarms-pane > .body .alarms');
+  const foot = document.querySelector('.alarms-pane .alarms-foot');
+  const row = [...(list?.querySelectorAll('[data-waits]') ?? [])].find((one) => /Phone/.test(one.textContent));
+  if (!foot || !row) return false; // it is being moved
+  const { top } = foot.getBoundingClientRect();
+  const keys = [...row.querySelectorAll('.ac .key')].map((one) => one.getBoundingClientRect());
+  return row.querySelector('.t').getBoundingClientRect().height < 30 && keys.length === 2
+    && keys.every(({ bottom, height }) => height >= 40 && bottom <= top + 1);
+}"""
+
+
+@pytest.mark.gate
+@pytest.mark.parametrize("is_critical", [False, True])
+async def test_on_a_low_tablet_on_its_side_a_warning_is_read_and_answered(
+    phone: Phone, canned: Canned, *, is_critical: bool
+) -> None:
+    canned.state = warned()
+    page = await opened(phone, canned)
+    await phone.f("sound-off").tap()
+    await expect(phone.f("sound-off")).to_be_hidden()
+    if is_critical:
+        canned.state["alarms"].append(critical())
+        await expect(page.locator("#sheet-alarm")).to_be_visible()
+    for width, height in ((1000, 600), (1024, 660), (1024, 768), (1180, 700)):
+        await page.set_viewport_size({"width": width, "height": height})
+        if is_critical:  # the list begins with it
+            await expect(page.locator(".alarms-pane #sheet-alarm")).to_be_visible()
+        await page.wait_for_function(LISTED)
+
+
+#: How far the notices lie over the trends [px], and how many there are.
+OVER_TRENDS = """() => {
+  const box = (one) => document.querySelector(one).getBoundingClientRect();
+  const [trends, notices] = ['.pager [data-part=trends].pane', '.snacks'].map(box);
+  const seen = [...document.querySelectorAll('.snacks > .snack')].filter((one) => one.checkVisibility());
+  return [Math.max(0, Math.round(trends.bottom - notices.top - 1)), seen.length];
+}"""
+
+
+@pytest.mark.gate
+async def test_on_a_low_wall_the_notices_lie_under_the_trends(phone: Phone, canned: Canned) -> None:
+    several(canned)
+    page = await opened(phone, canned)
+    await noticed(page, canned)
+    for width, height in ((1800, 860), (1920, 900), (1920, 1080)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.evaluate(DRAWN)
+        assert await page.evaluate(OVER_TRENDS) == [0, 3], (width, height)
 
 
 #: A slow-down as it stands beside a warning.
@@ -466,6 +550,26 @@ async def sheets_leave_the_car_in_sight(
 @pytest.mark.gate
 async def test_a_sheet_leaves_strip_rail_and_speed_in_sight(phone: Phone, canned: Canned) -> None:
     await sheets_leave_the_car_in_sight(phone, canned, GATE, ["sheet-menu", "sheet-slow"])
+
+
+#: Whether the menu has the height of a row between its head and its key, and the warning beside it can be answered.
+MENU_BESIDE_A_WARNING = """() => {
+  const box = (one) => document.querySelector(one).getBoundingClientRect();
+  const [head, keys] = ['.sheet-head', '.keys'].map((one) => box(`#sheet-menu > ${one}`));
+  const answer = document.querySelector('.snack[data-f=warning] .key.solid');
+  const at = answer.getBoundingClientRect();
+  const hit = document.elementFromPoint((at.left + at.right) / 2, (at.top + at.bottom) / 2);
+  return keys.top - head.bottom > 56 && answer.contains(hit);
+}"""
+
+
+@pytest.mark.gate
+async def test_beside_a_warning_a_sheet_shows_more_than_its_key_in_a_low_window(phone: Phone, canned: Canned) -> None:
+    sizes = [(740, 560), (820, 560), (740, 600), (999, 640)]
+    await sheets_leave_the_car_in_sight(phone, canned, sizes, ["sheet-menu"])
+    for width, height in sizes:
+        await phone.page.set_viewport_size({"width": width, "height": height})
+        await phone.page.wait_for_function(MENU_BESIDE_A_WARNING)
 
 
 @pytest.mark.gate

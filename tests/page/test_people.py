@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -198,8 +199,9 @@ async def test_what_opens_by_itself_covers_neither_an_alarm_nor_a_finger(
 
         await late.page.route("**/people*.css*", hold)
         await late.page.add_init_script(SLIDING)
-        await late.open(one.ann.page.url)
-        await late.live()
+        async with late.page.expect_response(re.compile("duty-notices")):
+            await late.open(one.ann.page.url)
+            await late.live()
         await late.page.wait_for_timeout(600)  # of several pictures
         assert not requested.is_set()
         await late.page.evaluate("document.querySelector('#sliding').remove()")

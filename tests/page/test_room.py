@@ -21,6 +21,11 @@ ROOM = {
     "the search stands beside what is stored": (
         "files", 740, 360, f"() => {{ {RECT} return at('.files-find').top < at('.files .sec').bottom - 8 }}",
     ),
+    "that there are no alarms is read once beside a sheet": (
+        "menu", 412, 915,
+        "() => ['.strip', '.sheet-head .worst'].filter((one) => document.querySelector(one).checkVisibility()).length"
+        " === 1",
+    ),
     "two actions of a recording are in sight, beside what it is": (
         "files-menu", 740, 360,
         f"() => {{ {RECT} return at('[data-f=file-actions] li:nth-child(2)').bottom <= at('#monitor > .rail').top"
@@ -120,6 +125,11 @@ ROOM = {
     "three are on the smallest": (
         "take-over", 320, 568,
         f"() => {{ {RECT} return at('.chip-rows .key:nth-child(3)').bottom <= at('.take-over .mark-keys').top }}",
+    ),
+    "all reasons and what is known of an intervention are on a phone on its side": (
+        "take-over", 740, 360,
+        f"() => {{ {RECT} return at('.take-facts').top >= at('.take-over .mark-head').bottom - 1"
+        " && at('.chip-rows .key:nth-child(6)').bottom <= at('.take-over .mark-keys').top }",
     ),
     "a critical alarm cuts no key of a planned stop on a phone on its side": (
         "planned-stop-critical", 740, 360,

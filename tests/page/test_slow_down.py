@@ -19,6 +19,7 @@ from tests.page.barriers import fits_all, no_barrier
 from tests.page.canned import Canned, alarm, live, slow, slowed
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import running, server, simulate
+from tests.page.screenshots import SCENES
 from tests.page.test_meant import said_more
 from tests.vehicle.conftest import Guard
 from tests.vehicle.over_bridge import run_controller, run_guard, task
@@ -555,3 +556,31 @@ async def test_a_phone_that_is_lost_mid_press_orders_nothing_then_or_later(phone
             assert (await client.get("/api/state")).json()["decelerate"]["order"] is None
             events = (await client.get("/api/events", params={"limit": 1000})).json()["events"]
             assert [event["step"] for event in events if event["change"] == "slow_down"] in ([], ["refused"])
+
+
+@pytest.mark.parametrize("name", ["slow-down-not-confirmed", "slow-down-not-confirmed-seen"])
+async def test_not_confirmed_stands_three_times_at_most(phone: Phone, canned: Canned, name: str) -> None:
+    """The name of the alarm in the strip, what to do beneath the steps, and the title of the dialog or the legend."""
+    await SCENES[name](canned, phone.page)
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    await expect(phone.f("order-line")).to_have_text("NOT CONFIRMED – use the physical stop")
+    await expect(phone.page.locator("#sheet-alarm")).to_be_visible(visible=not name.endswith("seen"))
+    # Home's row lies beneath the fold, and a dialog over the action bar.
+    seen = """() => {
+      const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+      const found = [];
+      while (texts.nextNode()) {
+        const { currentNode: text } = texts;
+        const isUnder = document.querySelector('#sheet-alarm').open ? '.panel, #monitor > .rail' : '.panel';
+        const range = document.createRange();
+        range.selectNodeContents(text);
+        const { width, height } = range.getBoundingClientRect();
+        const isIn = (names) => text.parentElement.closest(names) !== null;
+        if (!/not confirmed/i.test(text.data) || isIn(`${isUnder}, .unseen`)) continue;
+        if (width > 1 && height > 1) found.push(text.data);
+      }
+      return found;
+    }"""
+    found = await phone.page.evaluate(seen)
+    assert len(found) == 3, found

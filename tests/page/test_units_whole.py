@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from playwright.async_api import expect
 
-from tests.page.canned import Canned, alarm, live, slowed
+from tests.page import canned_fleet as fleet
+from tests.page.canned import Canned, alarm, live, slow, slowed
 from tests.page.conftest import Phone
 from tests.page.screenshots import too_fast
 
@@ -48,6 +51,15 @@ BOTTOMS = """() => {
     keys: [`${rail} [data-f=release]`, `${rail} .slide`].map((one) => box(one).bottom),
     speed: box('.gauge .speed').bottom, rail: box(rail).top,
   };
+}"""
+
+
+#: How far the text of the slide ends from the right edge of its key [px].
+RIGHT = """() => {
+  const key = document.querySelector('#monitor > .rail .slide');
+  const range = document.createRange();
+  range.selectNodeContents(key.querySelector('.tx'));
+  return key.getBoundingClientRect().right - range.getBoundingClientRect().right;
 }"""
 
 
@@ -149,3 +161,42 @@ async def test_what_is_read_beneath_the_scan_is_in_sight_on_a_low_phone(phone: P
             assert ends is not None
             assert rail is not None
             assert ends["y"] + ends["height"] <= rail["y"], (has_note, width, height)
+
+
+async def test_what_the_slide_says_breaks_at_spaces_on_a_narrow_phone(phone: Phone, canned: Canned) -> None:
+    """In the font of a phone, which is narrower than the one of these tests."""
+    page = phone.page
+    await page.set_viewport_size({"width": 360, "height": 740})
+    canned.state = live()
+    await phone.open(canned.address)
+    await phone.live()
+    lines = "(name) => { const range = document.createRange(); range.selectNodeContents(document.querySelector(name));"
+    lines += (
+        " return new Set([...range.getClientRects()].filter(({ width }) => width > 1).map(({ top }) => top)).size }"
+    )
+    tx = "#monitor > .rail .slide .tx"
+    await page.locator(tx).evaluate("(one) => { one.style.fontFamily = 'Roboto' }")
+    assert await page.evaluate(lines, tx) == 3  # the title, and the reason in two lines
+    assert await page.evaluate(RIGHT) >= 4, "clear of the edge of the key [px]"
+    canned.state["decelerate"] = slow("armed")
+    await expect(page.locator(tx)).to_contain_text("Slide to slow")
+    assert await page.evaluate(lines, tx) == 2
+
+
+async def test_beams_and_the_acceleration_of_the_last_minute_have_their_units(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 360, "height": 740})
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    row = page.locator("[data-trend=acceleration] .row")
+    await page.locator(".panel[data-panel=home]").evaluate("(one) => one.scrollTo(0, 9999)")  # drawn once in sight
+    await expect(row).to_contain_text("Accel. m/s²")
+    assert await row.evaluate("(one) => [...one.children].every((it) => it.scrollWidth <= it.clientWidth + 1)")
+    await page.evaluate("dispatchEvent(new CustomEvent('catgraph-open', { detail: { screen: 'signals' } }))")
+    await expect(page.locator(".sigs")).to_contain_text("181beams", use_inner_text=False)
+
+
+async def test_the_page_of_all_cars_names_this_operator_as_you_first(phone: Phone, canned: Canned) -> None:
+    canned.cars = fleet.three()
+    await phone.open(f"{canned.address}/fleet")
+    await expect(phone.f("me", "#fleet")).to_have_text(re.compile("^You, ."))

@@ -35,7 +35,7 @@ async def test_a_covered_speed_says_how_far_the_car_may_have_driven(phone: Phone
     await expect(unseen).to_have_text(re.compile(r"^≤ [56]\.\d km unseen$"))  # 4.2 · 60 + 3 · 60² / 2, and the way here
     await expect(why).to_have_attribute("aria-label", re.compile(r"^Speed: STALE 1:\d\d s, ≤ [56]\.\d km unseen\. "))
     canned.state = state({"freshness": "stale", "age_s": 60.0, "value": {"speed_mps": None, "yaw_rate_radps": None}})
-    await expect(unseen).to_have_text("unseen not known")
+    await expect(unseen).to_have_text("driven: unknown")
     canned.state = state({"freshness": "ageing", "age_s": 60.0, "value": {"speed_mps": 0.0, "yaw_rate_radps": None}})
     await expect(unseen).to_have_text(re.compile(r"^≤ [56]\.\d km unseen$"))
 
@@ -70,3 +70,19 @@ async def test_a_gap_says_it_on_the_veil_on_the_sheet_and_in_the_log(phone: Phon
     await phone.live()
     await phone.page.evaluate(OPEN, "log")
     await expect(phone.page.locator(".log .gap").first).to_contain_text(re.compile(r", ≤ \d\d\.\d km unseen$"))
+
+
+@pytest.mark.parametrize("width", [360, 412, 1440, 1920])
+async def test_how_far_it_may_have_driven_touches_neither_the_speed_nor_the_acceleration(
+    phone: Phone, canned: Canned, width: int
+) -> None:
+    """In units of the gauge: a digit begins 80 above its foot, a letter 11."""
+    canned.state = state({"freshness": "ageing", "age_s": 0.62})
+    await phone.page.set_viewport_size({"width": width, "height": 900})
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    await expect(phone.page.locator('.gauge [data-f="unseen"]')).to_have_text(re.compile("unseen$"))
+    at = "(name) => Number(document.querySelector(`.gauge ${name}`).getAttribute('y'))"
+    push, way, speed = [await phone.page.evaluate(at, name) for name in (".aval", "[data-f=unseen]", ".speed")]
+    assert speed - 80 - way >= 4
+    assert way - 11 - push >= 4

@@ -15,7 +15,7 @@ test('an unknown speed, age or limit is not known, and never 0', () => {
   }
   assert.equal(unseenMetres(1, -0.1, 3), null);
   assert.equal(unseenMetres(1, 1, 0), null);
-  assert.equal(unseenWords(null), 'metres unseen not known');
+  assert.equal(unseenWords(null), 'distance driven unknown');
 });
 
 test('the page counts as the server does', () => { // tests/monitor/test_unseen.py reads the same table
@@ -107,5 +107,5 @@ test('a blind time has its metres once the first values after it came', () => {
   log.greet({ boot: 'a', last_event: 0 }, 9, 0);
   const other = /** @type {import('../../static/js/core/event-log.js').Gap} */ (log.caughtUp());
   log.seen(null);
-  assert.match(gapLine(other), /, metres unseen not known$/);
+  assert.match(gapLine(other), /, distance driven unknown$/);
 });

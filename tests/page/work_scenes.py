@@ -143,7 +143,8 @@ def me() -> Json:
 
 
 async def again(server: Canned, page: Page) -> None:
-    """The page from anew, as who is on duty is sent once."""
+    """The page from anew: who is on duty and the ids of the checks are sent once."""
+    await page.evaluate("sessionStorage.clear()")  # the page prompts once for who is on duty
     await page.goto("about:blank")
     await page.goto(f"{server.address}/#home")
     await page.wait_for_selector("#monitor:not([hidden])")
@@ -228,11 +229,32 @@ async def car_complies(server: Canned, page: Page) -> None:
         checked_when="Checked while the car is being slowed.", title="Slow-down NOT CONFIRMED",
         checks=[{"id": id, "label": label, "verdict": verdict, "text": text} for id, label, verdict, text in rows],
     )  # fmt: skip
-    await page.get_by_role("button", name="Slow-down FAULT").first.tap()
+    await again(server, page)
+    await page.locator(".checks li button:visible", has_text="Slow-down").tap()
     await page.wait_for_selector(".check-view")
 
 
+async def keys_help(server: Canned, page: Page) -> None:
+    """The list of keys."""
+    server.state = driving()
+    await page.wait_for_selector(".ledge > .mark-key")  # keys act once the page is complete
+    for _ in range(10):
+        await page.keyboard.press("?")
+        if await page.locator("#sheet-keys[open]").count():
+            return
+        await page.wait_for_timeout(500)
+    await page.wait_for_selector("#sheet-keys[open]", timeout=1000)
+
+
+async def left_hand(server: Canned, page: Page) -> None:
+    """The page under the left thumb."""
+    server.state = driving()
+    await page.evaluate("document.documentElement.dataset.hand = 'left'")
+
+
 WORK_SCENES = {
+    "help": keys_help,
+    "left-hand": left_hand,
     "mark-fresh": mark_fresh,
     "mark-voice": mark_voice,
     "mark-sheet": mark_sheet,

@@ -58,7 +58,8 @@ _DATA = (
     "/openapi.json",
 )  # never documents of ours, and opened as one they can do nothing
 _REPORT = re.compile(r"(/agents/[^/]{1,100})?/api/recordings/[^/]{1,100}/report")
-_PARTS = "/static/"  # decided by the path and not by the kind: a 304 has no kind, and replaces what is kept
+# Decided by the path and not by the kind: a 304 has no kind, and replaces what is kept.
+_PARTS = ("/static/", "/manifest.webmanifest")
 # What a browser does not know it complains of in its console: sharing and Bluetooth, which Chromium has not everywhere.
 _SELF = ("autoplay", "clipboard-write", "fullscreen", "geolocation", "microphone", "screen-wake-lock")
 _NOBODY = (

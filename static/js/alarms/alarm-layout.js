@@ -79,10 +79,10 @@ export function soundOf(frame, { isServerLost, isLossAcknowledged }) {
 /**
  * The one line under the tabs.
  * @param {State | null} frame
- * @param {{isSilent: boolean, chain: import('../core/link.js').ChainView, paused_s: number}} seen
+ * @param {{isSilent: boolean, chain: import('../core/link.js').ChainView, paused_s: number, stale?: number}} seen stale: so many signals are at the glass
  * @returns {Strip}
  */
-export function stripOf(frame, { isSilent, chain, paused_s }) {
+export function stripOf(frame, { isSilent, chain, paused_s, stale }) {
   if (!frame) return { kind: 'invert', icon: 'unknown', text: 'Nothing received yet', end: 'not checked', opens: 'signals' };
   if (frame.session.paused && !isSilent) {
     return { kind: 'invert', icon: 'pause', text: `Paused ${paused(paused_s)}: no alarm is raised`, end: '', opens: 'alarms' };
@@ -117,13 +117,14 @@ export function stripOf(frame, { isSilent, chain, paused_s }) {
   const isFuelAbsent = frame.signals.fuel?.freshness === 'not_published' && !tiles.some((tile) => tile.label === 'Fuel'); // counted as its tile is
   const unknown = tiles.filter((tile) => tile.verdict === 'unknown').length + Number(isFuelAbsent);
   const faults = tiles.filter((tile) => tile.verdict === 'fault').length; // their alarms may be suppressed
-  const counts = `${faults ? `${faults} FAULT` : `${ok} OK`} · ${unknown} not checked`;
+  const found = faults ? `${faults} FAULT` : stale ? `${stale} stale` : '';
+  const open = `${unknown} not checked`;
   if (worst) {
-    const end = listed > 1 ? amongWords(listed) : unknown ? `${unknown} not checked` : `${ok} OK`;
+    const end = listed > 1 ? amongWords(listed) : found || (unknown ? open : `${ok} OK`);
     return { kind: '', icon: 'info', text: worst.title, end, opens: 'alarms' };
   }
-  if (order) return { ...order, icon: 'slow', opens: 'alarms' };
-  return { kind: '', icon: faults ? 'info' : 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${unknown} not checked` : counts, opens: 'alarms' };
+  if (order) return { ...order, icon: 'slow', end: found || order.end, opens: 'alarms' };
+  return { kind: '', icon: found ? 'info' : 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${found || open}` : `${found || `${ok} OK`} · ${open}`, opens: 'alarms' };
 }
 
 /** Of how many in the list this is one. @param {number} listed */

@@ -1,6 +1,7 @@
 // The list of alarms behind the strip: every one that stands, has returned, is shelved or suppressed, with its keys.
 
-import { countWords, latelyWords, noneWords, rowsOf, together } from './alarms-layout.js';
+import { latelyWords, noneWords, together } from './alarm-pages.js';
+import { countWords, rowsOf } from './alarms-layout.js';
 import { html, icon, listen, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
 import { cameAt, Meant } from '../core/meant.js';

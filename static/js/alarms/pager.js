@@ -1,7 +1,7 @@
 // A list shown a page at a time: no row is sliced. The rows stay in the document, those of other pages hidden.
 
 import { html, icon, listen, setAttribute, setSentence, show } from '../core/dom.js';
-import { pagesOf } from './alarms-layout.js';
+import { pagesOf } from './alarm-pages.js';
 
 export class PagedList {
   #pages = [0];

@@ -12,6 +12,7 @@ import { isWeak } from './round-trip.js';
  * @property {number | null} age_s age of what is beyond the cut, or of the car's newest message
  * @property {0 | 1 | 2 | null} cut the broken wire: after the phone, the server or the bridge
  * @property {number | null} since_ms wall clock: when what is beyond the cut was last received
+ * @property {number} [known] the last node of which anything is known, where no wire is broken and it is not the car
  * @property {Node[]} nodes phone, server, bridge, car
  * @property {string} sentence what fell silent
  * @property {string} detail what is known beside it
@@ -79,8 +80,8 @@ function viewOf({ frame, isSilent, silence_s, lag_s, heard_ms, unserved = '' }) 
   }
   if (car_s === null) {
     return {
-      state: 'Waiting', age_s: older(session.connected_for_s, lag_s), cut: null, since_ms: null,
-      nodes: nodesOf(null, [...live, 'no message yet']),
+      state: 'Waiting', age_s: older(session.connected_for_s, lag_s), cut: null, since_ms: null, known: 2,
+      nodes: nodesOf(null, [...live, 'no message yet'], NAMES, 2),
       sentence: link.problem?.title ?? 'Nothing received yet.',
       detail: link.problem?.hint ?? '',
     };
@@ -94,14 +95,14 @@ function viewOf({ frame, isSilent, silence_s, lag_s, heard_ms, unserved = '' }) 
 }
 
 /**
- * Frames come again, but not yet enough of them to be believed.
+ * The page was away: frames may come again, but not yet enough of them to be believed.
  * @param {number} silence_s
  * @returns {ChainView}
  */
 function waking(silence_s) {
   return {
-    state: 'Waking', age_s: silence_s, cut: null, since_ms: null,
-    nodes: nodesOf(null, ['here', 'answers', '', '']),
+    state: 'Waking', age_s: silence_s, cut: null, since_ms: null, known: 0,
+    nodes: nodesOf(null, ['here'], NAMES, 0),
     sentence: 'This page was away.', detail: 'Values return with the next data.',
   };
 }
@@ -142,11 +143,12 @@ function agentSilent(why, silence_s, heard_ms) {
  * @param {0 | 1 | 2 | null} cut
  * @param {string[]} marks
  * @param {string[]} [names]
+ * @param {number} [known] the last of which anything is known
  * @returns {Node[]}
  */
-function nodesOf(cut, marks, names = NAMES) {
+function nodesOf(cut, marks, names = NAMES, known = cut ?? 3) {
   return names.map((name, i) => ({
-    name, mark: marks[i] ?? '', isBad: cut !== null && i === cut + 1, isKnown: cut === null || i <= cut,
+    name, mark: marks[i] ?? '', isBad: cut !== null && i === cut + 1, isKnown: i <= known,
   }));
 }
 

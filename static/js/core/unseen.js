@@ -36,7 +36,7 @@ export function keptSpeed(late_s) {
  * @param {Known} metres
  */
 export function unseenWords(metres) {
-  if (typeof metres !== 'number') return 'metres unseen not known';
+  if (typeof metres !== 'number') return 'distance driven unknown';
   if (metres > 999) return `≤ ${up(metres / 1000)} km unseen`;
   return `≤ ${metres > 99.9 ? Math.ceil(metres) : up(metres)} m unseen`;
 }

@@ -18,7 +18,7 @@ export class FilesSearch {
       type: 'search', placeholder: 'Search', 'aria-label': 'Search recordings', autocomplete: 'off', autocapitalize: 'off', spellcheck: 'false', enterkeyhint: 'search', maxlength: 100,
     }));
     this.select = /** @type {HTMLSelectElement} */ (html('select', { 'aria-label': 'Which recordings' }));
-    this.element = html('div', { class: 'files-find', hidden: true }, html('div', { class: 'field' }, icon('search'), text), this.select);
+    this.element = html('div', { class: 'files-find', hidden: true }, html('div', { class: 'field' }, icon('find'), text), this.select);
     this.stops = [
       listen(text, 'input', () => {
         clearTimeout(this.#typing);

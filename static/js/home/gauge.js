@@ -120,7 +120,7 @@ class Gauge {
   #drawWay(ink) {
     const { unseen, keeps, keptWay } = this.parts;
     const metres = unseenOf(this.store);
-    const way = ink !== 'ageing' && ink !== 'stale' ? '' : metres === null ? 'unseen not known' : unseenWords(metres); // short: it stands within the arc
+    const way = ink !== 'ageing' && ink !== 'stale' ? '' : metres === null ? 'driven: unknown' : unseenWords(metres); // short: it stands within the arc
     const [speed = '', of = ''] = proposalOf(this.store);
     setText(unseen, way);
     setText(keeps, speed);
@@ -177,13 +177,13 @@ function build(root) {
   const struck = svg('rect', { class: 'struck', y: 146, height: 90 });
   const unit = svg('text', { class: 'unit', y: 240 });
   const note = svg('text', { class: 'note', x: 190, y: 249, 'text-anchor': 'middle' });
-  const unseen = svg('text', { class: 'way', x: 190, y: 142, 'text-anchor': 'middle', 'data-f': 'unseen' });
+  const unseen = svg('text', { class: 'way', x: 190, y: 138, 'text-anchor': 'middle', 'data-f': 'unseen' });
   const [keeps, keptWay] = [232, 248].map((y) => svg('text', { class: 'way', x: 0, y }));
   const arc = svg('path', { class: 'ordarc' });
   const ordered = svg('tspan', { class: 'num' });
   const order = svg('text', { class: 'ord' }, 'ordered ', ordered);
   const top = svg('svg', { viewBox: VIEW, 'aria-hidden': 'true' }, bug, arc, order,
-    svg('text', { class: 'aval', x: 190, y: 124, 'text-anchor': 'middle' }, acceleration, accelerationUnit), box, speed, struck, unit, note, unseen, keeps, keptWay);
+    svg('text', { class: 'aval', x: 190, y: 121, 'text-anchor': 'middle' }, acceleration, accelerationUnit), box, speed, struck, unit, note, unseen, keeps, keptWay);
   const speedMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Speed', 'aria-valuemin': 0 });
   const why = html('button', { type: 'button', class: 'why', 'data-age-of': 'speed', hidden: true });
   const accelerationMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Acceleration' });

@@ -57,6 +57,12 @@ export function mount(root, store) {
     }
   }
 
+  // A bar whose foot is out of sight would be read as 0: the digits beside it are whole.
+  const watcher = new IntersectionObserver((entries) => {
+    for (const { target, intersectionRatio } of entries) /** @type {SVGElement} */ (target).style.opacity = intersectionRatio < 0.98 ? '0' : '';
+  }, { threshold: 0.98 });
+  for (const { bar } of parts.slice(0, 2)) watcher.observe(bar);
   if (store.frame) draw(); // before the first frame it is not shown
-  return store.on('draw', () => store.painter.inTurn(draw));
+  const stop = store.on('draw', () => store.painter.inTurn(draw));
+  return () => [stop(), watcher.disconnect()];
 }

@@ -36,7 +36,9 @@ export function mount(root, store) {
     const { session, phone } = store.frame ?? {};
     const [driven, drivenUnit] = session?.track_m == null ? ['–', ''] : distanceWords(session.track_m);
     write(fields.driven, ink, driven, fields.drivenUnit, drivenUnit);
-    const [apart, apartUnit] = !phone?.used || phone.apart_m == null ? ['–', ''] : distanceWords(phone.apart_m);
+    // As on the map: a comparison that is older than 5 s is of another moment.
+    const isNow = (phone?.compared_age_s ?? Infinity) + store.lag_s <= 5;
+    const [apart, apartUnit] = !isNow || !phone?.used || phone.apart_m == null ? ['–', ''] : distanceWords(phone.apart_m);
     write(fields.apart, ink, apart, fields.apartUnit, apartUnit);
 
     const tank = store.ink('fuel');

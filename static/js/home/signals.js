@@ -22,7 +22,7 @@ const HEADLINES = /** @type {Record<string, (value: any) => [string, string]>} *
   position: (value) => (value.status < 0 ? ['no', 'fix'] : [value.alt_m === null ? '2D' : '3D', 'fix']),
   odometry: (value) => speedWords(value.speed_mps, 2),
   heading: (value) => [value.heading_deg === null ? NOTHING : `${fixed(value.heading_deg, 0)}°`, ''],
-  scan: (value) => [fixed(value.beams, 0), ''],
+  scan: (value) => [fixed(value.beams, 0), 'beams'],
   diagnostics: (value) => [LEVELS[value.worst] ?? NOTHING, ''],
   command: (value) => speedWords(value.speed_mps),
 });

@@ -95,7 +95,7 @@ function buildRow(spec) {
 function drawText({ spec, label, value, key }, store) {
   const { unit } = shownIn(0, spec.unit);
   const { text, ink } = nowOf(spec, store);
-  setText(label, spec.name === 'acceleration' ? spec.label : `${spec.label} ${unit}`); // its unit has no room beside it
+  setText(label, `${spec.name === 'acceleration' ? 'Accel.' : spec.label} ${unit}`); // whole, its unit has no room beside it
   write(value, ink, text);
   if (isAbsent(ink)) setText(value, NOTHING); // the text has no room: the label of the key has it
   setAttribute(key, 'aria-label', `${spec.title}: ${ink === 'stale' ? 'stale, last ' : ''}${text} ${unit}; open the chart of the drive`);

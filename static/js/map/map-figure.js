@@ -4,7 +4,7 @@
 import { offsetOf, placeAt, turned } from '../core/geodesy.js';
 import { setAttribute, svg } from '../core/dom.js';
 import { distanceWords } from '../core/format.js';
-import { clearBox, clearTop, gridPaths, groundMatrix, overlap, pixelOf, round, scaleBar_m, turnedPixels } from './map-layout.js';
+import { clearBox, clearTop, gridPaths, groundMatrix, linesOf, overlap, pixelOf, round, scaleBar_m, turnedPixels } from './map-layout.js';
 import { OtherPhones } from './map-others.js';
 import { trackPaths } from './map-track.js';
 import { bearingWords } from './map-text.js';
@@ -40,6 +40,8 @@ const HIDING_PX = 200;
 const MARK_PX = 16;
 /** The room of a name: above its base line, and all [px]. */
 const NAME_PX = { up: 14, high: 19 };
+/** From one line of a name to the next [px]. */
+const LINE_PX = 17;
 /** Marks nearer than this leave no room for a number between them [px]. */
 const ROOM_PX = 70;
 
@@ -209,17 +211,19 @@ export class Figure {
     const isShown = at !== null && at[0] > -20 && at[0] < size.width + 20 && at[1] > -20 && at[1] < size.height + 20;
     shown(text, isShown);
     if (!at) return;
-    if (text.textContent !== name) text.textContent = name;
-    const half = (name.length * LETTER_PX) / 2 + 8;
-    const y = isAbove ? at[1] - room - 10 : at[1] + room + 20;
+    const lines = linesOf(name, (size.width - KEYS_PX - 16) / LETTER_PX);
+    writeLines(text, lines);
+    const half = (Math.max(...lines.map((line) => line.length)) * LETTER_PX) / 2 + 8;
+    const more = (lines.length - 1) * LINE_PX;
+    const y = isAbove ? at[1] - room - 10 - more : at[1] + room + 20;
     const x = Math.min(size.width - KEYS_PX - half, Math.max(half, at[0]));
     const isBesideScale = x - half > this.#scaleEnd_px + 8;
-    const box = { left: x - half, top: Math.min(size.height - (isBesideScale ? 8 : 44), Math.max(20, y)) - NAME_PX.up, width: 2 * half, height: NAME_PX.high };
-    const sides = [at[0] + MARK_PX, at[0] - MARK_PX - box.width].map((left) => ({ ...box, left, top: at[1] - NAME_PX.high / 2 }));
+    const box = { left: x - half, top: Math.min(size.height - (isBesideScale ? 8 : 44) - more, Math.max(20, y)) - NAME_PX.up, width: 2 * half, height: NAME_PX.high + more };
+    const sides = [at[0] + MARK_PX, at[0] - MARK_PX - box.width].map((left) => ({ ...box, left, top: at[1] - box.height / 2 }));
     const clear = clearBox(box, sides, this.#taken, size);
     if (!clear && size.height < HIDING_PX) shown(text, false);
     else if (clear && isShown) this.#taken.push(clear);
-    const { left, top } = clear ?? box;
+    const { left, top } = clear ?? clearBox(box, [], size.taken ?? [], size) ?? box; // over another name, not under a key
     place(text, left + half, top + NAME_PX.up);
   }
 
@@ -294,6 +298,13 @@ export function besideWay([a, b], { width, height }) {
   const fits = x + nx * off > HALF.x && y + ny * off > HALF.y && y + ny * off < height - HALF.y - 40;
   const side = fits ? off : -off;
   return [Math.min(width - HALF.x, Math.max(HALF.x, x + nx * side)), Math.min(height - HALF.y - 40, Math.max(HALF.y, y + ny * side))];
+}
+
+/** A name in lines. @param {SVGElement} text @param {string[]} lines */
+function writeLines(text, lines) {
+  const name = lines.join(' ');
+  if (text.textContent === name && Math.max(1, text.childElementCount) === lines.length) return;
+  text.replaceChildren(...(lines.length === 1 ? [name] : lines.map((line, n) => svg('tspan', { x: 0, dy: n ? LINE_PX : 0 }, n ? ` ${line}` : line))));
 }
 
 /** @param {Element} element @param {boolean} isShown */

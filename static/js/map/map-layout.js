@@ -136,6 +136,33 @@ export function clearBox(box, sides, taken, { width, height }) {
 }
 
 /**
+ * A name in as few lines of at most so many letters as its words allow, which are about equally long.
+ * @param {string} name
+ * @param {number} letters
+ */
+export function linesOf(name, letters) {
+  let lines = filled(name, letters);
+  for (let fewer = letters - 1; fewer > 0; fewer -= 1) {
+    const narrower = filled(name, fewer);
+    if (narrower.length > lines.length) break;
+    lines = narrower;
+  }
+  return lines;
+}
+
+/** @param {string} name @param {number} letters in a line, or more for a longer word */
+function filled(name, letters) {
+  /** @type {string[]} */
+  const lines = [];
+  for (const word of name.split(' ')) {
+    const last = lines.at(-1);
+    if (last !== undefined && last.length + 1 + word.length <= letters) lines[lines.length - 1] = `${last} ${word}`;
+    else lines.push(word);
+  }
+  return lines;
+}
+
+/**
  * The grid's lines over the map, as an SVG path of the weak and one of the strong: they lie still on the ground.
  * @param {Offset} middle where the view's middle is from the grid's origin
  * @param {Pick<View, 'mpp' | 'up_deg'>} view

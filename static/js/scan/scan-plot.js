@@ -60,8 +60,7 @@ export class ScanPlot {
 
   /** @param {Picture} picture */
   draw({ scan, around, width, height, dpr, theme, caption }) {
-    const [w, h] = [Math.round(width * dpr), Math.round(height * dpr)];
-    fit(this.canvas, w, h);
+    fit(this.canvas, Math.round(width * dpr), Math.round(height * dpr));
     const g = penOf(this.canvas, { alpha: false });
     if (!g) return;
     ({ colour: this.#colour, font: this.#font } = theme);
@@ -77,8 +76,7 @@ export class ScanPlot {
     const corridor = around.car ? { ...around.car, half_width_m: around.car.half_width_m + wider_m, tyre_angle_rad } : null;
     if (corridor) this.#stoppingStrip(g, scale, corridor, scan.judged.stopping_m);
     this.#hatch(g, scale, scan, sectors, width + height, dpr, theme.key);
-    const points = pointsOf(scan, reach_m * 1.05, 1 / scale.k);
-    this.#dots = { scale, points };
+    const { points } = (this.#dots = { scale, points: pointsOf(scan, reach_m * 1.05, 1 / scale.k) });
     const nearest = this.#nearestAt(g, scale, scan, reach_m); // all other labels keep its room free
     if (corridor) this.#corridor(g, scale, corridor, reach_m, scan.judged.stopping_m, around.limit_m);
     this.#names(g, scale, scan, reach_m, sectors, width);
@@ -136,17 +134,23 @@ export class ScanPlot {
     }
     g.setLineDash([]);
     if (stopping_m !== null && stopping_m > 0 && stopping_m <= end_m) {
-      const [left, right] = this.#across(g, scale, corridor, stopping_m, colour.ink, 5, 5);
-      if (left && right && left[1] > 0) this.#clear(g, `stop ${fixed(stopping_m)} m`, [[Math.max(100, left[0] - 7), left[1], 'right', 14, 400], [Math.min(scale.width - 92, right[0] + 12), left[1], 'left', 14, 400]], colour.ink);
+      this.#besides(g, `stop ${fixed(stopping_m)} m`, this.#across(g, scale, corridor, stopping_m, colour.ink, 5, 5), 400, colour.ink);
     }
     if (limit_m !== null && limit_m > 0 && limit_m <= end_m) {
-      const [, right] = this.#across(g, scale, corridor, limit_m, colour.you, 3, 0);
-      if (right && right[1] > 0) this.#clear(g, `limit ${fixed(limit_m)} m`, [[Math.min(scale.width - 92, right[0] + 12), right[1], 'left', 14, 700]], colour.you);
+      this.#besides(g, `limit ${fixed(limit_m)} m`, this.#across(g, scale, corridor, limit_m, colour.you, 3, 0).reverse(), 700, colour.you);
     }
+  }
+
+  /** Names a line across the corridor: beside its first end, else its other one, else further out with a thin line to it. @param {Pen} g @param {string} text @param {Point[]} ends @param {number} weight @param {string} css */
+  #besides(g, text, ends, weight, css) {
+    const places = placesBeside(ends, this.#width, weight);
+    const found = places[this.#clear(g, text, places.map(({ where }) => where), css)];
+    if (found?.isFar) thinLine(g, found.end, [found.where[0] + (found.where[2] === 'left' ? -4 : 4), midOf(this.#taken.at(-1), found.end[1])], css);
   }
 
   /**
    * A line across the corridor; gives its ends on the plot.
+   * @returns {Point[]}
    * @param {Pen} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number} way_m @param {string} colour @param {number} width @param {number} beyond_px
    */
   #across(g, scale, corridor, way_m, colour, width, beyond_px) {
@@ -284,6 +288,32 @@ export class ScanPlot {
     const left = align === 'left' ? x - 4 : align === 'right' ? x - width + 4 : x - width / 2;
     return { left, top: y - size * 0.72, width, height: size * 1.44 };
   }
+}
+
+/** Where a label of a line may stand, best first. @param {Point[]} ends of the line @param {number} width of the plot [px] @param {number} weight */
+function placesBeside(ends, width, weight) {
+  const [first, other] = ends;
+  if (!first || !other || first[1] <= 0) return [];
+  return [0, 28, 56, 84].flatMap((out) => [first, other].map((end) => {
+    const isLeft = end[0] === Math.min(first[0], other[0]);
+    const x = isLeft ? Math.max(100, end[0] - 10 - out) : Math.min(width - 92, end[0] + 12 + out);
+    return { end, isFar: out > 0, where: /** @type {Where} */ ([x, end[1], isLeft ? 'right' : 'left', 14, weight]) };
+  }));
+}
+
+/** @param {Pen} g @param {Point} from @param {Point} to @param {string} css */
+function thinLine(g, from, to, css) {
+  g.strokeStyle = css;
+  g.lineWidth = 1;
+  g.beginPath();
+  g.moveTo(...from);
+  g.lineTo(...to);
+  g.stroke();
+}
+
+/** The middle of a label that was drawn [px]. @param {Box | undefined} box @param {number} otherwise */
+function midOf(box, otherwise) {
+  return box ? box.top + box.height / 2 : otherwise;
 }
 
 /** Draws a text on its plate, which has the panel's colour, in the font that measured it. @param {Pen} g @param {string} text @param {Box} plate @param {{panel: string, css: string}} colours */

@@ -81,7 +81,7 @@ class SettingsTab {
     const phone = html('button', { type: 'button', class: 'key wide' }, icon('phone'), 'Preferences of this device');
     const keys = html('div', { class: 'keys' }, phone);
     this.panel.replaceChildren(
-      html('div', { class: 'find' }, html('div', { class: 'field' }, icon('search'), search), undo), state,
+      html('div', { class: 'find' }, html('div', { class: 'field' }, icon('find'), search), undo), state,
       all, this.mail.element, this.people.element, this.departure.element, this.devices.element, keys,
     );
     return { search, undo, state, groups, none, all, phone, keys };

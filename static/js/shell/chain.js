@@ -13,14 +13,15 @@ const drawn = new WeakMap();
  * @param {ChainView} view
  */
 export function drawChain(root, view) {
-  const key = String(view.cut);
+  const key = `${view.cut} ${view.known}`;
   if (drawn.get(root) === key) return;
   const cut = view.cut ?? 3;
+  const known = view.known ?? cut;
   const parts = [];
-  for (let i = 0; i < Math.min(cut, 3); i += 1) parts.push(svg('path', { class: 'wire', d: `M${12 + 24 * i} 12h12` }));
+  for (let i = 0; i < known; i += 1) parts.push(svg('path', { class: 'wire', d: `M${12 + 24 * i} 12h12` }));
   if (cut < 3) parts.push(svg('path', { class: 'cut', d: `M${21 + 24 * cut} 4l-6 16` }));
   for (let i = 0; i < 4; i += 1) {
-    parts.push(svg('rect', { class: i > cut ? 'node q' : 'node', x: 1 + 24 * i, y: 7, width: 10, height: 10 }));
+    parts.push(svg('rect', { class: i > known ? 'node q' : 'node', x: 1 + 24 * i, y: 7, width: 10, height: 10 }));
   }
   root.replaceChildren(...parts);
   drawn.set(root, key);
@@ -46,7 +47,7 @@ export function drawBigChain(root, view) {
       parts.push(svg('path', { class: 'wire q', d: `M${middle + 15} 22H${to}` }));
       parts.push(svg('path', { class: 'cut', d: `M${middle + 6} 6l-12 32` }));
     } else {
-      parts.push(svg('path', { class: view.cut !== null && i > view.cut ? 'wire q' : 'wire', d: `M${from} 22H${to}` }));
+      parts.push(svg('path', { class: view.nodes[i + 1]?.isKnown ? 'wire' : 'wire q', d: `M${from} 22H${to}` }));
     }
   }
   view.nodes.forEach((node, i) => {
@@ -62,6 +63,7 @@ export function drawBigChain(root, view) {
 
 /** @param {ChainView} view */
 function label(view) {
+  if (view.known !== undefined) return view.sentence;
   if (view.cut === null) return 'This device, server, bridge and car answer';
   return `The link is broken between ${view.nodes[view.cut]?.name} and ${view.nodes[view.cut + 1]?.name}`;
 }

@@ -170,7 +170,7 @@ export function placesOf(rows) {
   return sorted.map((row, i) => {
     const kind = row.isLost || (row.kind !== '' && row.icon === 'link-off') ? 'lost' : row.kind;
     const state = row.isLost ? 'no data' : row.text === '–' ? row.mode : row.text;
-    return { name: row.name, label: labels[i] ?? row.name, kind, isKnown: kind !== '' && kind !== 'lost' && !row.isAsking, isDriving: row.mode === 'driving', title: `${row.name}, ${state}` };
+    return { name: row.name, label: labels[i] ?? row.name, kind, isKnown: row.kind !== '' && !row.isAsking, isDriving: row.mode === 'driving', title: `${row.name}, ${state}` };
   });
 }
 

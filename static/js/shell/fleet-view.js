@@ -1,7 +1,8 @@
 // Draws the page of all cars from what its store knows: one view of it all is made, and each part writes what has changed.
 
 import { drawChain } from './chain.js';
-import { dutyEndedNotice, openDuty } from '../control/duty.js';
+import { openDuty } from '../control/duty.js';
+import { dutyEndedNotice } from '../control/duty-notices.js';
 import { dutyWords } from '../control/duty-layout.js';
 import { grouped, headOf, isLost, itemsOf, silenceOf } from './fleet-layout.js';
 import { LostPanel, lostChain } from './fleet-lost.js';
@@ -73,8 +74,9 @@ export class FleetView {
   /** Who is on duty at this device. */
   #drawMe() {
     const { duty, self } = this.store;
-    setText(this.me, duty?.me ? `${duty.me.name}, ${duty.me.title}` : `${self.name}, you`);
-    setAttribute(field(this.root, 'duty'), 'aria-label', `${duty?.me ? `${duty.me.name}, ${duty.me.title}` : `${self.name}, you`}. ${dutyWords(duty)}`);
+    const me = duty?.me ? `${duty.me.name}, ${duty.me.title}` : `You, ${self.name}`; // the name may be cut, "you" may not
+    setText(this.me, me);
+    setAttribute(field(this.root, 'duty'), 'aria-label', `${me}. ${dutyWords(duty)}`);
   }
 
   /** What of it a phone shows. @param {string} name */

@@ -15,9 +15,11 @@ export function mount(root, store) {
   const frame = need(document, '.frame');
 
   function draw() {
-    const seen = stripOf(store.frame, {
+    const { frame: of } = store;
+    const seen = stripOf(of, {
+      stale: Object.keys(of?.signals ?? {}).filter((name) => store.ink(name).ink === 'stale').length,
       isSilent: store.isSilent, chain: store.chain,
-      paused_s: (store.frame?.session.paused_for_s ?? 0) + store.lag_s,
+      paused_s: (of?.session.paused_for_s ?? 0) + store.lag_s,
     });
     setAttribute(strip, 'data-kind', seen.kind || null);
     setAttribute(strip, 'data-returned', seen.hasReturned);

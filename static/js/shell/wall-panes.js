@@ -32,7 +32,7 @@ export function signalLines(signals, lag_s) {
 }
 
 /**
- * Who has this car on a page: who is in control first, then who hears no alarm, then this page; the pane may not have room for all.
+ * Who has this car on a page: who is in control first, then who cannot hear alarms, then this page; the pane may not have room for all.
  * @param {Reach | null | undefined} reach
  * @param {Control | null} control
  * @param {string} page of this screen

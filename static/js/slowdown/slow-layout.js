@@ -96,7 +96,7 @@ export function slideOf(seen, isInAlarm = false) {
 /** @param {string} state @param {SlowOrder} order @returns {[string, string]} */
 function goWords(state, order) {
   if (!order.sending) return ['Not sending', 'to the car now'];
-  if (order.confirmed === false) return ['Not confirmed:', 'physical stop'];
+  if (order.confirmed === false) return ['Use the', 'physical stop']; // line and legend give the reason
   const zero = speedWords(0).join(' ');
   if (order.stands) return ['Standing', `held at ${zero}`];
   if (state === 'holding' && order.confirmed) return ['Holding', `at ${zero}`];

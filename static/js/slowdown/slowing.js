@@ -34,7 +34,7 @@ export function mount(root, store, control, say, shortOf) {
     const title = stateWord(seen);
     const state = title.toLowerCase();
     for (const legend of legends) {
-      setText(field(legend, 'legend-state'), state);
+      setText(field(legend, 'legend-state'), legend.closest('dialog')?.querySelector('h2')?.textContent?.includes(title) ? 'ordered' : state); // the title has NOT CONFIRMED
       setAttribute(legend, 'data-state', state);
     }
     const hold = seen.isReplay ? null : holdOf(now);

@@ -67,7 +67,7 @@ async def test_nothing_that_was_said_is_deleted_here_before_it_is_there(car: Car
 
         s3.delay_s = say
         now.uploader.ask(ID, deletes=True)
-        await now.until(lambda: not path.exists() and now.catalog.row(ID, is_trashed=True) is None)
+        await now.deleted_here()
     assert written
     stored = orjson.loads(s3.keys()[f"catalogue/car/{ID}.json"])
     assert stored["weather"] == "rain"

@@ -41,6 +41,7 @@ ANSWERS = {  # method, path, headers, status, its policy
     "its worker": ("GET", "/worker.js", {}, None, POLICY),
     "a part": ("GET", "/static/js/main.js", {}, 200, POLICY_OF_PARTS),
     "a picture": ("GET", "/static/icons/catgraph.svg", {}, 200, POLICY_OF_PARTS),
+    "the manifest": ("GET", "/manifest.webmanifest", {}, 200, POLICY_OF_PARTS),
     "no part": ("GET", "/static/js/nothing.js", {}, 404, POLICY_OF_PARTS),
     "data": ("GET", "/api/state", {}, 200, POLICY_OF_DATA),
     "what is drawn": ("GET", f"/api/recordings/{ID}/track.svg", {}, None, POLICY_OF_DATA),

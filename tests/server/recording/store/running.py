@@ -42,9 +42,10 @@ class Car:
     @asynccontextmanager
     async def running(self) -> AsyncIterator[Running]:
         catalog = Catalog(self.folder.parent, self.data / "recordings.sqlite", now=time.monotonic, wall_ms=self.wall_ms)
+        uploads = Uploads(self.data / "store" / "uploads.sqlite")
         uploader = Uploader(
             ObjectStore(self.s3.address),
-            Uploads(self.data / "store" / "uploads.sqlite"),
+            uploads,
             catalog,
             lambda: {"car": Situation(rule=self.rule)},
             clips=self.data / "store" / "clips",
@@ -56,7 +57,7 @@ class Car:
         await catalog.settled()
         await uploader.start()
         try:
-            yield Running(catalog, uploader)
+            yield Running(catalog, uploader, uploads)
         finally:
             await uploader.stop()
             await catalog.stop()
@@ -66,6 +67,7 @@ class Car:
 class Running:
     catalog: Catalog
     uploader: Uploader
+    uploads: Uploads
 
     def copy(self, id: str = ID) -> StoredCopy:
         row = self.catalog.row(id)
@@ -79,6 +81,16 @@ class Running:
 
     async def stored(self, id: str = ID) -> None:
         await self.until(lambda: self.copy(id)["state"] == "stored")
+
+    async def deleted_here(self, id: str = ID) -> None:
+        """A file that is on its way to the trash may still be put back."""
+        path = self.catalog.folder / "car" / f"{id}.mcap"
+
+        def is_destroyed() -> bool:
+            is_decided = self.uploads.get(id).is_deleted
+            return is_decided and not path.exists() and self.catalog.row(id, is_trashed=True) is None
+
+        await self.until(is_destroyed)
 
 
 def whole(s3: S3, id: str = ID) -> bytes:

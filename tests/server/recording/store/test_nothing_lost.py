@@ -28,9 +28,9 @@ from tests.server.recording.store.s3 import S3
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("small_parts")]
 
 
-async def deleted_here(now: Running, path: Path) -> None:
+async def deleted_here(now: Running) -> None:
     now.uploader.ask(ID, deletes=True)
-    await now.until(lambda: not path.exists() and now.catalog.row(ID, is_trashed=True) is None)
+    await now.deleted_here()
 
 
 def recordings_below(folder: Path) -> list[Path]:
@@ -54,7 +54,7 @@ async def test_a_name_that_is_used_again_overwrites_nothing_in_the_store(car: Ca
     path = car.folder / f"{ID}.mcap"
     content = path.read_bytes()
     async with car.running() as now:
-        await deleted_here(now, path)
+        await deleted_here(now)
         kept = s3.keys()
         record(path, seconds=20.0)
         await read(now, path)
@@ -79,7 +79,7 @@ async def test_a_name_that_is_used_again_overwrites_nothing_in_the_store(car: Ca
         assert path.read_bytes() == content  # not deleted again, though the rule deletes
         assert now.copy()["is_deletion_asked"] is False
         assert s3.keys() == kept
-        await deleted_here(now, path)
+        await deleted_here(now)
     assert whole(s3) == content
 
 
@@ -141,7 +141,6 @@ async def test_a_request_that_is_taken_back_ends_the_deletion(car: Car, s3: S3) 
 
 
 async def test_a_note_that_comes_while_the_file_is_deleted_is_kept(car: Car, s3: S3) -> None:
-    path = car.folder / f"{ID}.mcap"
     async with car.running() as now:
         now.uploader.ask(ID, deletes=False)
         await now.stored()
@@ -155,7 +154,7 @@ async def test_a_note_that_comes_while_the_file_is_deleted_is_kept(car: Car, s3:
             return 0.0
 
         s3.delay_s = note
-        await deleted_here(now, path)
+        await deleted_here(now)
     row = orjson.loads(s3.keys()[f"catalogue/car/{ID}.json"])
     assert (row["title"], row["note"]) == ("Brakes late", "at the gate")
 

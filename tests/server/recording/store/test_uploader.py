@@ -111,7 +111,7 @@ async def test_a_damaged_part_is_found_before_it_counts_as_stored(car: Car, s3: 
         assert now.copy()["sentence"] == "The copy in the store differs from the file (part 2); it is sent again."
         assert (car.folder / f"{ID}.mcap").exists()
         car.later_ms += 6_000
-        await now.until(lambda: not (car.folder / f"{ID}.mcap").exists())
+        await now.deleted_here()
     assert s3.sent("part-00002") == [second, second]
     assert len(s3.sent("part-00001")) == 1
 
@@ -132,8 +132,7 @@ async def test_a_recording_is_deleted_only_after_a_verified_copy_and_only_on_req
         await now.until(lambda: "differs" in now.copy()["sentence"])
         assert path.read_bytes() == content
         car.later_ms += 6_000
-        await now.until(lambda: not path.exists())
-        await now.until(lambda: now.catalog.row(ID, is_trashed=True) is None)
+        await now.deleted_here()
         assert now.catalog.row(ID) is None
     assert whole(s3) == content
 
@@ -160,7 +159,7 @@ async def test_what_is_being_recorded_is_neither_listed_nor_deleted(car: Car, s3
     running = car.folder / "car_20260921T151320Z.mcap"
     record(running, is_closed=False, began_ms=BEGAN_MS + 3_600_000)
     async with car.running() as now:
-        await now.until(lambda: not (car.folder / f"{ID}.mcap").exists())
+        await now.deleted_here()
         await asyncio.sleep(0.2)
     assert [path.name for path in car.folder.iterdir()] == [f"{running.name}.writing"]
     assert s3.sent(running.stem) == []
@@ -214,7 +213,7 @@ async def test_a_store_that_refuses_is_named_and_tried_again(
         assert len(s3.requests) == count  # it waits
         s3.fault = lambda method, path: None
         car.later_ms += 6_000
-        await now.until(lambda: not (car.folder / f"{ID}.mcap").exists())
+        await now.deleted_here()
         assert now.uploader.facts()["problem"] is None
 
 
