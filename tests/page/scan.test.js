@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { INVALID, NO_RETURN, NOTHING_IN_RANGE, TOO_CLOSE, readScan } from '../../static/js/scan/scan-frame.js';
-import { NOT_IN_VIEW, beamWords, behind, clearOf, clearPlace, coversAny, isInView, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringWords, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
+import { NOT_IN_VIEW, beamWords, behind, clearOf, clearPlace, coversAny, isInView, liesOverSector, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringWords, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
 import { edgesOf, endOf } from '../../static/js/scan/scan-corridor.js';
 import { beside, follow, nearestShown, nearestTo } from '../../static/js/scan/scan-pick.js';
 import { ScanMark } from '../../static/js/scan/scan-mark.js';
@@ -282,4 +282,17 @@ test('the distance beside the ring of the nearest object stands whole on the plo
   assert.deepEqual(ringWords(300, 80, 400), { way: -1, at: [256, 79, 'right'] });
   assert.deepEqual(ringWords(101, 125, 185), { way: 0, at: [101, 91, 'center'] });
   assert.deepEqual(ringWords(20, 30, 130), { way: 0, at: [44, 64, 'center'] });
+});
+
+test('a label lies over a sector that the laser sees from where it stands', () => {
+  const laser = { x_m: -2, y_m: 0.5 };
+  const over = (ends, ...sectors) => liesOverSector(ends.map(([x_m, y_m]) => ({ x_m, y_m })), laser, sectors.map(([from_rad, to_rad]) => ({ from_rad, to_rad, code: 0, beams: 40 })));
+  const right = [-0.9, -0.6];
+  assert.equal(over([[2, -2], [2, -6]], right), true, 'one end is beside it');
+  assert.equal(over([[2, 0], [2, -12]], [-0.72, -0.6]), true, 'both ends are beside it');
+  assert.equal(over([[2, 2], [2, 6]], right), false, 'at the left');
+  assert.equal(over([[2, -1.5], [2, -2]], right), false, 'beside it from the laser, over it from the car');
+  assert.equal(over([[2, -2], [2, -6]], [-0.72, -0.7]), false, 'a single beam');
+  assert.equal(over([[2, 2], [2, 6]], [0.4 - 2 * Math.PI, 1 - 2 * Math.PI]), true, 'counted by another turn');
+  assert.equal(over([[2, -2], [2, -6]]), false);
 });

@@ -120,8 +120,9 @@ WRITTEN = """() => {
   window.Worker = undefined;
   const { fillText, drawImage } = CanvasRenderingContext2D.prototype;
   let now = [];
-  CanvasRenderingContext2D.prototype.fillText = function (text) {
-    if (this.canvas.matches('.scanc')) now.push(text);
+  CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+    const { clientWidth, clientHeight } = this.canvas;
+    if (this.canvas.matches('.scanc')) now.push([text, x - clientWidth / 2, clientHeight - y]);
     return fillText.apply(this, arguments);
   };
   CanvasRenderingContext2D.prototype.drawImage = function () {
@@ -138,9 +139,11 @@ async def test_the_limit_of_the_scan_is_named_on_a_tablet(phone: Phone, canned: 
     await page.set_viewport_size({"width": 820, "height": 1180})
     await show(canned, page, "scan")
     await page.wait_for_function("() => window.written?.length")
-    written = await page.evaluate("window.written")
-    assert "limit 5.0 m" in written
+    written = {text: (x, y) for text, x, y in await page.evaluate("window.written")}
     assert "stop 7.1 m" in written
+    # The sector without a return is ahead at the right: a label over it near the car would make it look free.
+    assert written["limit 5.0 m"][0] < 0
+    assert written["no return"][1] > 34 + 30, "so far above the laser [px]"
 
 
 async def test_on_the_widest_screens_a_sheet_covers_all_of_the_settings(phone: Phone, canned: Canned) -> None:

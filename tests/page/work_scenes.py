@@ -220,6 +220,7 @@ async def car_complies(server: Canned, page: Page) -> None:
     server.state = driving()
     tile = next(one for one in server.state["checks"] if one["id"] == "Command")
     tile |= {"id": "slow_down_unconfirmed", "label": "Slow-down", "verdict": "fault", "brief": "FAULT 4.2 m/s"}
+    tile["checks"] = ["slow_down_unconfirmed"]
     text = "The car does not slow: 4.2 m/s, 2.2 m/s ordered"
     rows = (("slow_down_unconfirmed", "Car complies", "fault", text),
             ("slow_down_hold_ended", "Car held", "ok", "The car is held for 597 s more"),

@@ -214,6 +214,19 @@ export function placeOf({ cx, cy, k }, x_px, y_px) {
   return { x_m: (cy - y_px) / k, y_m: (cx - x_px) / k };
 }
 
+/**
+ * Whether what reaches from one place to the other, ahead of the laser, lies over one of these sectors that is wide enough for a name.
+ * @param {{x_m: number, y_m: number}[]} ends
+ * @param {{x_m: number, y_m: number}} laser
+ * @param {Sector[]} sectors
+ */
+export function liesOverSector(ends, laser, sectors) {
+  const bearings_rad = ends.map(({ x_m, y_m }) => Math.atan2(y_m - laser.y_m, x_m - laser.x_m));
+  const [low, high] = [Math.min(...bearings_rad), Math.max(...bearings_rad)];
+  const wide = sectors.filter(({ from_rad, to_rad }) => to_rad - from_rad >= NAMED_RAD);
+  return wide.some(({ from_rad, to_rad }) => [-2 * Math.PI, 0, 2 * Math.PI].some((turn) => from_rad + turn <= high && low <= to_rad + turn));
+}
+
 /** The rings of a plot, at round metres [m]. @param {number} reach_m */
 export function ringsOf(reach_m) {
   const step = [1, 2, 5, 10, 20, 50].find((one) => one >= reach_m / 5) ?? 50;

@@ -2,7 +2,7 @@
 
 import { edgesOf, endOf } from './scan-corridor.js';
 import { bearingOf, rangeOf } from './scan-frame.js';
-import { clearOf, clearPlace, codeWords, isInView, namedSectors, plotScale, pointsOf, ringWords, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
+import { clearOf, clearPlace, codeWords, isInView, liesOverSector, namedSectors, placeOf, plotScale, pointsOf, ringWords, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
 import { Hatching, ScanGrid, fit, penOf } from './scan-grid.js';
 import { fixed } from '../core/format.js';
 
@@ -48,7 +48,7 @@ export class ScanPlot {
   #width = 0;
   /** The boxes of the labels drawn already. @type {Box[]} */
   #taken = [];
-  /** The returns, which the labels of a line and the numbers of the rings keep clear of. @type {{scale: Scale, points: Float32Array} | null} */
+  /** The returns, which the labels of a line and the numbers of the rings keep clear of. @type {{scale: Scale, points: Float32Array, isHatched: (where: Where) => boolean} | null} */
   #dots = null;
   /** Where the number of a ring stood: it stays there while no return comes there. @type {Map<number, number>} */
   #turns = new Map();
@@ -76,7 +76,7 @@ export class ScanPlot {
     const corridor = around.car ? { ...around.car, half_width_m: around.car.half_width_m + wider_m, tyre_angle_rad } : null;
     if (corridor) this.#stoppingStrip(g, scale, corridor, scan.judged.stopping_m);
     this.#hatch(g, scale, scan, sectors, width + height, dpr, theme.key);
-    const { points } = (this.#dots = { scale, points: pointsOf(scan, reach_m * 1.05, 1 / scale.k) });
+    const { points } = (this.#dots = { scale, points: pointsOf(scan, reach_m * 1.05, 1 / scale.k), isHatched: hatchedBy(scale, scan, sectors) });
     const nearest = this.#nearestAt(g, scale, scan, reach_m); // all other labels keep its room free
     if (corridor) this.#corridor(g, scale, corridor, reach_m, scan.judged.stopping_m, around.limit_m);
     this.#names(g, scale, scan, reach_m, sectors, width);
@@ -143,7 +143,7 @@ export class ScanPlot {
 
   /** Names a line across the corridor: beside its first end, else its other one, else further out with a thin line to it. @param {Pen} g @param {string} text @param {Point[]} ends @param {number} weight @param {string} css */
   #besides(g, text, ends, weight, css) {
-    const places = placesBeside(ends, this.#width, weight);
+    const places = placesBeside(ends, this.#width, weight).sort((a, b) => Number(this.#dots?.isHatched(a.where)) - Number(this.#dots?.isHatched(b.where)));
     const found = places[this.#clear(g, text, places.map(({ where }) => where), css)];
     if (found?.isFar) thinLine(g, found.end, [found.where[0] + (found.where[2] === 'left' ? -4 : 4), midOf(this.#taken.at(-1), found.end[1])], css);
   }
@@ -186,7 +186,7 @@ export class ScanPlot {
       if (Math.cos(a) < 0) continue; // behind: not in the picture
       const aside = Math.abs(Math.sin(a));
       // As far out as the edge allows, so that the label is where its sector is wide.
-      const r = Math.min(reach_m * 0.36, aside > 0.05 ? (cx - 44) / (k * aside) : reach_m);
+      const r = Math.min(Math.max(reach_m * 0.36, Math.min(NAME_OUT_PX / k, reach_m * 0.8)), aside > 0.05 ? (cx - 44) / (k * aside) : reach_m);
       const [x, y] = at(r * Math.cos(a) + x_m, r * Math.sin(a) + y_m);
       this.#label(g, codeWords(sector.code), Math.min(width - 42, Math.max(42, x)), y, this.#colour.ink, 'center', 14, 700);
     }
@@ -290,6 +290,11 @@ export class ScanPlot {
   }
 }
 
+/** At least this far from the laser the name of a sector stands on a small plot: nearer it would cover the sector [px]. */
+const NAME_OUT_PX = 96;
+/** The width of the label of a line [px]. */
+const LABEL_PX = 84;
+
 /** Where a label of a line may stand, best first. @param {Point[]} ends of the line @param {number} width of the plot [px] @param {number} weight */
 function placesBeside(ends, width, weight) {
   const [first, other] = ends;
@@ -299,6 +304,11 @@ function placesBeside(ends, width, weight) {
     const x = isLeft ? Math.max(100, end[0] - 10 - out) : Math.min(width - 92, end[0] + 12 + out);
     return { end, isFar: out > 0, where: /** @type {Where} */ ([x, end[1], isLeft ? 'right' : 'left', 14, weight]) };
   }));
+}
+
+/** Whether a label would lie over a hatched sector, which would look free there. @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {import('./scan-layout.js').Sector[]} sectors @returns {(where: Where) => boolean} */
+function hatchedBy(scale, { x_m = 0, y_m = 0 }, sectors) {
+  return ([x, y, align]) => liesOverSector([placeOf(scale, x, y), placeOf(scale, x + (align === 'left' ? LABEL_PX : -LABEL_PX), y)], { x_m, y_m }, sectors);
 }
 
 /** @param {Pen} g @param {Point} from @param {Point} to @param {string} css */
