@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from monitor.shell_facts import ReachFacts
 from server.control.lease import Operator
@@ -49,13 +50,14 @@ class PageStatus:
     of: Operator
     status: Present
     heard_s: float
+    command_s: float = -math.inf  # of its last command: the page runs then, whatever it shows
 
     def is_fresh(self, now_s: float) -> bool:
         return now_s - self.heard_s <= FRESH_S
 
     def is_seen(self, now_s: float) -> bool:
         """Whether somebody may be looking at it now."""
-        return self.status.is_visible and self.is_fresh(now_s)
+        return self.status.is_visible and now_s - max(self.heard_s, self.command_s) <= FRESH_S
 
     def why_not(self, now_s: float) -> ReaderEnded | None:
         """Why the page cannot sound an alarm now; None: it can."""
@@ -85,6 +87,12 @@ class AlarmReach:
         self._pages.pop(key, None)
         self._pages[key] = PageStatus(of=operator, status=status, heard_s=now_s)
         self._forget(now_s)
+
+    def note_command(self, operator: Operator, now_s: float) -> None:
+        """A command came from a page: it is seen, unless it reported before that it is hidden."""
+        key = operator.who, operator.page
+        if key in self._pages:
+            self._pages[key] = replace(self._pages[key], command_s=now_s)
 
     def leave(self, operator: Operator) -> None:
         """Remove a page that was closed."""

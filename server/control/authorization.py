@@ -115,8 +115,10 @@ class Authorization:
         for a visible page, as the tap on Connect does."""
         if command.needs != "control":
             return
-        self.tick(now_s)
         operator, control = caller.operator, self._control
+        if operator is not None:
+            self._reach.note_command(operator, now_s)
+        self.tick(now_s)
         if operator is not None:
             control.admit(operator, caller.fence)
             if control.holder is None and self._reach.is_here(operator, now_s):
@@ -131,10 +133,11 @@ class Authorization:
 
     def execute(self, command: commands.TakeControl, caller: Caller, now_s: float) -> int | None:
         """Take, hand over or request control; return the lease number if this page holds it. Raises Refused."""
-        self.tick(now_s)
         by, control, fence = caller.operator, self._control, caller.fence
         if by is None:
             raise Refused("Only a page can be in control: a program cannot show that somebody is watching.")
+        self._reach.note_command(by, now_s)
+        self.tick(now_s)
         if command.do in ("take", "take_over", "request") and not self._reach.is_here(by, now_s):
             raise Refused("Only a visible page can be in control: this one is in the background.")
         acts: list[Act | None] = []

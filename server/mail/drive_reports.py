@@ -55,6 +55,7 @@ class DriveReports:
         self._waiting: dict[tuple[Path, str], _Drive] = {}  # by folder of a car, and session
         self._kept: dict[str, list[str]] = {}  # folder → recordings, as the file has it
         self._resumed: dict[tuple[Path, str], bool] = {}  # whether a session continues the drive before it
+        self._written: dict[Path, frozenset[str]] = {}  # sessions being written when last looked, by folder of a car
         self._loop: asyncio.AbstractEventLoop | None = None
         self._due = asyncio.Event()
         self._supervisor = Supervisor("drive reports")
@@ -110,8 +111,10 @@ class DriveReports:
     async def _mail_all(self, is_over: Callable[[Sequence[_Drive], bool], bool]) -> None:
         """Mails each drive of which nothing is being written and that is over."""
         for folder in dict.fromkeys(folder for folder, _ in self._waiting):
+            before, now = self._written.get(folder, frozenset()), await asyncio.to_thread(_written, folder)
+            self._written[folder] = now
+            written = now | before  # what was completed meanwhile is announced a moment later
             mine = {session: drive for (place, session), drive in self._waiting.items() if place == folder}
-            written = await asyncio.to_thread(_written, folder)
             groups = await asyncio.to_thread(self._grouped, folder, sorted({*mine, *written}))
             for number, group in enumerate(groups):
                 waiting = {session: mine[session] for session in group if session in mine}
@@ -209,12 +212,12 @@ def _says_it_resumes(folder: Path, session: str) -> bool | None:
     return any(event.get("resumes") is True for event in of_change(events or (), "started"))
 
 
-def _written(folder: Path) -> set[str]:
+def _written(folder: Path) -> frozenset[str]:
     """The sessions of which something is being written, or waits to be recovered."""
     try:
-        return {first_part(id_of(path)) for path in folder.iterdir() if path.name.endswith(WRITING)}
+        return frozenset(first_part(id_of(path)) for path in folder.iterdir() if path.name.endswith(WRITING))
     except OSError:
-        return set()
+        return frozenset()
 
 
 def _read(path: Path) -> dict[str, list[str]]:

@@ -151,9 +151,12 @@ test('no tick stands in the strip while a value is stale, and checks at fault ar
   assert.deepEqual(read(state({ checks: [ok, unknown] }), { stale: 0 }), ['ok', 'No alarms', '1 OK · 1 not checked']);
   assert.deepEqual(read(state({ checks: [ok, unknown] }), { stale: 9 }), ['info', 'No alarms', '9 stale · 1 not checked']);
   const decelerate = { state: 'armed' };
-  assert.deepEqual(read(state({ checks: [ok], decelerate })), ['slow', 'Armed', 'an aid, not an emergency stop']);
-  assert.deepEqual(read(state({ checks: [ok, fault], decelerate })), ['slow', 'Armed', '1 FAULT']);
-  assert.deepEqual(read(state({ checks: [ok], decelerate }), { stale: 9 }), ['slow', 'Armed', '9 stale']);
+  assert.deepEqual(read(state({ checks: [ok, unknown], decelerate })), ['ok', 'No alarms', '1 OK · 1 not checked']);
+  assert.deepEqual(read(state({ checks: [ok, fault], decelerate })), ['info', 'No alarms', '1 FAULT · 0 not checked']);
+  assert.deepEqual(read(state({ checks: [ok], decelerate }), { stale: 9 }), ['info', 'No alarms', '9 stale · 0 not checked']);
+  assert.deepEqual(read(state({ checks: [ok, unknown] }), { stale: 9, unchecked: 'ok' }), ['info', 'No alarms', '9 stale · 2 not checked'], 'as the tiles');
+  assert.deepEqual(read(state({ checks: [ok, unknown, fault] }), { stale: 9, unchecked: 'ok' }), ['info', 'No alarms', '1 FAULT · 2 not checked'], 'a fault stays');
+  assert.deepEqual(read(state({ checks: [ok, unknown, fault] }), { stale: 0, unchecked: 'all' }), ['info', 'No alarms', '0 OK · 3 not checked'], 'no tick where nothing is checked');
   const alarms = [alarm({ state: 'SHELVED', priority: 'warning' })];
   assert.deepEqual(read(state({ checks: [ok, fault, unknown], alarms })), ['info', 'No alarms', '1 shelved · 1 FAULT']);
   assert.deepEqual(read(state({ checks: [ok, unknown], alarms })), ['ok', 'No alarms', '1 shelved · 1 not checked']);
@@ -195,11 +198,14 @@ test('tiles: paused means not checked, but for faults the server finds all the s
   const forgotten = state({ checks: [{ ...checks[0], label: 'Monitoring', verdict: 'fault', brief: 'FAULT 5 min' }] });
   assert.deepEqual(rows('paused', forgotten)[0], ['Monitoring', 'warn', 'FAULT 5 min']);
   assert.deepEqual(rows('stale', fault)[0], ['Speed', 'unk', 'not checked', 'stale']);
+  const aged = (frame = state({ checks })) => showTiles(frame, null, false, true).map(({ kind, lines }) => [kind, ...lines])[0];
+  assert.deepEqual(aged(), ['unk', 'not checked', 'stale']);
+  assert.deepEqual(aged(fault), ['crit', 'FAULT 12.6 m/s'], 'it stands until it is checked again');
 });
 
 test('the log tells what happened', () => {
   const event = /** @type {any} */ ({ n: 1, at_ms: 0, alarm: 'speed_limit', change: 'cleared', title: 'Speed above limit', priority: 'critical', text: 'back under', by: null });
-  assert.deepEqual(eventWords(event), { icon: 'ok', kind: '', title: 'Speed above limit ended', text: 'back under' });
+  assert.deepEqual(eventWords(event), { icon: 'ok', kind: '', title: 'Speed above limit: ended', text: 'back under' });
   assert.equal(eventWords({ ...event, change: 'raised' }).icon, 'crit');
   assert.equal(eventWords({ ...event, alarm: null, change: 'lost', text: 'The bridge closed the connection.' }).title, 'The bridge closed the connection.');
   assert.equal(eventWords({ ...event, change: 'something_new' }).title, 'Speed above limit something_new');

@@ -98,7 +98,7 @@ test('the louder sound plays, and the count-down of this car above all', () => {
 
 test('the strip names another car only where this one has nothing worse', () => {
   assert.deepEqual([isLess('', 'crit'), isLess('warn', 'crit'), isLess('crit', 'crit'), isLess('order', 'crit'), isLess('invert', 'crit')], [true, true, false, false, false]);
-  assert.deepEqual([isLess('', 'warn'), isLess('armed', 'warn'), isLess('warn', 'warn'), isLess('', '')], [true, false, false, false]);
+  assert.deepEqual([isLess('', 'warn'), isLess('warn', 'warn'), isLess('', '')], [true, false, false]);
 });
 
 test('one car alone is listed from its own state', () => {

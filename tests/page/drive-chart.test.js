@@ -5,6 +5,7 @@ import { test } from 'node:test';
 import { brushPath, clockWords, csvOf, extentOf, foundAt, foundWords, limitAt, lineOf, placedMarks, roundEnds, specFor, tagAt, valueTicks, viewAfter, wholeLabel, within } from '../../static/js/home/drive-layout.js';
 import { DriveView, emptyWords, stateWords } from '../../static/js/home/drive-view.js';
 import { withFirst } from '../../static/js/home/drive-choice.js';
+import { marginOf, roomFor } from '../../static/js/home/pane-stack.js';
 
 const BUCKETS = { from_s: 10, step_s: 2 };
 
@@ -172,4 +173,10 @@ test('the tag of the cursor stands beside it where it would cover the mark of an
   const everywhere = Array.from({ length: 32 }, (_, i) => 22 + 24 * i); // but for the right end
   const at = tagAt(200, everywhere, { ...sizes, right: 1010 });
   assert.ok(Math.max(at - 200, 200 - at - 84) <= 24, `among many marks it stays at its cursor, not at ${at}`);
+});
+
+test('a flat plot has one number beside it, a higher one those at both ends', () => {
+  assert.deepEqual(roomFor([0, 20], 25), [20]);
+  assert.deepEqual(roomFor([0, 20], 60), [0, 20]);
+  assert.ok(marginOf({ height: 25 }) < marginOf({ height: 60 }));
 });

@@ -80,7 +80,7 @@ test('a recording of several files is not offered as it is', () => {
 });
 
 test('the facts in one sentence, and what is unknown as unknown', () => {
-  assert.equal(factWords(row()), '08:32 min, 38.0 MB, 1.3 km, up to 12.6 m/s, 2 critical alarms, 1 warning.');
+  assert.equal(factWords(row()), '08:32 min, 38.0 MB, 1.3 km, up to 12.6\u00a0m/s, 2 critical alarms, 1 warning.');
   assert.equal(factWords(row({ distance_m: null, top_speed_mps: null, alarms: null })), '08:32 min, 38.0 MB, no position, alarms not recorded.');
   assert.equal(factWords(row({ state: 'waiting', length_s: null })), '38.0 MB, being read.');
   assert.equal(factWords(row({ state: 'unreadable', problem: 'x.mcap is empty.' })), '38.0 MB. x.mcap is empty.');

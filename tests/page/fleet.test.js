@@ -33,8 +33,8 @@ test('who was not taken in time comes first, then the least time left, then what
   const texts = Object.fromEntries(order.map((one) => [one.name, `${one.who.text} | ${one.next} | ${keysOf(one)}`]));
   assert.equal(texts['up'], 'unassigned | at Supervisor for 0:11 | Take it,Hand over');
   assert.equal(texts['soon'], 'unassigned | Supervisor in 0:04 | Take it,Hand over');
-  assert.equal(texts['mine'], 'assigned to you | no timer | Open,Hand over,Release');
-  assert.equal(texts['asked'], 'offered to you by Desk 2 | offered for 0:00 | Accept,Decline');
+  assert.equal(texts['mine'], 'assigned to you | no timer | Open,Hand over,Unassign');
+  assert.equal(texts['asked'], 'offered to you by Desk 2 | offered 0:00 ago | Accept,Decline');
   assert.equal(texts['acked'], 'assigned to Desk 2, acknowledged | no timer | Take over');
   assert.equal(order.find(({ name }) => name === 'gone')?.title, 'No data: car may be moving');
   assert.equal(headOf(order, order.length), '8 · 4 unassigned');
@@ -146,7 +146,7 @@ test('in a flood a question to this page stays apart, old alarms do not count, a
   for (const one of Object.values(old)) /** @type {any} */ (one).worst.raised_ms = NOW - 601_000;
   assert.equal(grouped(itemsOf(seen(old)), new Set()).items.length, 12);
   const mine = grouped(itemsOf(seen(flooded(12, { assigned: person('me'), escalates_ms: null }))), new Set()).items;
-  assert.deepEqual(mine.map(keysOf), ['Release all,Show 12']);
+  assert.deepEqual(mine.map(keysOf), ['Unassign all,Show 12']);
 });
 
 test('a row shows what is known, and nothing of before as if it were now', () => {

@@ -13,6 +13,11 @@ test('Home shows what would fill it while nothing has arrived, and nothing once 
   assert.equal(helped('never', 'stale'), '', 'a value that grew old is shown as old');
 });
 
+test('where the car sends nothing, Home does not call its topics unknown', () => {
+  const frame = /** @type {any} */ (state({ signals: signals('not_published'), link: { cut: 'bridge-car' } }));
+  assert.equal(helpWords(frame), '');
+});
+
 test('where no car is monitored, Home is not shown and has no text', () => {
   const frame = /** @type {any} */ (state({ signals: signals('not_published'), session: { phase: 'lost' } }));
   assert.equal(helpWords(frame), '');

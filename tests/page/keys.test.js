@@ -41,5 +41,7 @@ test('panes are in sight together, a page alone, a drawer beside Home', () => {
   assert.deepEqual(tabsInSight(tabs, 0, true), ['home', 'map', 'scan']);
   assert.deepEqual(tabsInSight(tabs, 3, true), ['files']);
   assert.deepEqual(tabsInSight(tabs, 4, true), ['home', 'settings']);
+  assert.deepEqual(tabsInSight(tabs, 4, true, true), ['home', 'map', 'scan', 'settings']);
+  assert.deepEqual(tabsInSight(tabs, 3, true, true), ['files']);
   assert.deepEqual(tabsInSight(tabs, 1, false), ['map']);
 });

@@ -23,7 +23,7 @@ test('a snackbar never tells of what is over as if it stood', () => {
     snackWords({ ...ALARM, active: true, verdict: 'unknown', text: 'No link to the car' }), 'Not checked now: No link to the car. It was: 11.2 m/s',
   );
   assert.equal(snackWords({ ...ALARM, active: false, state: 'RTN_UNACKED' }), 'Returned to normal. It was: 11.2 m/s');
-  assert.equal(snackWords({ ...ALARM, active: false, trip_text: '', title: 'GPS jump' }), 'Returned to normal. It was: GPS jump');
+  assert.equal(snackWords({ ...ALARM, active: false, trip_text: '', title: 'GPS jump' }), 'Returned to normal.', 'its title stands above');
 });
 
 test('what its check finds well is never the text of an alarm that stands', () => {

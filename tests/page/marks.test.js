@@ -6,7 +6,7 @@ import { corrected, headWords, markedAt, moreWords, newMark, outdated, stepOf, s
 import { courseOf, linePath, xOf } from '../../static/js/drive/mark-plot.js';
 import { HELD_MS, PULL_PX, Press } from '../../static/js/drive/press.js';
 import { MOST_POINTS, scaled, smallerWords } from '../../static/js/drive/photo.js';
-import { rowsOf } from '../../static/js/drive/mark-list.js';
+import { rowsOf, storedWords } from '../../static/js/drive/mark-list.js';
 import { isForNow } from '../../static/js/drive/mark-server.js';
 import { aboutWords, markAt } from '../../static/js/drive/recorded-marks.js';
 import { eventsOf, flagPath, markBeside } from '../../static/js/replay/replay-layout.js';
@@ -340,4 +340,13 @@ test('a replay steps through alarms and marks in the order of time, and shows a 
   assert.equal(markAt(marks, 60), null);
   assert.equal(aboutWords(/** @type {any} */ (marks[0])), 'Control · by the car’s button · delivered after the recording');
   assert.match(flagPath(12.34), /^M12\.3 /);
+});
+
+test('the row of a stored mark names each part once', () => {
+  const stored = /** @type {any} */ ({ marked_ms: AT_MS, category: null, words: '', voice: true, photo: false, source: 'page', by: 'Ann' });
+  const [alone, among] = [storedWords(stored), storedWords({ ...stored, category: 'object', photo: true })];
+  assert.match(alone.head, /· voice$/);
+  assert.deepEqual(alone.more, ['Ann']);
+  assert.match(among.head, /· object$/);
+  assert.deepEqual(among.more, ['voice', 'photo', 'Ann']);
 });

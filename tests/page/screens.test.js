@@ -7,7 +7,7 @@ import { details, headline, kindWords } from '../../static/js/home/signals.js';
 import { tabByHash, tabByKey } from '../../static/js/shell/tabs.js';
 import { lastKnown, savedWords } from '../../static/js/shell/dialogs.js';
 import { recordingWords } from '../../static/js/shell/topbar.js';
-import { thenWords } from '../../static/js/shell/veil.js';
+import { thenWords, titleOf } from '../../static/js/shell/veil.js';
 import { state } from './frames.js';
 
 test('tabs by key and by link', () => {
@@ -70,6 +70,9 @@ test('found vehicles are listed once, and an answer of another shape is none', (
 test('the headline of each signal; unknown is a dash and never 0', () => {
   assert.deepEqual(headline('speed', { speed_mps: 4.2 }), ['4.2', 'm/s']);
   assert.deepEqual(headline('scan', { beams: 181 }), ['181', 'beams']);
+  assert.deepEqual([headline('bearing', { bearing_rad: -0.052 }), headline('bearing', { bearing_rad: null })], [['3°', 'right'], ['–', '']], 'as on Home');
+  assert.deepEqual([headline('steering', { percent: -4.04 }), headline('steering', { percent: null })], [['4.0', '% left'], ['–', '%']]);
+  assert.deepEqual(headline('acceleration', { acceleration_mps2: 0.3 }), ['+0.3', 'm/s²']);
   assert.deepEqual(headline('distance', { distance_m: null, none_in_range: true }), ['none', '']);
   assert.deepEqual(headline('position', { status: -1, alt_m: 1 }), ['no', 'fix']);
   assert.deepEqual(headline('diagnostics', { worst: 2 }), ['ERROR', '']);
@@ -112,6 +115,9 @@ test('recording and last values', () => {
   assert.equal(savedWords({ state: 'off', for_s: null, saved }), '');
   assert.equal(thenWords(state({ signals: { speed: { value: { speed_mps: 4.2 } }, distance: { value: { distance_m: 12.4 } } } })), '4.2 m/s, object at 12.4 m');
   assert.equal(thenWords(null), '');
+  const title = (/** @type {any} */ view, /** @type {any} */ car_s) => titleOf({ age_s: 5, ...view }, car_s);
+  assert.equal(title({ state: 'Silent' }, null), 'Nothing received yet', 'no value is stale that never was');
+  assert.deepEqual([title({ state: 'Silent' }, 5), title({ state: 'Lost' }, null), title({ state: 'Lost', age_s: null }, null), title({ state: 'Waking' }, 1)], ['Stale 5.0 s', 'Stale 5.0 s', 'Stale', 'Waking']);
   const known = { speed: { value: { speed_mps: 4.2 } } };
   const store = (/** @type {object} */ frame) => /** @type {any} */ ({ frame, signal: (/** @type {string} */ name) => state(frame).signals[name], ink: () => ({ age_s: 1 }), limit: () => 2 });
   assert.equal(lastKnown(store(state({ signals: known }))), ' Last known: 4.2 m/s, ≤ 5.2 m unseen.');

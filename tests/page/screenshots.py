@@ -806,6 +806,9 @@ async def map_tiles(server: Canned, page: Page) -> None:
          "bounds": [-180, -85, 180, 85]}
     ]  # fmt: skip
     server.tile = lambda z, x, y: png(*((176, 190, 168) if (x + y) % 2 else (198, 205, 186)))
+    await page.reload()  # a map in sight reads its layers once
+    await page.wait_for_selector("#monitor:not([hidden])")
+    await page.tap("#monitor .top .rec")
     await map_(server, page)
     await page.wait_for_timeout(800)
 

@@ -60,16 +60,23 @@ test('one term of its state, never a comfortable one', () => {
   assert.deepEqual(['before', 'unproven'].map((stands) => state(ordered({ confirmed: null, stands }, 'holding'))), ['STANDING', 'STANDING']);
 });
 
-test('the strip: armed where nothing else stands, the order above warnings, a critical alarm above the order', () => {
+test('the strip: what is checked while armed, the order above warnings, a critical alarm above the order', () => {
   const strip = (/** @type {any} */ more) => {
     const frame = state(more);
     return stripOf(frame, { isSilent: false, paused_s: 0, chain: chainOf({ frame, isSilent: false, silence_s: 0.1, lag_s: 0.1, heard_ms: 0 }) });
   };
   const warning = alarm({ id: 'gps', title: 'GPS drift', priority: 'warning', place: 'snackbar' });
-  assert.deepEqual(strip({ decelerate: slow('armed') }), { kind: 'armed', icon: 'slow', text: 'Armed', end: 'an aid, not an emergency stop', opens: 'alarms' });
+  assert.deepEqual(strip({ decelerate: slow('armed') }), { kind: '', icon: 'ok', text: 'No alarms', end: '0 OK · 0 not checked', opens: 'alarms' });
   assert.equal(strip({ decelerate: slow('armed'), alarms: [warning] }).text, 'GPS drift');
   assert.equal(strip({ decelerate: slow('not_armed') }).text, 'No alarms');
   assert.deepEqual(strip({ decelerate: ordered() }), { kind: 'order', icon: 'slow', text: 'Slowing the car', end: '−1.5 m/s² ordered', opens: 'alarms' });
+  const checks = ['ok', 'ok', 'unknown'].map((verdict, n) => ({ id: `${n}`, label: `${n}`, verdict }));
+  const ends = (/** @type {any} */ decelerate) => [checks, [...checks, { id: 'f', label: 'F', verdict: 'fault' }]].map((all) => strip({ decelerate, checks: /** @type {any} */ (all) }).end);
+  assert.deepEqual(ends(ordered()), ['−1.5 m/s² ordered', '−1.5 m/s² · 1 FAULT']);
+  assert.deepEqual(ends(ordered({}, 'holding')), ['0.0 m/s ordered', 'ordered · 1 FAULT']);
+  assert.deepEqual(ends(ordered({ confirmed: null })), ['−1.5 m/s²', '−1.5 m/s² · 1 FAULT']);
+  assert.deepEqual(ends(ordered({ sending: false })), ['', '1 FAULT']);
+  assert.deepEqual(ends(ordered({ confirmed: null, stands: 'before' }, 'holding')), ['stood already', '1 FAULT']);
   assert.equal(strip({ decelerate: ordered(), alarms: [warning] }).end, '−1.5 m/s² · 1 alarm');
   assert.equal(strip({ decelerate: ordered(), alarms: [alarm({ state: 'ACKED' })] }).text, 'Speed above limit');
   assert.equal(strip({ decelerate: ordered(), session: { paused: true } }).kind, 'invert');

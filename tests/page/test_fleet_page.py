@@ -121,7 +121,7 @@ async def test_an_item_is_handed_over_answered_and_taken_over(phone: Phone, cann
     await expect(item(page, "Serval")).to_contain_text("offered to you by Desk 2")
     await press(page, "Serval", "decline")
     canned.cars[1]["summary"]["attention"] = fleet.attention(ago_s=9, assigned=fleet.holder({"page": me, "name": "Me"}))
-    await expect(item(page, "Serval").locator(".key:visible")).to_have_text(["Open", "Hand over", "Release"])
+    await expect(item(page, "Serval").locator(".key:visible")).to_have_text(["Open", "Hand over", "Unassign"])
     await press(page, "Serval", "release")
     await press(page, "Caracal", "over")
     await page.wait_for_url("**/?vehicle=Caracal*")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from playwright.async_api import expect
 
-from tests.page.canned import Canned, Json, alarm, live, slowed
+from tests.page.canned import Canned, Json, alarm, live, slow, slowed
 from tests.page.conftest import Phone
 from tests.page.screenshots import at_a_planned_stop, car, too_fast
 
@@ -75,6 +75,25 @@ async def test_the_strip_of_a_quiet_car_is_read_whole(phone: Phone, canned: Cann
     for width in (412, 360, 320):
         await phone.page.set_viewport_size({"width": width, "height": 800})
         assert await phone.page.evaluate(CUT, ['[data-f="strip-text"]', '[data-f="strip-end"]']) == [], width
+
+
+async def test_the_strip_beside_a_slow_down_is_read_whole_with_its_checks(phone: Phone, canned: Canned) -> None:
+    await phone.open(canned.address)
+    await phone.live()
+    for slow_down, text, end, widths in (
+        (slow("armed"), "No alarms", "12 OK · 3 not checked", (412, 360, 320)),
+        (slowed(True), "Slowing the car", "−1.5 m/s² ordered", (412, 360)),
+        (slowed(None), "Slow-down ordered", "−1.5 m/s²", (412, 360, 320)),
+    ):
+        canned.state = live() | {"decelerate": slow_down}
+        await expect(phone.f("strip-text")).to_have_text(text)
+        await expect(phone.f("strip-end")).to_have_text(end)
+        for width in widths:
+            await phone.page.set_viewport_size({"width": width, "height": 800})
+            assert await phone.page.evaluate(CUT, ['[data-f="strip-text"]', '[data-f="strip-end"]']) == [], (
+                width,
+                text,
+            )
 
 
 @pytest.mark.world(n=11)

@@ -30,7 +30,8 @@ WHOLE: dict[str, dict[str, tuple[int, int, int, int]]] = {
     "check": {
         ".check-view .check-message": ALL,
         ".check-view [data-f=check-figures]": ALL,
-        ".check-view .alarms-foot .key": ALL,
+        ".check-view .alarms-foot .turn .key": ALL,
+        ".check-view .check-alarm .key": ALL,
         ".check-view [data-f=close]": ALL,
     },
     "link-lost": {"#sheet-lost .bd p": ALL, "#sheet-lost :is(.main, .key)": ALL},
@@ -40,6 +41,7 @@ WHOLE: dict[str, dict[str, tuple[int, int, int, int]]] = {
     "cars": {"#sheet-cars [data-car]": (3, 2, 1, 3)},
     "menu": {"#sheet-menu .menu-list button": (8, 6, 6, 8), "#sheet-menu .keys .key": ALL},
     "handover": {
+        "#sheet-handover .from-to": (1, 0, 0, 1),
         "#sheet-handover .read-back > li": (2, 2, 1, 2),
         "#sheet-handover .tick[data-next]": (1, 1, 0, 1),
         "#sheet-handover .duty-keys .key": ALL,
@@ -72,6 +74,10 @@ WHOLE: dict[str, dict[str, tuple[int, int, int, int]]] = {
     "departure": {".dep-list > li": (3, 2, 1, 3), ".departure .sign": ALL},
     "topic": {".pick-sheet .menu-list li": (3, 2, 1, 3), ".pick-sheet .keys .key": ALL},
     "help": {"#sheet-keys .key-list dd": (4, 3, 2, 5), "#sheet-keys .keys .key": ALL},
+    "question": {"[data-f=stops]": (1, 0, 0, 1)},
+    "slow-down-sliding": {"[data-f=stops]": (1, 0, 0, 1)},
+    "planned-stop-returned": {"[data-f=stops]": (1, 0, 0, 1)},
+    "settings": {".range .high": (1, 0, 0, 1)},
     "scan": {"#panel-scan .three": ALL, "#panel-scan .zoom": (1, 0, 0, 1)},
 }
 #: How many elements there are, how many of them are whole in sight, and whose text is cut.

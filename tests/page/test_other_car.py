@@ -201,3 +201,16 @@ async def test_the_warning_of_this_car_is_covered_by_no_other_car_and_no_notice(
     await phone.page.evaluate("document.querySelector('.snacks > .note').remove()")
     await expect(warning).to_be_hidden()
     await expect(card).to_be_visible()
+
+
+async def test_no_card_stands_over_the_list_that_begins_with_the_same_row(phone: Phone, canned: Canned) -> None:
+    fleet(canned)
+    await opened(phone, canned, 820, 1180)
+    page = phone.page
+    card = page.locator("[data-f=other-car]")
+    await expect(card).to_be_visible()
+    await phone.f("who").tap()
+    await expect(page.locator("#sheet-cars li").first).to_contain_text(OTHER)
+    await expect(card).to_have_count(0)
+    await page.locator("#sheet-cars [data-f=no]").tap()
+    await expect(card).to_be_visible()

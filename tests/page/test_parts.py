@@ -79,8 +79,8 @@ async def test_one_stale_value_loses_its_ink_and_no_other(phone: Phone, canned: 
 async def test_the_map_shows_both_and_says_which_is_old(phone: Phone, canned: Canned) -> None:
     await opened(phone, canned, "map")
     panel = phone.page.locator("#panel-map")
-    await expect(phone.f("car-lat", "#panel-map")).to_have_text("32.231904")
-    await expect(phone.f("phone-lat", "#panel-map")).to_have_text("32.231828")
+    await expect(phone.f("car-lat", "#panel-map")).to_have_text("32.231904°")
+    await expect(phone.f("phone-lat", "#panel-map")).to_have_text("32.231828°")
     await expect(phone.f("apart", "#panel-map")).to_have_text("10.4")
     await expect(phone.f("bearing", "#panel-map")).to_have_text("car at 324° NW")
     canned.state["signals"]["position"] |= {"freshness": "stale", "age_s": 3.35}

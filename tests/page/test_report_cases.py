@@ -160,6 +160,7 @@ async def test_case_06_no_position_is_told(phone: Phone, drive: Drive) -> None:
     car, watch = drive
     await phone.open(watch.address)
     await phone.live()
+    await expect(phone.f("latitude")).not_to_have_attribute("data-ink", "never")  # a position came
     await car.type("stale-gps 60")
     snack = phone.page.locator(".snack", has_text="Position silent")
     await expect(snack).to_be_visible()

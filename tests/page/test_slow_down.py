@@ -105,7 +105,7 @@ async def nothing_ordered(thumb: Thumb, car: Canned) -> None:
 
 @pytest.mark.gate
 async def test_slid_and_let_go_it_is_ordered_with_what_proves_that_it_is_new(thumb: Thumb, car: Canned) -> None:
-    await expect(thumb.phone.f("strip")).to_have_text("Armedan aid, not an emergency stop")
+    await expect(thumb.phone.f("strip")).to_have_text("No alarms12 OK · 3 not checked")
     await expect(thumb.phone.f("legend-car")).to_have_text("slow-down: armed")
     await thumb.drag(0.95)
     command = await until_received(thumb, car, "slow_down")

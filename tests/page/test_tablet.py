@@ -39,9 +39,15 @@ async def test_a_sheet_on_a_tablet_cuts_no_row_of_what_is_behind_it(
 ) -> None:
     await phone.page.set_viewport_size({"width": width, "height": height})
     await show(canned, phone.page, scene)
-    await expect(phone.page.locator(".view > .sheet[open] > .sheet-head")).to_be_visible()
+    await expect(phone.page.locator(".view > .sheet[open] > .sheet-head")).to_be_hidden()  # the gauge has the speed
+    await phone.page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
     await phone.page.evaluate(RISEN)
     assert await phone.page.evaluate(CUT_BY_A_SHEET) == []
+    gauge, sheet = [await phone.page.locator(one).bounding_box() for one in (".gauge", ".view > .sheet[open]")]
+    assert gauge is not None
+    assert sheet is not None
+    assert gauge["y"] + gauge["height"] <= sheet["y"]
+    await expect(phone.page.locator(".gauge .speed")).to_be_in_viewport(ratio=1.0)
 
 
 async def test_no_label_of_a_small_gauge_is_below_12_px(phone: Phone, canned: Canned) -> None:
@@ -76,6 +82,8 @@ async def test_a_sheet_over_files_covers_whole_parts_and_shows_all_it_has(
     page = phone.page
     await page.set_viewport_size({"width": width, "height": height})
     await show(canned, page, scene)
+    await page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
+    await expect(phone.f("sound-off")).to_be_hidden()
     await page.evaluate(RISEN)
     cut = await page.evaluate(
         """(name) => {

@@ -78,7 +78,7 @@ async def test_ui_report_fig_3_9_the_overflow_menu(phone: Phone, canned: Canned)
     await phone.f("menu").tap()
     menu = phone.page.locator("#sheet-menu")
     assert await menu.locator("li:has([data-screen])").all_inner_texts() == [
-        "View saved data", "Departure check", "Preferences", "Alarms", "Alarm log", "Signals", "License", "About",
+        "Departure check", "Alarms", "Alarm log", "Signals", "View saved data", "Preferences", "License", "About",
     ]  # fmt: skip
     await menu.get_by_text("Preferences").tap()
     await phone.page.locator("[data-theme-key=light]").tap()

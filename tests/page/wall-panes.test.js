@@ -36,7 +36,7 @@ test('who is in control stands first, then who hears no alarm and why, then this
   const { head, lines } = peopleLines(reach, /** @type {any} */ ({ page: 'a' }), 'b');
   assert.equal(head, '3 pages, alarms audible on 2');
   assert.deepEqual(lines.map(({ cells }) => cells.slice(0, 3)), [['Desk 1', 'in control', 'alarms audible'], ['Field 2', 'watching', 'sound is off'], ['Desk 2, you', 'watching', 'alarms audible']]);
-  assert.deepEqual(peopleLines(null, null, 'a'), { head: 'unknown', lines: [] });
+  assert.deepEqual(peopleLines(null, null, 'a'), { head: 'unknown', lines: [{ key: '', cells: ['No list received', '', '', ''] }] });
 });
 
 test('a displayed list without room for a line counts all of them; one that is not displayed counts none', (t) => {

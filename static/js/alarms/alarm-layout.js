@@ -73,16 +73,16 @@ export function soundOf(frame, { isServerLost, isLossAcknowledged }) {
   return LOUD.find((sound) => asking.includes(sound)) ?? null;
 }
 
-/** @typedef {{kind: 'crit' | 'warn' | 'invert' | 'order' | 'armed' | '', icon: string, text: string, end: string, opens: 'alarms' | 'signals', hasReturned?: boolean, isKnown?: boolean}} Strip
+/** @typedef {{kind: 'crit' | 'warn' | 'invert' | 'order' | '', icon: string, text: string, end: string, opens: 'alarms' | 'signals', hasReturned?: boolean, isKnown?: boolean}} Strip
  * hasReturned: nothing urgent stands any more, and nobody has acknowledged it; isKnown: it stands, and was acknowledged */
 
 /**
  * The one line under the tabs.
  * @param {State | null} frame
- * @param {{isSilent: boolean, chain: import('../core/link.js').ChainView, paused_s: number, stale?: number}} seen stale: so many signals are at the glass
+ * @param {{isSilent: boolean, chain: import('../core/link.js').ChainView, paused_s: number, stale?: number, unchecked?: 'all' | 'ok' | null}} seen stale: so many signals are on this page; unchecked: nothing is checked now, or what was OK is not any more
  * @returns {Strip}
  */
-export function stripOf(frame, { isSilent, chain, paused_s, stale }) {
+export function stripOf(frame, { isSilent, chain, paused_s, stale, unchecked }) {
   if (!frame) return { kind: 'invert', icon: 'unknown', text: 'Nothing received yet', end: 'not checked', opens: 'signals' };
   if (frame.session.paused && !isSilent) {
     return { kind: 'invert', icon: 'pause', text: `Paused ${paused(paused_s)}: no alarm is raised`, end: '', opens: 'alarms' };
@@ -95,9 +95,11 @@ export function stripOf(frame, { isSilent, chain, paused_s, stale }) {
   // An advisory that stands does not hide a warning that returned and waits to be acknowledged.
   const worst = standing.find(({ priority }) => priority !== 'advisory') ?? standing[0];
   const listed = frame.alarms.length + (frame.suppressed ?? []).length; // what the list behind it has
-  const order = stripWords(frame.decelerate, standing.length);
+  const { ok, unknown, found } = countsOf(frame, { stale, unchecked });
+  const open = `${unknown} not checked`;
+  const order = stripWords(frame.decelerate, standing.length, found);
   // A critical alarm comes before the order, whose steps stand beneath; all else after it.
-  if (order && order.kind !== 'armed' && worst?.priority !== 'critical') {
+  if (order && worst?.priority !== 'critical') {
     return { ...order, icon: order.kind === 'crit' ? 'crit' : 'slow', opens: 'alarms' };
   }
   if (worst && worst.priority !== 'advisory') {
@@ -112,19 +114,21 @@ export function stripOf(frame, { isSilent, chain, paused_s, stale }) {
     const isFirst = frame.link.topics_heard === 0;
     return { kind: 'invert', icon: isFirst ? 'unknown' : 'clock', text: isFirst ? 'Nothing received yet' : 'Values are not live', end: 'not checked', opens: 'signals' };
   }
-  const tiles = tilesOf(frame.checks);
-  const ok = tiles.filter((tile) => tile.verdict === 'ok').length;
-  const isFuelAbsent = frame.signals.fuel?.freshness === 'not_published' && !tiles.some((tile) => tile.label === 'Fuel'); // counted as its tile is
-  const unknown = tiles.filter((tile) => tile.verdict === 'unknown').length + Number(isFuelAbsent);
-  const faults = tiles.filter((tile) => tile.verdict === 'fault').length; // their alarms may be suppressed
-  const found = faults ? `${faults} FAULT` : stale ? `${stale} stale` : '';
-  const open = `${unknown} not checked`;
   if (worst) {
     const end = listed > 1 ? amongWords(listed) : found || (unknown ? open : `${ok} OK`);
     return { kind: '', icon: 'info', text: worst.title, end, opens: 'alarms' };
   }
-  if (order) return { ...order, icon: 'slow', end: found || order.end, opens: 'alarms' };
-  return { kind: '', icon: found ? 'info' : 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${found || open}` : `${found || `${ok} OK`} · ${open}`, opens: 'alarms' };
+  return { kind: '', icon: found || unchecked ? 'info' : 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${found || open}` : `${found || `${ok} OK`} · ${open}`, opens: 'alarms' };
+}
+
+/** The checks as their tiles are counted. @param {State} frame @param {{stale?: number, unchecked?: 'all' | 'ok' | null}} seen */
+function countsOf({ checks, signals }, { stale, unchecked }) {
+  const tiles = tilesOf(checks);
+  const of = (/** @type {string} */ verdict) => tiles.filter((tile) => tile.verdict === verdict).length;
+  const isFuelAbsent = signals.fuel?.freshness === 'not_published' && !tiles.some((tile) => tile.label === 'Fuel'); // counted as its tile is
+  const ok = unchecked ? 0 : of('ok');
+  const faults = unchecked === 'all' ? 0 : of('fault'); // their alarms may be suppressed
+  return { ok, unknown: tiles.length + Number(isFuelAbsent) - ok - faults, found: faults ? `${faults} FAULT` : stale ? `${stale} stale` : '' };
 }
 
 /** Of how many in the list this is one. @param {number} listed */

@@ -184,7 +184,7 @@ class AlarmList {
     const mark = html('span', { class: 'mark' }, icon(row.icon));
     const isWaiting = row.kind === 'unacknowledged' || row.kind === 'returned';
     const title = html('span', { class: 't' }, row.title);
-    const at = html('span', { class: 'h' }, isWaiting || !row.at ? '' : 'since ', html('span', { class: 'n' }, row.at));
+    const at = html('span', { class: 'h' }, isWaiting || !row.at ? '' : 'began ', html('span', { class: 'n' }, row.at));
     const text = html('button', { type: 'button', class: 'tx', 'data-f': 'open' }, ...(isWaiting ? [html('span', {}, title, at), html('span', {}, detail, state)]
       : [html('span', {}, title), html('span', {}, detail), html('span', { class: 'l3' }, state, at)]));
     text.addEventListener('click', () => openScreen('check', row.id));

@@ -5,7 +5,7 @@ import { keysOf, silentWords, stateWords } from './alarms-layout.js';
 import { drawMinute } from './check-chart.js';
 import { CheckFeed } from './check-feed.js';
 import { TAGS, episodeWords, figuresOf, placeOf, thresholdWords, totalWords } from './check-layout.js';
-import { whyUnchecked } from './checks.js';
+import { hasAged, whyUnchecked } from './checks.js';
 import { openShelve } from './shelve.js';
 import { dialogWords } from './standing.js';
 import { html, icon, listen, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
@@ -87,7 +87,8 @@ class CheckView {
     if (!frame) return;
     feed.look();
     const { answer } = feed;
-    const why = feed.isOld ? 'no answer' : whyUnchecked(store);
+    const isFault = alarm?.verdict === 'fault' || answer?.verdict === 'fault'; // stands until it is checked again
+    const why = feed.isOld ? 'no answer' : whyUnchecked(store) ?? (!isFault && hasAged(store) ? 'stale' : null);
     const isAlways = why === 'paused' && answer?.verdict === 'fault'; // what the server finds although it is paused
     const isKnown = why === null || isAlways;
     const verdict = !isKnown ? 'unknown' : alarm?.verdict === 'fault' ? 'fault' : answer?.verdict ?? 'unknown';

@@ -17,11 +17,11 @@ import { openScreen } from '../core/open-screen.js';
  * @param {boolean} isFuelPublished
  * @returns {Shown[]}
  */
-export function showTiles(frame, why, isFuelPublished) {
+export function showTiles(frame, why, isFuelPublished, isOld = false) {
   const priorities = new Map(frame.alarms.map((alarm) => [alarm.id, alarm.priority]));
   const shown = tilesOf(frame.checks).map(({ label, verdict, brief, ids }) => {
     if (why !== null && !(why === 'paused' && verdict === 'fault')) return tile(label, 'unk', `not checked: ${why}`);
-    if (verdict === 'ok') return tile(label, 'ok', brief || 'OK');
+    if (verdict === 'ok') return isOld ? tile(label, 'unk', 'not checked: stale') : tile(label, 'ok', brief || 'OK');
     if (verdict === 'unknown') return tile(label, 'unk', brief || 'not checked');
     const found = ids.map((id) => priorities.get(id));
     const kind = found.includes('critical') ? 'crit' : found.includes('advisory') && !found.includes('warning') ? 'info' : 'warn';
@@ -73,7 +73,7 @@ export function mount(root, store) {
   function draw() {
     const { frame } = store;
     if (!frame) return;
-    shown = showTiles(frame, whyUnchecked(store), store.ink('fuel').ink !== 'not_published');
+    shown = showTiles(frame, whyUnchecked(store), store.ink('fuel').ink !== 'not_published', hasAged(store));
     while (list.children.length > shown.length) list.lastElementChild?.remove();
     while (list.children.length < shown.length) list.append(html('li', {}, html('button', { type: 'button' }, icon('ok', 's'), html('b'), html('span'))));
     while (marks.children.length > shown.length) marks.lastElementChild?.remove();
@@ -111,6 +111,11 @@ export function whyUnchecked(store) {
   if (session?.phase !== 'monitoring') return 'no link';
   if (session.paused) return 'paused';
   return store.chain.cut !== null ? 'stale' : null;
+}
+
+/** Whether a value has become stale since the newest frame: it was checked before, and what was OK may not be. @param {import('../core/store.js').Store} store */
+export function hasAged(store) {
+  return Object.entries(store.frame?.signals ?? {}).some(([name, { freshness }]) => freshness !== 'stale' && store.ink(name).ink === 'stale');
 }
 
 /** "20 OK · 1 fault · 4 not checked". @param {Shown[]} shown */

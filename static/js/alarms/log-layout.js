@@ -18,7 +18,7 @@ export const KINDS = /** @type {const} */ ([
 ]);
 export const MARKS = { critical: ['crit', 'c-crit'], warning: ['warn', 'c-warn'], advisory: ['info', ''] };
 const CHANGES = /** @type {Record<string, string>} */ ({
-  raised: '', recaused: 'again', cleared: 'ended', acknowledged: 'acknowledged', shelved: 'shelved', unshelved: 'no longer shelved', silenced: 'silenced', unsilenced: 'sounds again',
+  raised: '', recaused: 'again', cleared: ': ended', acknowledged: 'acknowledged', shelved: 'shelved', unshelved: 'no longer shelved', silenced: 'silenced', unsilenced: 'sounds again',
   suppressed: 'not announced', unsuppressed: 'announced again', handed_over: 'taken over', unacknowledged: 'unacknowledged again',
 });
 const RISES = new Set(['raised', 'recaused', 'unsuppressed', 'unacknowledged']);
@@ -46,7 +46,7 @@ function wordsOf(event) {
   const isRise = !Object.hasOwn(CHANGES, event.change) || RISES.has(event.change); // a change of another version is no comfort
   const [mark, kind] = isRise ? MARKS[event.priority ?? 'advisory'] : ['ok', ''];
   return {
-    icon: mark ?? 'info', kind: kind ?? '', title: `${event.title ?? event.alarm} ${change}`.trim(),
+    icon: mark ?? 'info', kind: kind ?? '', title: `${event.title ?? event.alarm}${/^[ :]|^$/.test(change) ? '' : ' '}${change}`, // as the strip has it
     text: [event.text, hiddenWords(event), event.planned_stop ? 'planned stop' : '', event.by ? `by ${event.by}` : ''].filter(Boolean).join(' · '),
   };
 }

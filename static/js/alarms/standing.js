@@ -18,10 +18,10 @@ export const markWords = ({ planned_stop }) => (planned_stop ? 'planned stop' : 
  * @param {import('../core/protocol-types.js').StandingAlarm} alarm
  */
 export function snackWords(alarm) {
-  const was = alarm.trip_text || alarm.title;
-  if (!alarm.active) return `Returned to normal. It was: ${was}`;
-  if (alarm.verdict === 'ok') return `Returning to normal: ${alarm.text || 'OK'}. It was: ${was}`; // it clears once that has lasted
-  return alarm.verdict === 'unknown' ? `Not checked now: ${alarm.text || 'unknown'}. It was: ${was}` : alarm.text || was;
+  const was = alarm.trip_text ? ` It was: ${alarm.trip_text}` : '';
+  if (!alarm.active) return `Returned to normal.${was}`;
+  if (alarm.verdict === 'ok') return `Returning to normal: ${alarm.text || 'OK'}.${was}`; // it clears once that has lasted
+  return alarm.verdict === 'unknown' ? `Not checked now: ${alarm.text || 'unknown'}.${was}` : alarm.text || alarm.trip_text || alarm.title;
 }
 
 /**

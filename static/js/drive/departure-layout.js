@@ -60,7 +60,7 @@ export function needWords({ kind, need, unit, of }) {
     case 'manual': return 'by hand: press when done';
     case 'check': return 'by itself: its check is OK';
     case 'topic': return `by itself: ${of} at ${amount} or more`;
-    case 'recorder': return 'by itself: it records';
+    case 'recorder': return 'by itself: recording is on';
     case 'sound': return `by itself: on ${counted(need ?? 1, 'phone')} or more`;
     case 'disk': return `by itself: ${amount} or more`;
     case 'clock': return `by itself: differs ${amount} at most`;

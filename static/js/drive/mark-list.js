@@ -15,8 +15,8 @@ import { quietly } from './marks.js';
 
 /** The texts of a mark of the server. @param {Stored} mark */
 export function storedWords({ marked_ms, category, words, voice, photo, source, by }) {
-  const head = `${timeOfDay(marked_ms)} · ${category || (voice ? 'voice' : photo ? 'photo' : words ? 'words' : 'tap only')}`;
-  return { head, more: [...(words ? [words] : []), ...(voice ? ['voice'] : []), ...(photo ? ['photo'] : []), source === 'car' ? 'by the car’s button' : by ?? ''].filter(Boolean) };
+  const kind = category || (voice ? 'voice' : photo ? 'photo' : words ? 'words' : 'tap only');
+  return { head: `${timeOfDay(marked_ms)} · ${kind}`, more: [...(words ? [words] : []), ...(voice && kind !== 'voice' ? ['voice'] : []), ...(photo && kind !== 'photo' ? ['photo'] : []), source === 'car' ? 'by the car’s button' : by ?? ''].filter(Boolean) };
 }
 
 /**

@@ -8,6 +8,8 @@ export class PlayKey {
   #url = '';
   #icon = icon('play');
   #label = html('span');
+  /** @type {number | null} */
+  #length_s = null;
   element = html('button', { type: 'button', class: 'key wide', 'data-f': 'mark-play', hidden: true }, this.#icon, this.#label);
 
   /** @param {() => Blob | string | null} source null: there is no voice @param {import('./marks.js').Say} say */
@@ -15,14 +17,14 @@ export class PlayKey {
     this.source = source;
     this.say = say;
     this.element.addEventListener('click', () => void this.#press());
-    for (const type of ['ended', 'pause', 'play']) this.#audio.addEventListener(type, () => this.#drawIcon());
+    for (const type of ['ended', 'pause', 'play']) this.#audio.addEventListener(type, () => this.#drawWords());
   }
 
   /** @param {number | null} length_s */
   draw(length_s) {
     show(this.element, this.source() !== null);
-    setText(this.#label, length_s === null ? 'Voice' : `${fixed(length_s)} s`);
-    setAttribute(this.element, 'aria-label', `${this.#audio.paused ? 'Play' : 'Stop'} the voice note`);
+    this.#length_s = length_s;
+    this.#drawWords();
   }
 
   async #press() {
@@ -39,8 +41,11 @@ export class PlayKey {
     }
   }
 
-  #drawIcon() {
+  #drawWords() {
+    const act = this.#audio.paused ? 'Play' : 'Stop';
     setIcon(this.#icon, this.#audio.paused ? 'play' : 'stop');
+    setText(this.#label, this.#length_s === null ? act : `${fixed(this.#length_s)} s`);
+    setAttribute(this.element, 'aria-label', `${act} the voice note`);
   }
 
   #release() {

@@ -177,7 +177,7 @@ class TakeOver {
     const rows = [
       { title: 'At', value: speed, unit, text: timeOfDay(found.at_ms) },
       started,
-      { title: 'Alarms then', value: alarms.value, unit: '', text: alarms.text },
+      { title: 'Alarms', value: alarms.value, unit: '', text: alarms.text },
     ];
     this.facts.forEach((fact, i) => {
       const row = rows[i];

@@ -109,7 +109,7 @@ export function factWords(row) {
   const [speed, unit] = speedWords(row.top_speed_mps);
   return `${[
     lengthWords(row.length_s), sizeWords(row.size_bytes), row.distance_m === null ? 'no position' : distanceWords(row.distance_m),
-    row.top_speed_mps === null ? '' : `up to ${speed} ${unit}`, alarmWords(row.alarms),
+    row.top_speed_mps === null ? '' : `up to ${speed}\u00a0${unit}`, alarmWords(row.alarms),
   ].filter(Boolean).join(', ')}.`;
 }
 

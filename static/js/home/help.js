@@ -5,11 +5,11 @@ import { counted } from '../core/format.js';
 
 /**
  * @param {Pick<import('../core/protocol-types.js').State, 'signals' | 'link' | 'session'>} frame
- * @returns {string} empty: values have arrived
+ * @returns {string} empty: values have arrived, or the chain shows why none do
  */
 export function helpWords({ signals, link, session }) {
   const all = Object.values(signals);
-  if (session.phase !== 'monitoring' || all.some(({ freshness }) => freshness !== 'never' && freshness !== 'not_published')) return '';
+  if (session.phase !== 'monitoring' || link.cut !== null || all.some(({ freshness }) => freshness !== 'never' && freshness !== 'not_published')) return '';
   if (all.some(({ freshness }) => freshness === 'never')) return `No message yet. Home fills with the first messages of the ${counted(link.topics_subscribed, 'topic')} that were subscribed to.`;
   return 'None of this car’s topics is recognised. Open Settings and choose a topic for speed, position and scan: Home, Map and Scan fill from them.';
 }

@@ -68,6 +68,8 @@ export function mount(root, store) {
 
     const stop = stopping_m === null ? TAPE.from : (onTape(Math.min(stopping_m, TAPE.metres)) ?? TAPE.from);
     setAttribute(marks.stopping, 'width', (stop - TAPE.from).toFixed(1));
+    setAttribute(marks.object, 'data-ink', state.ink);
+    for (const part of [stops, marks.stopping]) setAttribute(part, 'data-ink', speedState.ink);
     mark(marks.object, isLive ? onTape(distance_m) : null);
     mark(marks.standoff, onTape(store.limit('obstacle.standoff_m')));
   }

@@ -6,6 +6,8 @@ import { colours } from './spark.js';
 export const AXIS_PX = 26;
 /** A lower pane has room for the ends of its scale only [px]. */
 export const LOW_PX = 84;
+/** A still lower one has room for one of them [px]. */
+const FLAT_PX = 40;
 /** Times between two ticks of the clock [s]. */
 export const INCRS_S = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10_800, 21_600, 43_200, 86_400];
 
@@ -56,6 +58,14 @@ export class PaneStack {
   resize() {
     for (const pane of this.panes) pane.resize();
   }
+}
+
+/** Above and below what is drawn; a flat plot gives less away [px]. @type {(plot: {height: number}) => number} */
+export const marginOf = ({ height }) => (height < FLAT_PX ? 7 : 9);
+
+/** Of its ticks those that have room. @param {number[]} ticks @param {number} height of the plot, without its clock [px] */
+export function roomFor(ticks, height) {
+  return height < FLAT_PX ? ticks.slice(-1) : ticks;
 }
 
 /** The room for a plot [px]. @param {HTMLElement} host */

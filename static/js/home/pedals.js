@@ -51,6 +51,7 @@ export function mount(root, store) {
       write(value, ink, shown.digits, unit, shown.side);
       const shape = name === 'steering' ? steeringFill(isLive ? percent : 0) : pedalFill(isLive ? percent : 0);
       for (const [attribute, size] of Object.entries(shape)) setAttribute(fill, attribute, size.toFixed(1));
+      setAttribute(fill, 'data-ink', ink);
       setAttribute(fill, 'hidden', !isLive); // an empty frame is not a measured 0
       setAttribute(bar, 'aria-valuenow', isLive ? Math.round(percent) : 0);
       setAttribute(bar, 'aria-valuetext', isLive ? `${shown.digits} ${shown.side}` : 'unknown');

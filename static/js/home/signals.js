@@ -3,7 +3,8 @@
 import { html, icon, setAttribute, setText, setSentence, show } from '../core/dom.js';
 import { isAbsent, write } from '../core/ink.js';
 import { shownIn, speedWords } from '../core/units.js';
-import { age, counted, fixed, NOTHING } from '../core/format.js';
+import { age, bearing, counted, fixed, NOTHING, signed } from '../core/format.js';
+import { steeringWords } from './pedals.js';
 import { CandidateFeed, SignalMore } from './signal-more.js';
 
 /** @typedef {import('../core/protocol-types.js').SignalState<any>} Signal */
@@ -13,12 +14,15 @@ const LEVELS = ['OK', 'WARN', 'ERROR', 'STALE'];
 /** The headline of each signal's value, as a number with its unit or as text. */
 const HEADLINES = /** @type {Record<string, (value: any) => [string, string]>} */ ({
   speed: (value) => speedWords(value.speed_mps),
-  acceleration: (value) => [fixed(value.acceleration_mps2), 'm/s²'],
+  acceleration: (value) => [signed(value.acceleration_mps2), 'm/s²'],
   brake: (value) => [fixed(value.percent), '%'],
   accelerator: (value) => [fixed(value.percent), '%'],
-  steering: (value) => [fixed(value.percent), '%'],
+  steering: ({ percent }) => (typeof percent === 'number' ? [fixed(Math.abs(percent)), steeringWords(percent).side] : [NOTHING, '%']),
   distance: (value) => (value.none_in_range ? ['none', ''] : [fixed(value.distance_m), 'm']),
-  bearing: (value) => [fixed(value.bearing_rad, 3), 'rad'],
+  bearing: (value) => {
+    const where = bearing(value.bearing_rad);
+    return where ? [where.degrees, where.side] : [NOTHING, ''];
+  },
   position: (value) => (value.status < 0 ? ['no', 'fix'] : [value.alt_m === null ? '2D' : '3D', 'fix']),
   odometry: (value) => speedWords(value.speed_mps, 2),
   heading: (value) => [value.heading_deg === null ? NOTHING : `${fixed(value.heading_deg, 0)}°`, ''],
@@ -177,8 +181,8 @@ function fill(at, name, signal, { ink, age_s }) {
   setText(at.kind, kindWords(signal, ink));
   setAttribute(at.element, 'data-faulty', signal.rejected > 0);
   write(at.value, ink, text, at.unit, unit);
-  setText(at.rate, ['never', 'not_published', 'not_chosen'].includes(ink) ? NOTHING : fixed(signal.rate_hz));
-  setText(at.old, isAbsent(ink) ? NOTHING : age(age_s, 2));
+  setText(at.rate, ink === 'stale' ? '' : ['never', 'not_published', 'not_chosen'].includes(ink) ? NOTHING : fixed(signal.rate_hz)); // its place is the age's
+  setSentence(at.old, isAbsent(ink) ? NOTHING : `${ink === 'stale' ? 'STALE ' : ''}${age(age_s, 2)}`);
   setAttribute(at.old, 'data-age', ink);
   show(at.clock, ink === 'ageing');
   if (at.more.isOpen) at.more.draw(details(signal, name));

@@ -40,6 +40,8 @@ const HIDING_PX = 200;
 const MARK_PX = 16;
 /** The room of a name: above its base line, and all [px]. */
 const NAME_PX = { up: 14, high: 19 };
+/** The name of a phone stands outside the circle of its accuracy up to this radius, inside a wider one [px]. */
+const WIDE_PX = 56;
 /** From one line of a name to the next [px]. */
 const LINE_PX = 17;
 /** Marks nearer than this leave no room for a number between them [px]. */
@@ -196,7 +198,7 @@ export class Figure {
   #drawNames(view, size, car, phone, carAt, phoneAt) {
     const isCarAbove = !carAt || !phoneAt || phoneAt[1] >= carAt[1]; // the names stand away from each other
     const carRoom = Math.max(28, car.isLive && car.ellipse ? reachUp(car.ellipse, view) : 0);
-    const phoneRoom = Math.max(18, phone.isLive ? (phone.accuracy_m ?? 0) / view.mpp : 0);
+    const phoneRoom = nameRoom(phone.isLive ? (phone.accuracy_m ?? 0) / view.mpp : 0);
     this.#drawName(this.carName, size, carAt, car.label, isCarAbove, carRoom);
     this.#drawName(this.phoneName, size, phoneAt, phone.label, !isCarAbove, phoneRoom);
   }
@@ -247,6 +249,9 @@ export class Figure {
 function around([x, y], x_px, y_px) {
   return { left: x - x_px, top: y - y_px, width: 2 * x_px, height: 2 * y_px };
 }
+
+/** From a phone to its name: outside the circle of its accuracy, unless that is wide [px]. @param {number} around_px */
+export const nameRoom = (around_px) => (around_px > WIDE_PX ? 18 : Math.max(18, around_px));
 
 /** On a low map the compass stands above the bar. @param {Size} size */
 const scaleLeft = (size) => (size.height < LOW_PX ? 72 : 16);

@@ -96,5 +96,5 @@ function drawAge(element, age_s, ink, instead = '') {
 
 /** Six decimals are 0.1 m. @param {number | undefined} value */
 function degrees(value) {
-  return value === undefined ? '–' : fixed(value, 6);
+  return value === undefined ? '–' : `${fixed(value, 6)}°`;
 }

@@ -1,6 +1,6 @@
 // The texts of the car and of the phone on the map, and the freshness of each: pure functions of the newest frame.
 
-import { bearing_deg, distance_m, placeOf } from '../core/geodesy.js';
+import { placeOf } from '../core/geodesy.js';
 import { ellipseOf } from './map-layout.js';
 import { nameOf } from '../phone/phones-layout.js';
 import { local } from '../core/decimal.js';
@@ -29,7 +29,7 @@ import { age, distanceWords, fixed, heading } from '../core/format.js';
  * @property {string} label
  * @property {string} message
  *
- * @typedef {{distance_m: number, bearing_deg: number, allowed_m: number | null}} Apart allowed_m: null where the server did not compare them
+ * @typedef {{distance_m: number, bearing_deg: number, allowed_m: number | null}} Apart allowed_m: null where the server names none
  */
 
 /** A phone's fix older than this tells where it was, not where it is; as the server has it [s]. */
@@ -99,14 +99,14 @@ export function phoneOf(frame, lag_s, page = '') {
   else if (place && !isLive) message = `The phone’s newest fix is ${age(age_s)} s old.`;
   return {
     place, isLive, age_s, accuracy_m: phone.accuracy_m,
-    label: isLive ? `${name} ±${metres(phone.accuracy_m ?? 0)}` : `${name} STALE ${age(age_s)} s`,
+    label: isLive ? `${name} ±${metres(phone.accuracy_m ?? 0)}${phone.used ? '' : ', too coarse'}` : `${name} STALE ${age(age_s)} s`,
     message: `${message}${whose}`.trim(),
   };
 }
 
 /**
- * How far car and phone are apart, and where the car is from the phone: as the server compared them, for one moment; where
- * it did not, as the two newest fixes have it.
+ * How far car and phone are apart, and where the car is from the phone: as the server compared them, for one moment. Where it
+ * did not, two fixes of two moments or a coarse one give no distance, here as on Home.
  * @param {State} frame
  * @param {number} lag_s
  * @param {CarShown} car
@@ -116,11 +116,9 @@ export function phoneOf(frame, lag_s, page = '') {
 export function apartOf(frame, lag_s, car, phone) {
   if (!car.isLive || !phone.isLive || !car.place || !phone.place) return null;
   const compared = frame.phone;
-  if (compared?.used && typeof compared.apart_m === 'number' && typeof compared.bearing_deg === 'number' && (compared.compared_age_s ?? Infinity) + lag_s <= COMPARED_LIVES_S) {
-    const least_m = frame.limits['phone_car.least_m'];
-    return { distance_m: compared.apart_m, bearing_deg: compared.bearing_deg, allowed_m: compared.explained_m === null ? null : Math.max(compared.explained_m, typeof least_m === 'number' ? least_m : 0) };
-  }
-  return { distance_m: distance_m(phone.place, car.place), bearing_deg: bearing_deg(phone.place, car.place), allowed_m: null };
+  if (!compared?.used || typeof compared.apart_m !== 'number' || typeof compared.bearing_deg !== 'number' || (compared.compared_age_s ?? Infinity) + lag_s > COMPARED_LIVES_S) return null;
+  const least_m = frame.limits['phone_car.least_m'];
+  return { distance_m: compared.apart_m, bearing_deg: compared.bearing_deg, allowed_m: compared.explained_m === null ? null : Math.max(compared.explained_m, typeof least_m === 'number' ? least_m : 0) };
 }
 
 /** A bearing as it is read: "323° NW". @param {number} bearing */

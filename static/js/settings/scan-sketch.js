@@ -1,4 +1,4 @@
-// A small drawing of one laser's newest scan from above, so that an operator sees which laser looks ahead.
+// A small drawing of one laser's newest scan from above, so that an operator sees which laser points ahead.
 
 import { setAttribute, setText, svg } from '../core/dom.js';
 

@@ -2,7 +2,7 @@
 
 import { announcedOf, askingOf, keyOf, louder } from './cars-layout.js';
 import { field, html, icon, listen, need, setAttribute, setIcon, setText, setSentence } from '../core/dom.js';
-import { age, counted } from '../core/format.js';
+import { ageWords, counted } from '../core/format.js';
 import { Meant } from '../core/meant.js';
 
 /**
@@ -82,7 +82,7 @@ export class CarsAlarms {
     const { asking, store } = this;
     this.#drawStrip(asking);
     const critical = asking.find(({ worst }) => worst?.priority === 'critical') ?? null;
-    this.#drawCard(critical);
+    this.#drawCard(document.querySelector('#sheet-cars[open]') ? null : critical); // the list begins with the same row
     if (!store.painter.drawing.isFailed) for (const row of asking) this.#speak(row);
   }
 
@@ -97,7 +97,13 @@ export class CarsAlarms {
     setAttribute(strip, 'data-opens', 'cars');
     setIcon(need(strip, '.i'), first.icon);
     setSentence(field(strip, 'strip-text'), `${this.cars.shortOf(first.name)}: ${first.worst?.title ?? ''}`);
-    setSentence(field(strip, 'strip-end'), asking.length > 1 ? counted(asking.length, 'car') : '');
+    setSentence(field(strip, 'strip-end'), asking.length > 1 ? counted(asking.length, 'car') : ageWords(this.#for_s(first)));
+  }
+
+  /** For how long its worst alarm is raised [s]. @param {CarRow} row */
+  #for_s({ worst }) {
+    const { cars, carsLag_s } = this.store;
+    return Math.max(0, ((cars?.time_ms ?? 0) - (worst?.raised_ms ?? 0)) / 1000 + carsLag_s);
   }
 
   /** @param {CarRow | null} row */
@@ -116,8 +122,7 @@ export class CarsAlarms {
     const short = this.cars.shortOf(row.name); // whole in the list of cars
     const { title, text } = row.worst;
     setSentence(this.title, text || title);
-    const for_s = ((this.store.cars?.time_ms ?? 0) - row.worst.raised_ms) / 1000 + this.store.carsLag_s;
-    setSentence(this.text, `${short}: ${title}, for ${age(Math.max(0, for_s))} s. In control: ${row.operator}.`);
+    setSentence(this.text, `${short}: ${title}, for ${ageWords(this.#for_s(row))}. In control: ${row.operator}.`);
     setText(this.open, `Open ${short}`);
     if (!card.isConnected) warning.after(card); // where there is room for one, this car's comes first
   }
@@ -136,7 +141,7 @@ export class CarsAlarms {
   }
 }
 
-const WEIGHT = { '': 0, armed: 1, warn: 2, invert: 3, order: 4, crit: 5 };
+const WEIGHT = { '': 0, warn: 2, invert: 3, order: 4, crit: 5 };
 
 /** Whether what this car's strip shows is less than an alarm of another. @param {string} own @param {CarRow['kind']} other */
 export function isLess(own, other) {

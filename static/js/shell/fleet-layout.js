@@ -62,7 +62,7 @@ const EVENTS = 20;
 
 const KIND = /** @type {const} */ ({ critical: 'crit', warning: 'warn', advisory: '' });
 const LABELS = /** @type {Record<Act, string>} */ ({
-  open: 'Open', take: 'Take it', over: 'Take over', accept: 'Accept', decline: 'Decline', hand: 'Hand over', withdraw: 'Withdraw', release: 'Release', hush: 'Silence', off: 'It is off', on: 'Not off', show: 'Show',
+  open: 'Open', take: 'Take it', over: 'Take over', accept: 'Accept', decline: 'Decline', hand: 'Hand over', withdraw: 'Withdraw', release: 'Unassign', hush: 'Silence', off: 'It is off', on: 'Not off', show: 'Show',
 });
 
 /** Age of what a car stated last, now [s]; null: it never stated anything. @param {ListedCar} car @param {number} lag_s */
@@ -199,7 +199,7 @@ function timerOf(attention, now_ms, timer_s) {
 function nextOf({ attention }, now_ms) {
   if (!attention) return '';
   const { offered } = attention;
-  return supervisorWords(attention, now_ms) || (offered ? `offered for ${duration((now_ms - offered.since_ms) / 1000)}` : 'no timer');
+  return supervisorWords(attention, now_ms) || (offered ? `offered ${duration((now_ms - offered.since_ms) / 1000)} ago` : 'no timer');
 }
 
 /** @param {CarSummary} summary @param {string} page @returns {Who} */
@@ -288,7 +288,7 @@ function groupOf(of, all, isUnfolded) {
   const isMine = first.who.is === 'you';
   const who = isLostCars || isMine ? first.who.text : free === all.length ? 'unassigned' : free ? `${free} of ${all.length} unassigned` : 'assigned to others';
   const show = key('show', isLostCars, isUnfolded ? `Hide ${all.length}` : `Show ${all.length}`);
-  const keys = isLostCars ? (loudest(all) === 'none' ? [] : [key('hush', false, 'Silence all')]) : isMine ? [key('release', false, 'Release all')] : free ? [key('take', true, 'Take all'), ...(free === all.length ? [key('hand')] : [])] : [key('over', false, 'Take over all')];
+  const keys = isLostCars ? (loudest(all) === 'none' ? [] : [key('hush', false, 'Silence all')]) : isMine ? [key('release', false, 'Unassign all')] : free ? [key('take', true, 'Take all'), ...(free === all.length ? [key('hand')] : [])] : [key('over', false, 'Take over all')];
   return {
     ...first, key: of, cars: names, name: counted(all.length, 'car'), title: isLostCars ? 'No data: cars may be moving' : first.title,
     detail: rangeOf(names), since_s: Math.max(...all.map(({ since_s }) => since_s ?? 0)), who: { text: who, is: free ? 'nobody' : first.who.is },

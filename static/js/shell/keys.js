@@ -134,7 +134,7 @@ class PageKeys {
     const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-keys', 'aria-labelledby': 'keys-title' },
       html('div', { class: 'bd' }, html('h2', { id: 'keys-title' }, 'Keys'), html('p', { class: 'sub small' }, ...textNodes('No key orders a slow-down. Saved on this device only.'))),
       html('dl', { class: 'key-list' }, ...KEYS.flatMap(({ shown, does }) => [html('dt', {}, html('kbd', {}, shown)), html('dd', {}, ...textNodes(does))])),
-      html('div', { class: 'keys' }, toggle, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
+      html('div', { class: 'keys' }, toggle, html('button', { type: 'button', class: 'key', 'data-f': 'no', autofocus: true }, 'Close'))));
     const take = addSheet(sheet);
     listen(sheet, 'close', take);
     listen(toggle, 'click', () => {

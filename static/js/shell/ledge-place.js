@@ -12,6 +12,8 @@ const SHORT = 'height < 50em';
 const LEAST = 'height < 32.5em';
 const WIDE = 'width >= 62.5em';
 const NARROW = 'width < 43.75em';
+/** There a drawer stands beside the instruments. */
+const DESK = '(width >= 75em) and (height >= 37.5em)';
 
 /** Measured in this way it costs no layout of the page, which innerWidth and innerHeight do. @param {string} size */
 const is = (size) => matchMedia(`(${size})`).matches;
@@ -32,7 +34,8 @@ function isCramped(monitor, store) {
 /** What is marked is the live drive: in a replay there is no such place. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */
 function placeLedge(monitor, store) {
   const root = document.documentElement;
-  const isThere = LIVE.includes(monitor.dataset['front'] ?? '') && !store.replaying && !root.hasAttribute('data-replay') && !isCramped(monitor, store);
+  const isLive = LIVE.includes(monitor.dataset['front'] ?? '') || (monitor.dataset['wide'] === 'drawer' && matchMedia(DESK).matches);
+  const isThere = isLive && !store.replaying && !root.hasAttribute('data-replay') && !isCramped(monitor, store);
   show(need(monitor, ':scope > .ledge'), isThere);
   setAttribute(root, 'data-ledge', isThere);
 }

@@ -136,6 +136,8 @@ class LogPane {
   #lines = 0;
   /** Reads the recording that is shown; fetched with the first. @type {typeof import('../replay/recorded-log.js').shownLines | undefined} */
   #recorded;
+  /** Why nothing of the recording is listed. */
+  #unread = '';
 
   /** @param {HTMLElement} list @param {Store} store */
   constructor(list, store) {
@@ -154,13 +156,15 @@ class LogPane {
     setText(this.head, replay ? 'of the recording, newest first' : 'newest first');
     if (replay && !this.#recorded) {
       this.#recorded = () => [];
-      import('../replay/recorded-log.js').then(({ shownLines }) => { this.#recorded = shownLines; }, () => {});
+      this.#unread = 'The recording is being read.';
+      import('../replay/recorded-log.js').then(({ shownLines }) => [this.#recorded, this.#unread] = [shownLines, ''], () => { this.#unread = 'The log could not be loaded. Reload the page.'; });
     }
     const recorded = replay && (this.#recorded?.(replay) ?? []).slice(0, this.#lines);
-    const key = recorded ? JSON.stringify(recorded) : `${last} ${measured} ${rows.length} ${this.#lines}`;
+    const key = recorded ? this.#unread + JSON.stringify(recorded) : `${last} ${measured} ${rows.length} ${this.#lines}`;
     if (key === this.#shown) return;
     this.#shown = key;
-    this.list.replaceChildren(...(recorded ?? rows.slice(0, this.#lines).map(liveOf)).map(lineOf));
+    const lines = recorded ?? rows.slice(0, this.#lines).map(liveOf);
+    this.list.replaceChildren(...lines.map(lineOf), ...(lines.length ? [] : [html('li', {}, html('span'), html('span'), html('span', { class: 't' }, replay ? this.#unread || 'No entries up to this time.' : 'No entries received.'))]));
   }
 }
 

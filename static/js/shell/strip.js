@@ -1,7 +1,9 @@
 // The one line under the tabs that never moves: the worst of what stands.
 
 import { stripOf } from '../alarms/alarm-layout.js';
+import { hasAged, whyUnchecked } from '../alarms/checks.js';
 import { field, need, setAttribute, setIcon, setSentence } from '../core/dom.js';
+import { UNCONFIRMED } from '../slowdown/slow-layout.js';
 
 /**
  * @param {HTMLElement} root
@@ -18,13 +20,14 @@ export function mount(root, store) {
     const { frame: of } = store;
     const seen = stripOf(of, {
       stale: Object.keys(of?.signals ?? {}).filter((name) => store.ink(name).ink === 'stale').length,
-      isSilent: store.isSilent, chain: store.chain,
+      unchecked: whyUnchecked(store) !== null ? 'all' : hasAged(store) ? 'ok' : null, isSilent: store.isSilent, chain: store.chain,
       paused_s: (of?.session.paused_for_s ?? 0) + store.lag_s,
     });
     setAttribute(strip, 'data-kind', seen.kind || null);
     setAttribute(strip, 'data-returned', seen.hasReturned);
     setAttribute(strip, 'data-known', seen.isKnown);
     setAttribute(strip, 'data-opens', seen.opens);
+    setAttribute(strip, 'data-unconfirmed', seen.text.includes(UNCONFIRMED));
     setIcon(mark, seen.icon);
     setSentence(text, seen.text);
     setSentence(end, seen.end);

@@ -1,7 +1,7 @@
 // The tabs, which the server declares: swiped natively, pressed, reached by arrow keys or by a deep link, and remembered.
 
 import { field, listen, setAttribute } from '../core/dom.js';
-import { floorQuery, isFloor } from './layout.js';
+import { floorQuery, isFloor, isWall } from './layout.js';
 
 const REMEMBERED = 'catgraph.tab';
 /** So long after the last finger and the last movement the tabs are at rest [ms]. */
@@ -35,11 +35,12 @@ export function tabByHash(hash, names) {
  * @param {{name: string, wide: string}[]} tabs
  * @param {number} index of the tab in front
  * @param {boolean} hasPanes
+ * @param {boolean} [hasWall] the panes stay beside a drawer too
  */
-export function tabsInSight(tabs, index, hasPanes) {
+export function tabsInSight(tabs, index, hasPanes, hasWall = false) {
   const front = tabs[index];
   if (!hasPanes || !front || front.wide === 'page') return front ? [front.name] : [];
-  return tabs.filter((tab, i) => i === index || (tab.wide === 'pane' && (front.wide === 'pane' || tab === tabs[0]))).map(({ name }) => name);
+  return tabs.filter((tab, i) => i === index || (tab.wide === 'pane' && (front.wide === 'pane' || hasWall || tab === tabs[0]))).map(({ name }) => name);
 }
 
 /** The tabs; `onFront` receives which is in front, from the start on. */
@@ -143,7 +144,7 @@ export class Tabs {
 
   /** Is any of this tab to be seen? @param {string} tab */
   shows(tab) {
-    return tabsInSight(this.tabs, this.index, isFloor()).includes(tab);
+    return tabsInSight(this.tabs, this.index, isFloor(), isWall()).includes(tab);
   }
 
   /** The tabs that have a key now, from the left. */

@@ -6,7 +6,7 @@ import { rewinder } from '../core/draw-proof.js';
 import { field, html, mirror, need, setAttribute, setText, setSentence, show, textNodes } from '../core/dom.js';
 import { speedWords } from '../core/units.js';
 import { unseenOf, unseenWords } from '../core/unseen.js';
-import { age, fixed, timeOfDay } from '../core/format.js';
+import { ageWords, fixed, timeOfDay } from '../core/format.js';
 
 /** What is known of the recorder under the veil: what it did then, or what is safe for good. @type {Record<string, string>} */
 const RECORDED = { recording: 'it was recording', held: 'saved', saving: 'it was being saved', stopped: 'it had stopped' };
@@ -67,13 +67,14 @@ export function mount(root, store) {
     const isUnsaid = kind === null || store.painter.drawing.isFailed;
     show(chain, !isUnsaid);
     drawBigChain(chain, view);
-    setSentence(title, isUnsaid || view.age_s === null ? 'Stale' : `${view.state === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);
+    const was = thenWords(store.frame);
+    setSentence(title, isUnsaid ? 'Stale' : titleOf(view, store.frame?.link.car_age_s));
     const [bold, plain] = isUnsaid ? ['The display is not updating.', 'The page or the server has stopped. Watch the car.'] : [view.sentence, detailOf(view)];
     if (written !== `${bold}|${plain}`) {
       sentence.replaceChildren(html('b', {}, ...textNodes(bold)), ' ', ...textNodes(plain));
       written = `${bold}|${plain}`;
     }
-    setSentence(then, [thenWords(store.frame) || 'nothing', store.frame ? unseenWords(unseenOf(store)) : ''].filter(Boolean).join(', '));
+    setSentence(then, was ? [was, unseenWords(unseenOf(store))].filter(Boolean).join(', ') : 'nothing');
     const recording = RECORDED[store.frame?.recording.state ?? 'off'] ?? '';
     setText(rec, recording);
     for (const part of [recName, rec]) show(part, recording !== '');
@@ -82,6 +83,13 @@ export function mount(root, store) {
   if (store.frame) draw(); // before the first frame it is not shown
   const stops = [store.on('drawn', rewinder(store, () => store.frame)), store.on('draw', draw)];
   return () => stops.forEach((stop) => stop());
+}
+
+/** The title; what never sent a message is not called stale. @param {import('../core/link.js').ChainView} view @param {number | null} [car_s] age of the car's newest message */
+export function titleOf({ state, age_s }, car_s) {
+  if (state === 'Silent' && car_s === null) return 'Nothing received yet';
+  if (age_s === null) return 'Stale';
+  return state === 'Waking' ? state : `Stale ${ageWords(age_s)}`;
 }
 
 /** @param {import('../core/link.js').ChainView} view */

@@ -39,7 +39,7 @@ export function signalLines(signals, lag_s) {
  * @returns {{head: string, lines: Line[]}}
  */
 export function peopleLines(reach, control, page) {
-  if (!reach) return { head: 'unknown', lines: [] };
+  if (!reach) return { head: 'unknown', lines: [{ key: '', cells: ['No list received', '', '', ''] }] };
   const rank = (/** @type {Reach['pages'][number]} */ one) => (one.page === control?.page ? 0 : !one.can ? 1 : one.page === page ? 2 : 3);
   const lines = [...reach.pages].sort((a, b) => rank(a) - rank(b)).map((one) => ({
     key: one.page,

@@ -18,6 +18,7 @@ export class OrderSteps {
     this.steps = field(root, 'order-steps');
     this.line = field(root, 'order-line');
     this.live = field(root, 'order-live');
+    this.strip = field(root, 'strip');
     this.rows = Array.from({ length: STEPS }, () => ({ mark: icon('unknown', 's'), label: html('span', { class: 'lab' }), value: html('b') }))
       .map((row) => ({ ...row, item: html('li', {}, row.mark, row.label, row.value) }));
     store.on('switch', () => { this.#announced = ''; }); // the other car was not released
@@ -39,6 +40,7 @@ export class OrderSteps {
     });
     const line = orderWords(order, this.store.isSilent ? 0 : this.store.lag_s);
     setAttribute(this.steps, 'data-kind', line.kind || null);
+    setAttribute(this.steps, 'data-said', order.confirmed === false && this.store.vehicles.length === 1 && this.strip.hasAttribute('data-unconfirmed')); // the strip says the same
     setSentence(this.line, this.store.vehicles.length > 1 ? `${this.store.vehicle}: ${line.text}` : line.text);
   }
 

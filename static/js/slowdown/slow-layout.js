@@ -20,7 +20,9 @@ import { age, fixed, timeOfDay } from '../core/format.js';
  */
 
 /** The unmistakable sentence, the same wherever it stands. */
-export const NOT_CONFIRMED = 'NOT CONFIRMED – use the physical stop';
+/** In the title of the alarm too. */
+export const UNCONFIRMED = 'NOT CONFIRMED';
+export const NOT_CONFIRMED = `${UNCONFIRMED} – use the physical stop`;
 const AID = 'An aid, not an emergency stop: Wi-Fi and the bridge are in its path. The safety driver stops the car.';
 /** A guard that sends nothing for so long cannot be relied on [s]; it reports at least twice a second. */
 const GUARD_HEARD_S = 2;
@@ -104,26 +106,26 @@ function goWords(state, order) {
 }
 
 /**
- * The strip while an order stands or the slow-down is armed, where no critical alarm takes it; null: nothing to say.
+ * The strip while an order stands, where no critical alarm takes it; null: nothing to say.
  * @param {Decelerate | null | undefined} now
  * @param {number} standing alarms that stand too
- * @returns {{kind: 'order' | 'crit' | 'armed', text: string, end: string} | null}
+ * @param {string} [found] faults or stale values, where no alarm stands
+ * @returns {{kind: 'order' | 'crit', text: string, end: string} | null}
  */
-export function stripWords(now, standing) {
+export function stripWords(now, standing, found = '') {
   const order = orderOf(now);
   if (!now) return null;
   if (!order && holdOf(now)) return { kind: 'order', text: `The guard ${now.guard?.state === 'slowing' ? 'slows' : 'holds'} the car`, end: 'by itself' };
-  if (!order && now.state !== 'armed') return null;
-  if (!order) return { kind: 'armed', text: 'Armed', end: 'an aid, not an emergency stop' };
+  if (!order) return null;
   if (order.confirmed === false) return { kind: 'crit', text: NOT_CONFIRMED, end: '' };
   const rate = `−${fixed(order.deceleration_mps2)} m/s²`;
-  const alarms = standing === 0 ? '' : ` · ${standing} ${standing === 1 ? 'alarm' : 'alarms'}`;
-  if (!order.sending) return { kind: 'order', text: 'Not sending to the car', end: alarms.slice(3) };
-  if (order.stands) return { kind: 'order', text: 'The car stands', end: alarms.slice(3) || (order.stands === 'before' ? 'stood already' : 'not proven') };
-  if (now.state === 'holding' && order.confirmed) return { kind: 'order', text: 'Holding the car', end: alarms ? `ordered${alarms}` : `${speedWords(0).join(' ')} ordered` };
+  const also = standing ? ` · ${standing} ${standing === 1 ? 'alarm' : 'alarms'}` : found && ` · ${found}`;
+  if (!order.sending) return { kind: 'order', text: 'Not sending to the car', end: also.slice(3) };
+  if (order.stands) return { kind: 'order', text: 'The car stands', end: also.slice(3) || (order.stands === 'before' ? 'stood already' : 'not proven') };
+  if (now.state === 'holding' && order.confirmed) return { kind: 'order', text: 'Holding the car', end: also ? `ordered${also}` : `${speedWords(0).join(' ')} ordered` };
   return order.confirmed
-    ? { kind: 'order', text: 'Slowing the car', end: alarms ? `${rate}${alarms}` : `${rate} ordered` }
-    : { kind: 'order', text: 'Slow-down ordered', end: `${rate}${alarms}` };
+    ? { kind: 'order', text: 'Slowing the car', end: also ? `${rate}${also}` : `${rate} ordered` }
+    : { kind: 'order', text: 'Slow-down ordered', end: `${rate}${also}` };
 }
 
 /**
@@ -262,11 +264,11 @@ function rivalsOf(rivals) {
  * @returns {{tag: string, kind: 'plain' | 'warn' | 'unk', cost: string}}
  */
 export function connectRow(now, isMonitoring) {
-  if (!isMonitoring || !now) return { tag: 'Not armed', kind: 'unk', cost: 'can be armed on Home once connected' };
+  if (!isMonitoring || !now) return { tag: 'Not armed', kind: 'unk', cost: 'can be armed once connected' };
   const { text } = guardWords(now.guard);
   if (orderOf(now)) return { tag: 'Slowing', kind: 'warn', cost: 'the car is being slowed now' };
   if (now.state === 'armed') return { tag: 'Armed', kind: 'plain', cost: text };
-  if (now.state === 'not_armed') return { tag: 'Not armed', kind: 'unk', cost: `can be armed on Home. ${text}` };
+  if (now.state === 'not_armed') return { tag: 'Not armed', kind: 'unk', cost: `can be armed. ${text}` };
   return { tag: 'Not available', kind: 'unk', cost: bare(now.why ?? 'not available') };
 }
 

@@ -51,7 +51,7 @@ export class SlowSlides {
     const { state, why } = seen.now ?? {};
     const because = seen.isSilent ? 'the server does not answer.'
       : seen.isViewer ? 'viewers cannot use it.'
-        : state === 'not_armed' ? 'the slow-down is not armed; acknowledge the alarm, then arm it on Home.'
+        : state === 'not_armed' ? 'the slow-down is not armed; acknowledge the alarm, then arm it.'
           : why ?? 'it is not available.';
     return `${because} Use the physical stop.`;
   }

@@ -139,6 +139,20 @@ def test_a_page_of_another_car_leaves_and_is_one_operator_with_a_page_that_is_he
     assert reach.facts(1.0).can == MOST
 
 
+def test_a_page_in_which_a_key_was_pressed_is_here_and_sounds_no_alarm_by_that() -> None:
+    reach = AlarmReach()
+    reach.update_status(one("Ann"), READY, 0.0)
+    reach.update_status(one("Ben"), replace(READY, is_visible=False), 0.0)
+    for name in ("Ann", "Ben", "Cem"):
+        reach.note_command(one(name), 5.0)
+    assert [reach.is_here(one(name), 5.0) for name in ("Ann", "Ben", "Cem")] == [True, False, False]
+    assert reach.is_here(one("Ann"), 8.0)
+    assert not reach.is_here(one("Ann"), 8.1)
+    assert reach.facts(5.0).can == 0
+    reach.update_status(one("Ann"), replace(READY, is_visible=False), 6.0)
+    assert not reach.is_here(one("Ann"), 6.0)
+
+
 def test_here_is_who_is_seen() -> None:
     reach = AlarmReach()
     reach.update_status(one("Ann"), READY, 0.0)

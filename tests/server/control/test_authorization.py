@@ -82,6 +82,30 @@ def test_a_page_that_nobody_sees_is_served_and_has_no_lease() -> None:
         car.do(ANN, "take", 1.0)
 
 
+@pytest.mark.parametrize("what", ["take", "take_over", "request"])
+def test_a_press_counts_although_the_page_could_not_report_for_some_seconds(what: str) -> None:
+    car = Vehicle()
+    car.see(ANN, BEN, now_s=0.0)
+    car.do(BEN, "take", 0.0)
+    for second in range(1, 9):
+        car.see(BEN, now_s=second)
+    if what == "take":
+        car.do(page("Ben", 101), "release", 8.0)
+    car.do(ANN, what, 8.0)  # nothing came from Ann for 8 s: a slow link, a busy phone
+    car.gate.tick(8.1)
+    assert car.acts[-1] == {"take": "taken", "take_over": "taken_over", "request": "requested"}[what]
+    assert len(car.shown(8.1)["requests"]) == (what == "request")
+
+
+def test_the_first_order_takes_control_although_the_page_could_not_report_for_some_seconds() -> None:
+    car = Vehicle()
+    car.see(ANN, now_s=0.0)
+    car.gate.admit(PAUSE, ANN, 8.0)
+    assert car.acts == ["taken"]
+    car.gate.tick(11.1)  # and nothing came since
+    assert car.acts == ["taken", "lapsed"]
+
+
 def test_what_any_operator_may_do_needs_no_control() -> None:
     car = Vehicle()
     car.see(ANN, now_s=0.0)

@@ -207,6 +207,35 @@ async def test_a_drive_that_goes_on_after_a_restart_is_mailed_as_one_when_it_end
         assert await mailed(reports) == [(before, after)]
 
 
+@pytest.mark.parametrize("resumed", [False, True])
+async def test_what_was_completed_and_not_yet_announced_is_mailed_with_the_rest(tmp_path: Path, resumed: bool) -> None:
+    shelf, watch = Shelf(tmp_path / "car"), Watch()
+    before = "car_20261119T140303Z"
+    after = "car_20261119T141500Z" if resumed else part_id(before, 2)
+    going_on = shelf.folder / f"{after}{WRITING}"
+    record(going_on, seconds=2.0, own=[{"n": 1, "at_ms": 5, "alarm": None, "change": "started", "resumes": True}])
+    mailer = Mailer(tmp_path / "mail", shelf, wall_ms=Clock())
+    await mailer.start()
+    mailer.settings = replace(MailSettings(host="localhost", port=1, sender="car@example.org"), report_to=TO)
+    reports = DriveReports(mailer, now=watch)
+    try:
+        reports._take(shelf.folder, shelf.put(before).stem)
+        watch.s = 100.0
+        await reports._mail_all(reports._is_over)
+        path = going_on.rename(shelf.folder / f"{after}.mcap")
+        await reports._mail_all(reports._is_over)
+        assert await mailed(reports) == []
+        reports._take(shelf.folder, path.stem)
+        await reports._mail_all(reports._is_over)
+        assert await mailed(reports) == []  # it has just ended
+        watch.s = 200.0
+        await reports._mail_all(reports._is_over)
+        assert await mailed(reports) == [(before, after) if resumed else (before,)]
+        assert not reports._waiting
+    finally:
+        await mailer.stop()
+
+
 async def test_what_waits_is_mailed_after_kills(tmp_path: Path) -> None:
     shelf, watch = Shelf(tmp_path / "car"), Watch()
     id, name = "car_20261118T140303Z", tmp_path / "mail" / "reports.json"
