@@ -62,7 +62,7 @@ def why_text(why: Why, view: PhoneView, now_s: float, phone: str = "this phone")
             )
         case "hidden":
             return WhyText(
-                sentence=f"The page on {phone} is in the background, where it gets no position",
+                sentence=f"No position while the page is in the background on {phone}",
                 short="hidden",
                 brief="background",
             )

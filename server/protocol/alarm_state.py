@@ -233,6 +233,7 @@ class TileCheck(TypedDict):
     label: str
     verdict: Verdict
     text: str
+    priority: Annotated[NotRequired[Priority], doc("of its alarm; absent from agents before 2026-12")]
 
 
 class CheckEnd(TypedDict):

@@ -50,7 +50,7 @@ class Retry(BaseCommand):
 class Disconnect(Prompt):
     """Ends monitoring: the session is idle."""
 
-    http: ClassVar[str] = "End monitoring"
+    http: ClassVar[str] = "Stop monitoring"
     kind: Literal["disconnect"]
 
 

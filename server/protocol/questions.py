@@ -22,7 +22,7 @@ class Question(TypedDict):
 
     signal: str
     kind: Literal["source", "unit"]
-    words: Annotated[str, doc("*Two lasers: which looks ahead?*")]
+    words: Annotated[str, doc("*Two lasers: which one faces forward?*")]
     options: Annotated[list[Option], doc("the most probable first, at most 12")]
     options_count: Annotated[int, doc("how many there are, those left out included")]
 

@@ -167,7 +167,13 @@ def _ends(check: AnyCheck, monitor: Monitor) -> CheckEnd | None:
 
 def _listed(check: AnyCheck, monitor: Monitor) -> TileCheck:
     finding = monitor.findings.get(check.id, NOT_YET)
-    return {"id": check.id, "label": check.label, "verdict": finding.verdict, "text": finding.text}
+    return {
+        "id": check.id,
+        "label": check.label,
+        "verdict": finding.verdict,
+        "text": finding.text,
+        "priority": check.alarm.priority,
+    }
 
 
 def _for_s(course: CheckCourse, now_s: float) -> float | None:

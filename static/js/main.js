@@ -23,7 +23,7 @@ import { Router } from './shell/router.js';
 import { Phone } from './phone/phone.js';
 import { Presence } from './control/presence.js';
 import { Screens } from './shell/screens.js';
-import { floorQuery } from './shell/layout.js';
+import { floorQuery, isWall } from './shell/layout.js';
 import { Cars, mountChip } from './shell/cars.js';
 import { CarsAlarms } from './shell/cars-alarms.js';
 import { closeSheet, mountSheets } from './shell/sheet.js';
@@ -275,7 +275,7 @@ function mountScreens(page, arming) {
   mountStart(start, store);
   if (start.querySelector('[data-f="who"]')) mountChip(start, cars); // the requested car may never answer: another one may be chosen
   mountConnect(need(document, '#connect'), store, router, arming);
-  const contents = tabContents(monitor, store, say, (name) => router.isMonitorShown && tabs.shows(name) && (screens.open === null || matchMedia('(width >= 112.5em)').matches));
+  const contents = tabContents(monitor, store, say, (name) => router.isMonitorShown && tabs.shows(name) && (screens.open === null || isWall()));
   const screens = new Screens(monitor, store, () => page.front(), say);
   mountSheets();
   mountInstall(say);

@@ -80,14 +80,14 @@ test('a row shows the measured value and its limit, where both are known', () =>
   assert.equal(detail({ measured: labelled('Rate', 5, 'Hz'), limit: labelled('Expected', 20, 'Hz') }), '5.0 Hz (expected 20.0 Hz)');
   assert.equal(detail({ measured: labelled('Slow', 3, ''), limit: labelled('Of', 5, '') }), '3 of 5');
   assert.equal(detail({ limit: quantity(3, 's') }), 'now');
-  assert.match(detail({ verdict: 'unknown', text: 'Speed is 4.2 s old' }) ?? '', /^Not checked now: Speed is 4.2 s old/);
+  assert.match(detail({ verdict: 'unknown', text: 'Speed is 4.2 s old' }) ?? '', /^Not checked now: speed is 4.2 s old/);
   assert.equal(detail({ state: 'RTN_UNACKED', active: false }), 'then');
 });
 
 test('states are named in the terms of ISA-18.2', () => {
   const state = (/** @type {any} */ more) => shown([alarm('a', more)])[0]?.state;
   assert.equal(state({}), 'unacknowledged');
-  assert.equal(state({ state: 'RTN_UNACKED', active: false }), 'returned unacknowledged');
+  assert.equal(state({ state: 'RTN_UNACKED', active: false }), 'ended, unacknowledged');
   assert.equal(state({ state: 'ACKED', acknowledged_by: 'Ann', active: false }), 'acknowledged by Ann');
   assert.match(state({ state: 'SHELVED', shelved_by: 'Ann', shelved_until_ms: 0 }) ?? '', /^shelved until \d\d:\d\d:\d\d by Ann$/);
 });

@@ -190,7 +190,7 @@ def check(name: str, label: str, **more: Any) -> Json:
     """The answer to a request for one check: OK, and nothing measured."""
     return {
         "id": name, "label": label, "tile": label,
-        "checks": [{"id": name, "label": label, "verdict": "ok", "text": ""}],
+        "checks": [{"id": name, "label": label, "verdict": "ok", "text": "", "priority": "warning"}],
         "verdict": "ok", "text": "OK", "for_s": 41.0, "measured": None, "limit": None,
         "checked_when": "Always checked.", "settings": [], "title": label, "priority": "warning",
         "delays": {"on_s": 0.3, "off_s": 2.0}, "ends": None, "advice": "",

@@ -16,7 +16,7 @@ def two_lasers() -> Json:
         {"value": REAR, "label": REAR, "why": "frame rear_laser, 20 Hz, no transform to the car"},
     ]
     return {
-        "signal": "scan", "kind": "source", "words": "Two lasers: which looks ahead?", "options": options,
+        "signal": "scan", "kind": "source", "words": "Two lasers: which one faces forward?", "options": options,
         "options_count": 2,
     }  # fmt: skip
 

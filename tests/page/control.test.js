@@ -37,6 +37,7 @@ test('the key of the control sheet names what it offers, or who is in control', 
 test('how many hear alarms', () => {
   assert.deepEqual(reachOf({ can: 2, of: 3, why: 'sound off', pages: [], left_out: 0 }), { text: 'Alarms audible on 2 of 3 operator pages', why: 'sound off', isBad: false });
   assert.equal(reachOf({ can: 1, of: 1, why: '', pages: [], left_out: 0 }).text, 'Alarms audible on 1 of 1 operator page');
+  assert.equal(reachOf(null).text, 'Alarms audible: not known');
   assert.equal(reachOf({ can: 0, of: 1, why: '', pages: [], left_out: 0 }).text, 'Nobody can hear alarms (1 operator)');
   assert.deepEqual(reachOf({ can: 0, of: 0, why: '', pages: [], left_out: 0 }), { text: 'Nobody can hear alarms (no operator)', why: '', isBad: true });
   assert.equal(reachOf(null).isBad, false);

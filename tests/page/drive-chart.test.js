@@ -170,6 +170,7 @@ test('the tag of the cursor stands beside it where it would cover the mark of an
   assert.equal(tagAt(200, [200, 240], sizes), 104, 'else at its left');
   assert.equal(tagAt(200, [147, 208], sizes), 220, 'and where both are taken, behind the mark that is nearer');
   assert.equal(tagAt(400, [400], sizes), 304, 'inside of the chart');
+  assert.equal(tagAt(200, [140, 216], sizes, [216]), 120, 'else a warning is covered, and no critical alarm');
   const everywhere = Array.from({ length: 32 }, (_, i) => 22 + 24 * i); // but for the right end
   const at = tagAt(200, everywhere, { ...sizes, right: 1010 });
   assert.ok(Math.max(at - 200, 200 - at - 84) <= 24, `among many marks it stays at its cursor, not at ${at}`);
@@ -178,5 +179,7 @@ test('the tag of the cursor stands beside it where it would cover the mark of an
 test('a flat plot has one number beside it, a higher one those at both ends', () => {
   assert.deepEqual(roomFor([0, 20], 25), [20]);
   assert.deepEqual(roomFor([0, 20], 60), [0, 20]);
-  assert.ok(marginOf({ height: 25 }) < marginOf({ height: 60 }));
+  assert.ok(marginOf(25) < marginOf(60));
+  // what has one tick is flat for its margins too
+  for (const height of [30, 39, 40, 41, 60]) assert.equal(marginOf(height) === marginOf(25), roomFor([0, 20], height).length === 1);
 });

@@ -49,7 +49,7 @@ test('a car that is off on purpose is in no count and sounds nothing, and shows 
   assert.deepEqual([lost?.name, lost && keysOf(lost), lost?.sound], ['a', 'Open,Silence,It is off', 'high']);
   assert.deepEqual([off?.isOff, off && keysOf(off), off?.sound, off?.since_s, off?.kind], [true, 'Not off', 'none', 60, '']);
   assert.match(off?.who.text ?? '', /^set by Ann at /);
-  const row = carRows(of, ['a'], false).find(({ name }) => name === 'b');
+  const row = carRows(of, ['a'], null).find(({ name }) => name === 'b');
   assert.deepEqual([row?.text, row?.kind, row?.isLost, row?.isAsking], ['Off on purpose', '', false, false]);
 });
 
@@ -61,7 +61,7 @@ test('what somebody acknowledged who is off duty needs an answer like what nobod
   const [first] = itemsOf(of);
   assert.equal(first?.name, 'b');
   assert.match(first?.detail ?? '', /^12\.6 m\/s, limit 11\.0 m\/s; acknowledged by A\. K\. \(Pixel\), off duty since \d\d:\d\d$/);
-  const rows = Object.fromEntries(carRows(of, ['b', 'a'], false).map(({ name, text }) => [name, text]));
+  const rows = Object.fromEntries(carRows(of, ['b', 'a'], null).map(({ name, text }) => [name, text]));
   assert.match(rows['b'] ?? '', /^.+ · owner off duty$/);
   assert.doesNotMatch(rows['a'] ?? '', /off duty/);
 });
@@ -94,7 +94,7 @@ test('an offer of mine can be withdrawn, and a car whose agent states no item is
 test('a car that never sent data is listed, and needs nobody', () => {
   const all = seen({ a: undefined, b: summary() });
   assert.deepEqual(itemsOf(all), []);
-  const rows = carRows(all, [], false);
+  const rows = carRows(all, [], null);
   assert.deepEqual(rows.map(({ name, text, kind, icon, isAsking }) => [name, text, kind, icon, isAsking]), [['a', 'No data yet', '', 'unknown', false], ['b', '–', '', 'ok', false]]);
   assert.equal(lineOf([], [], 0, rows).end, '1 of 2 not monitored');
 });
@@ -129,7 +129,7 @@ test('over ten cars with one cause are one item and one row, and unfold', () => 
   assert.deepEqual(shown.map(({ name, detail }) => `${name} ${detail}`), ['C07 12.6 m/s, limit 11.0 m/s', '31 cars C34 to C64']);
   const group = shown[1];
   assert.deepEqual([keysOf(group), group?.who.text, flood], ['Take all,Hand over,Show 31', 'unassigned', 31]);
-  const rows = carRows(all, items.map(({ name }) => name), false);
+  const rows = carRows(all, items.map(({ name }) => name), null);
   assert.equal(foldedRows(rows, folded, new Set()).length, 2);
   const open = new Set([/** @type {any} */ (group).key]);
   assert.equal(grouped(items, open).items.length, 33);
@@ -137,6 +137,14 @@ test('over ten cars with one cause are one item and one row, and unfold', () => 
   assert.equal(keysOf(grouped(items, open).items[1]), 'Take all,Hand over,Hide 31');
   assert.equal(headOf(items, shown.length), '32 in 2 groups · 32 unassigned');
   assert.equal(lineOf(items, shown, flood, rows).end, 'flood: 31');
+  const silent = seen(flooded(31));
+  for (const { summary: of } of silent.cars.cars) of.link.cut = 2;
+  const each = itemsOf(silent);
+  const { items: one, ...all31 } = grouped(each, new Set());
+  const line = lineOf(each, one, all31.flood, rows);
+  assert.equal(each[0]?.title, 'Speed above limit, car may move');
+  assert.equal(`${line.text} | ${line.end} ${line.more}`, '31 cars: Speed above limit, cars may move |  flood · 31 unassigned', 'the number is said once');
+  assert.equal(foldedRows(carRows(silent, each.map(({ name }) => name), null), all31.folded, new Set())[0]?.text, 'Speed above limit: C34 to C64');
 });
 
 test('in a flood a question to this page stays apart, old alarms do not count, and what I took is a group of mine', () => {
@@ -150,24 +158,26 @@ test('in a flood a question to this page stays apart, old alarms do not count, a
 });
 
 test('a row shows what is known, and nothing of before as if it were now', () => {
-  const [calm] = carRows(seen({ a: summary() }), [], false);
+  const [calm] = carRows(seen({ a: summary() }), [], null);
   assert.deepEqual([calm?.text, calm?.mode, calm?.operator, calm?.age, calm?.energy.text, calm?.isQuiet], ['–', 'driving', 'No one', '0.2', '64', true]);
   const standing = summary({ speed: { value_mps: 0.02, freshness: 'fresh', age_s: 0.1, horizon_s: 1 } });
-  assert.equal(carRows(seen({ a: standing }), [], false)[0]?.mode, 'standing');
-  const late = carRows(seen({ a: summary({ holder: 'Ann' }) }, { lag_s: 3.2 }), [], false)[0];
+  assert.equal(carRows(seen({ a: standing }), [], null)[0]?.mode, 'standing');
+  const late = carRows(seen({ a: summary({ holder: 'Ann' }) }, { lag_s: 3.2 }), [], null)[0];
   assert.deepEqual([late?.text, late?.mode, late?.speed.ink, late?.operator, late?.isLost, late?.energy.ink], ['No data', 'unknown', 'stale', 'Ann?', true, 'stale']);
-  assert.deepEqual(carRows(seen({ b: summary(), a: needy() }), [], true).map(({ name, text, mode }) => `${name} ${text} ${mode}`), ['a not known now unknown', 'b not known now unknown']);
-  assert.equal(carRows(seen({ a: needy({}, { state: 'ACKED' }) }), ['a'], false)[0]?.text, 'Speed above limit');
+  assert.deepEqual(carRows(seen({ b: summary(), a: needy() }), [], 'cars').map(({ name, text, mode }) => `${name} ${text} ${mode}`), ['a not known now unknown', 'b not known now unknown']);
+  const cuts = (/** @type {any} */ lost) => carRows(seen({ b: summary() }), [], lost).map(({ chain }) => chain.cut);
+  assert.deepEqual([cuts('cars'), cuts('server')], [[1], [0]], 'where the bar has it');
+  assert.equal(carRows(seen({ a: needy({}, { state: 'ACKED' }) }), ['a'], null)[0]?.text, 'Speed above limit');
 });
 
 test('rows stand in the order of the queue, then by name as people count', () => {
   const all = seen({ C10: summary(), C2: summary(), C1: needy(), C3: needy({ escalates_ms: NOW + 1000 }) });
-  assert.deepEqual(carRows(all, itemsOf(all).map(({ name }) => name), false).map(({ name }) => name), ['C3', 'C1', 'C2', 'C10']);
+  assert.deepEqual(carRows(all, itemsOf(all).map(({ name }) => name), null).map(({ name }) => name), ['C3', 'C1', 'C2', 'C10']);
   assert.ok(natural('C2', 'C10') < 0);
 });
 
 test('nothing needs a person is shown only of cars that are monitored', () => {
-  const line = (/** @type {any} */ cars) => lineOf([], [], 0, carRows(seen(cars), [], false));
+  const line = (/** @type {any} */ cars) => lineOf([], [], 0, carRows(seen(cars), [], null));
   assert.deepEqual([line({ a: summary() }).text, line({ a: summary() }).icon, line({ a: summary() }).end], ['Nothing needs a person', 'ok', '']);
   assert.deepEqual([line({ a: summary(), b: summary({ phase: 'idle' }) }).icon, line({ a: summary(), b: summary({ paused: true }) }).end], ['unknown', '1 of 2 not monitored']);
   assert.equal(line({}).text, 'No car is listed yet');
@@ -176,12 +186,12 @@ test('nothing needs a person is shown only of cars that are monitored', () => {
 test('each car has one place in the grid, named by its number where that tells it apart', () => {
   assert.deepEqual(labelsOf(['C01', 'C02']), ['01', '02']);
   assert.deepEqual(labelsOf(['Ocelot', 'C02']), ['Ocelot', 'C02']);
-  const rows = carRows(seen({ b: null, a: needy(), c: summary() }), ['a', 'b'], false);
+  const rows = carRows(seen({ b: null, a: needy(), c: summary() }), ['a', 'b'], null);
   assert.deepEqual(placesOf(rows).map(({ name, kind, title }) => `${name} ${kind} ${title}`), ['a crit a, Speed above limit', 'b lost b, no data', 'c  c, driving']);
-  const [known] = placesOf(carRows(seen({ a: summary({ worst: worst({ state: 'ACKED' }) }) }), [], false));
+  const [known] = placesOf(carRows(seen({ a: summary({ worst: worst({ state: 'ACKED' }) }) }), [], null));
   assert.deepEqual([known?.kind, known?.isKnown], ['crit', true], 'it stands, though it was acknowledged');
   assert.equal(placesOf(rows)[0]?.isKnown, false);
-  const cut = (/** @type {any} */ state) => placesOf(carRows(seen({ a: summary({ phase: 'lost', worst: worst({ state }) }) }), [], false)).map(({ kind, isKnown }) => [kind, isKnown])[0];
+  const cut = (/** @type {any} */ state) => placesOf(carRows(seen({ a: summary({ phase: 'lost', worst: worst({ state }) }) }), [], null)).map(({ kind, isKnown }) => [kind, isKnown])[0];
   assert.deepEqual([cut('UNACKED'), cut('ACKED')], [['lost', false], ['lost', true]], 'also of a car whose connection is lost');
 });
 

@@ -2,14 +2,14 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { heldWords } from '../../static/js/shell/connect-layout.js';
 import { filterParams, dayWords, eventWords, joined, lowest, standingRows, tookWords } from '../../static/js/alarms/log-layout.js';
-import { dialogWords, loadWords, snackWords, standingWords } from '../../static/js/alarms/standing.js';
+import { dialogWords, joinWords, loadWords, snackWords, standingWords } from '../../static/js/alarms/standing.js';
 
 const ALARM = /** @type {any} */ ({ active: true, text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
 const noon_ms = new Date(2026, 5, 1, 12, 0, 0).getTime();
 
 test('who acknowledged stands where the alarm stands', () => {
   assert.equal(standingWords(ALARM), '12.6 m/s · unacknowledged');
-  assert.equal(standingWords({ ...ALARM, active: false, state: 'RTN_UNACKED' }), '11.2 m/s · returned unacknowledged');
+  assert.equal(standingWords({ ...ALARM, active: false, state: 'RTN_UNACKED' }), '11.2 m/s · ended, unacknowledged');
   assert.equal(standingWords({ ...ALARM, state: 'ACKED', acknowledged_by: 'Pixel 7 · a3f2' }), '12.6 m/s · acknowledged by Pixel 7 · a3f2');
   assert.equal(standingWords({ ...ALARM, state: 'ACKED', text: '' }), '11.2 m/s · acknowledged');
   assert.equal(
@@ -20,16 +20,21 @@ test('who acknowledged stands where the alarm stands', () => {
 test('a snackbar never tells of what is over as if it stood', () => {
   assert.equal(snackWords({ ...ALARM, active: true }), '12.6 m/s');
   assert.equal(
-    snackWords({ ...ALARM, active: true, verdict: 'unknown', text: 'No link to the car' }), 'Not checked now: No link to the car. It was: 11.2 m/s',
+    snackWords({ ...ALARM, active: true, verdict: 'unknown', text: 'No link to the car' }), 'Not checked now: no link to the car. It was: 11.2 m/s',
   );
   assert.equal(snackWords({ ...ALARM, active: false, state: 'RTN_UNACKED' }), 'Returned to normal. It was: 11.2 m/s');
   assert.equal(snackWords({ ...ALARM, active: false, trip_text: '', title: 'GPS jump' }), 'Returned to normal.', 'its title stands above');
+  const ended = { ...ALARM, active: false, state: 'RTN_UNACKED', title: 'GPS drift', trip_text: 'GPS drift' };
+  assert.equal(snackWords(ended), 'Returned to normal.', 'it is named once');
+  assert.equal(snackWords({ ...ended, worst: { value: 6.3, unit: 'm', side: 'above' } }), 'Returned to normal. Highest 6.3 m.');
+  assert.equal(joinWords('Returned to normal.', 'planned stop'), 'Returned to normal · planned stop');
+  assert.equal(joinWords('Returned to normal. It was: 6.3 m', ''), 'Returned to normal. It was: 6.3 m');
 });
 
 test('what its check finds well is never the text of an alarm that stands', () => {
   const clearing = { ...ALARM, title: 'Phone position missing', verdict: 'ok', text: 'Position of the phone known to 5 m', trip_text: 'No GPS fix on this phone for 16 s' };
   assert.equal(snackWords(clearing), 'Returning to normal: Position of the phone known to 5 m. It was: No GPS fix on this phone for 16 s');
-  assert.equal(standingWords({ ...clearing, active: false, state: 'RTN_UNACKED' }), 'No GPS fix on this phone for 16 s · returned unacknowledged');
+  assert.equal(standingWords({ ...clearing, active: false, state: 'RTN_UNACKED' }), 'No GPS fix on this phone for 16 s · ended, unacknowledged');
 });
 
 test('too many alarms are shown in one line; what can be borne is a number only', () => {
@@ -98,7 +103,7 @@ test('a dialog tells with what it began, and never speaks in the present of what
   assert.match(dialogWords({ ...near, trip_text: 'GPS has no fix' }), / Began 12:00:00: GPS has no fix\./, 'an abbreviation');
   assert.match(dialogWords({ ...near, trip_text: 'Lidar error', causes: ['Lidar'] }), / Began 12:00:00: Lidar error\./, 'a name');
   const lost = { ...near, verdict: 'unknown', text: 'No link to the car.' };
-  assert.equal(dialogWords(lost), 'Not checked now: No link to the car. Active for 3.5 s. Began 12:00:00: 4.8 m. Brake.');
+  assert.equal(dialogWords(lost), 'Not checked now: no link to the car. Active for 3.5 s. Began 12:00:00: 4.8 m. Brake.');
   assert.equal(dialogWords({ ...lost, active: false }), 'It has returned to normal. Began 12:00:00: 4.8 m.', 'nothing is to be done about what has ended');
 });
 

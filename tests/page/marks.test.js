@@ -7,7 +7,7 @@ import { courseOf, linePath, xOf } from '../../static/js/drive/mark-plot.js';
 import { HELD_MS, PULL_PX, Press } from '../../static/js/drive/press.js';
 import { MOST_POINTS, scaled, smallerWords } from '../../static/js/drive/photo.js';
 import { rowsOf, storedWords } from '../../static/js/drive/mark-list.js';
-import { isForNow } from '../../static/js/drive/mark-server.js';
+import { isForNow, reasonOf } from '../../static/js/drive/mark-server.js';
 import { aboutWords, markAt } from '../../static/js/drive/recorded-marks.js';
 import { eventsOf, flagPath, markBeside } from '../../static/js/replay/replay-layout.js';
 import { cutWords, typeOf } from '../../static/js/drive/voice.js';
@@ -200,6 +200,7 @@ test('a photo that cannot be uploaded, or takes long, keeps no mark waiting', as
 
 test('a server without room refuses a photo, which is offered again', async () => {
   assert.ok(isForNow(503) && isForNow(429) && !isForNow(507) && !isForNow(413));
+  assert.deepEqual([[404, 'Not Found'], [413, null], [404, 'No such mark.']].map(([status, detail]) => reasonOf(Number(status), detail)), ['This server cannot store it (404).', 'The server refused it (413).', 'No such mark.']);
   const full = { ok: false, isLost: false, reason: 'The disk is full.' };
   const { it, kept, received, wait } = delivery((step) => (step === 'photo' ? full : OK));
   kept.set('a', mark('a', { photo: part() }));
@@ -279,6 +280,11 @@ test('rows say what was cut, moved or made smaller', () => {
   assert.match(headWords(cut), /^\d\d:\d\d:\d\d · control$/);
   assert.deepEqual(moreWords(cut), ['voice cut at 3.1 s: the page was hidden', 'moved by −1.5 s']);
   assert.equal(markedAt(cut), AT_MS - 1500);
+  const said = (/** @type {any} */ more) => { const one = mark('b', { voice: part({ length_s: 4 }), ...more }); return [headWords(one).slice(11), ...moreWords(one)]; };
+  assert.deepEqual(said({}), ['voice', '4.0 s'], 'what the head names is not named again');
+  assert.deepEqual(said({ category: 'control' }), ['control', 'voice 4.0 s']);
+  assert.deepEqual(said({ photo: part({ bytes: 2.1e6 }) }), ['voice', '4.0 s', 'photo 2.1 MB']);
+  assert.deepEqual(said({ voice: null, photo: part({ bytes: 2.1e6 }) }), ['photo', '2.1 MB']);
   assert.equal(cutWords('let go', 3), '');
   assert.equal(smallerWords(11.8e6, 2.1e6), 'photo 2.1 MB, made smaller from 11.8 MB');
   assert.equal(waitWords(3), '3 wait');

@@ -53,6 +53,29 @@ test('what requests a turn in its own turn has it, and one picture is requested 
   assert.equal(due.length, 0);
 });
 
+test('where pictures come seldom, one has all that waited for long, and no more than that', (context) => {
+  const { painter, picture } = studio();
+  let now_ms = 0;
+  context.mock.method(performance, 'now', () => now_ms);
+  /** @type {string[]} */
+  const drawn = [];
+  /** @type {(name: string) => () => void} */
+  const pane = (name) => () => {
+    drawn.push(name);
+    now_ms += 5;
+    if (name === 'tile') painter.inTurn(pane('late'));
+  };
+  for (const name of ['map', 'chart', 'brake', 'tile']) painter.inTurn(pane(name));
+  now_ms = 150;
+  picture();
+  assert.deepEqual(drawn, ['map'], 'a piece of each picture while they come soon');
+  now_ms = 320;
+  picture();
+  assert.deepEqual(drawn, ['map', 'chart', 'brake', 'tile']);
+  picture();
+  assert.deepEqual(drawn, ['map', 'chart', 'brake', 'tile', 'late']);
+});
+
 test('a second request before its turn waits once', () => {
   const { painter, picture } = studio();
   let times = 0;

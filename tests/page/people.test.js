@@ -6,6 +6,7 @@ import { test } from 'node:test';
 import { AddPerson } from '../../static/js/control/add-person.js';
 import { chipOf } from '../../static/js/control/control-layout.js';
 import { LeftNotice, dutyWords, initialsOf, partOf } from '../../static/js/control/duty-layout.js';
+import { SHAPES, shapeOf } from '../../static/js/drive/mode-text.js';
 import { endWords, leftLines, lineWords, markOf } from '../../static/js/control/handover-layout.js';
 import { lastWords } from '../../static/js/control/people-layout.js';
 import { requestItem, supervisorWords, unownedWords } from '../../static/js/shell/fleet-requests.js';
@@ -46,11 +47,14 @@ test('a hand-over concerns two pages, and opens once all is read', (t) => {
   assert.equal(endWords({ ...handover, left: 0 }, 'taker').isOpen, true);
   assert.equal(endWords({ ...handover, left: 0 }, 'giver').isOpen, false, 'who hands over cannot take it for them');
   const line = (/** @type {any} */ more) => /** @type {any} */ ({ key: 'k', kind: 'alarm', title: 'Speed', text: '12 m/s', priority: null, since_ms: null, until_ms: null, read: false, ...more });
-  assert.equal(lineWords(line({ since_ms: AT })), '12 m/s · since 13:58:00');
-  assert.equal(lineWords(line({ since_ms: AT, text: 'Acknowledged by Ann.' })), 'Acknowledged by Ann · since 13:58:00');
+  assert.equal(lineWords(line({ since_ms: AT })), '12 m/s · began 13:58:00');
+  assert.equal(lineWords(line({ since_ms: AT, text: 'Acknowledged by Ann.' })), 'Acknowledged by Ann · began 13:58:00');
   assert.equal(lineWords(line({ until_ms: AT, text: '' })), 'back at 13:58:00');
-  assert.equal(lineWords(line({ since_ms: AT, off_duty_ms: AT + 60_000 })), '12 m/s, off duty since 13:59 · active since 13:58:00');
+  assert.equal(lineWords(line({ since_ms: AT, off_duty_ms: AT + 60_000 })), '12 m/s, off duty since 13:59 · began 13:58:00');
   assert.deepEqual([line({ priority: 'critical' }), line({ priority: 'warning' }), line({ kind: 'shelved', priority: 'critical' })].map(markOf), ['crit', 'warn', 'bell-off']);
+  const driving = (/** @type {string} */ key) => shapeOf(line({ kind: 'driving', key }));
+  assert.deepEqual([driving('driving:autonomous:'), driving('driving:manual:'), driving('driving:unknown:silent'), shapeOf(line({}))], [SHAPES.autonomous, SHAPES.manual, '', ''], 'as in the ledge');
+  assert.equal(markOf(line({ kind: 'driving' })), 'unknown');
 });
 
 test('who signs on is shown what people who are off duty left acknowledged, and not what is theirs', () => {

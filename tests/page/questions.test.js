@@ -6,13 +6,13 @@ import { otherWords } from '../../static/js/home/signal-more.js';
 import { kindWords } from '../../static/js/home/signals.js';
 import { joinedChoices } from '../../static/js/replay/replay-layout.js';
 import { isOfMounting, lacksBumper } from '../../static/js/scan/scan-readout.js';
-import { answerOf, dealt, keyOf, mayAnswer, restWords, waitingWords } from '../../static/js/settings/question-layout.js';
+import { answerOf, dealt, keyOf, mayAnswer, meanwhileWords, restWords, waitingWords } from '../../static/js/settings/question-layout.js';
 import { pointsOf, reachOf, sketchedOf } from '../../static/js/settings/scan-sketch.js';
 import { changeLines, changeTo, DEFAULTS } from '../../static/js/settings/settings-layout.js';
 import { topicWords } from '../../static/js/settings/settings-topics.js';
 
 /** @returns {import('../../static/js/core/protocol-types.js').Question} */
-const question = (more = {}) => ({ signal: 'scan', kind: 'source', words: 'Two lasers: which looks ahead?', options: [{ value: '/a', label: '/a', why: '' }, { value: '/b', label: '/b', why: '' }], options_count: 2, ...more });
+const question = (more = {}) => ({ signal: 'scan', kind: 'source', words: 'Two lasers: which one faces forward?', options: [{ value: '/a', label: '/a', why: '' }, { value: '/b', label: '/b', why: '' }], options_count: 2, ...more });
 const brake = question({ signal: 'brake', kind: 'unit' });
 const none = { ink: /** @type {const} */ ('not_published'), age_s: null };
 
@@ -83,6 +83,12 @@ test('what else could carry a signal stands without the one that does, and not e
   assert.deepEqual(otherWords(null, '/a'), []);
   const many = otherWords(Array.from({ length: 500 }, (_, i) => ({ topic: `/t${i}`, type: 'T' })), '/t0');
   assert.deepEqual([many.length, many.at(-1)?.topic], [7, 'and 493 more']);
+});
+
+test('what holds meanwhile is a sentence', () => {
+  const words = (/** @type {any} */ kind, /** @type {string} */ label) => meanwhileWords(/** @type {any} */ ({ kind }), label);
+  assert.equal(words('source', 'Laser'), 'The laser is not used until one is chosen.');
+  assert.equal(words('unit', 'GPS fix'), 'The GPS fix is not used until its unit is known.');
 });
 
 test('the list of signals and Settings say that a source is not chosen', () => {

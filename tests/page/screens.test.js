@@ -116,7 +116,7 @@ test('recording and last values', () => {
   assert.equal(thenWords(state({ signals: { speed: { value: { speed_mps: 4.2 } }, distance: { value: { distance_m: 12.4 } } } })), '4.2 m/s, object at 12.4 m');
   assert.equal(thenWords(null), '');
   const title = (/** @type {any} */ view, /** @type {any} */ car_s) => titleOf({ age_s: 5, ...view }, car_s);
-  assert.equal(title({ state: 'Silent' }, null), 'Nothing received yet', 'no value is stale that never was');
+  assert.equal(title({ state: 'Silent' }, null), 'No values yet', 'no value is stale that never was');
   assert.deepEqual([title({ state: 'Silent' }, 5), title({ state: 'Lost' }, null), title({ state: 'Lost', age_s: null }, null), title({ state: 'Waking' }, 1)], ['Stale 5.0 s', 'Stale 5.0 s', 'Stale', 'Waking']);
   const known = { speed: { value: { speed_mps: 4.2 } } };
   const store = (/** @type {object} */ frame) => /** @type {any} */ ({ frame, signal: (/** @type {string} */ name) => state(frame).signals[name], ink: () => ({ age_s: 1 }), limit: () => 2 });

@@ -368,7 +368,7 @@ def at_a_planned_stop(state: dict[str, Any], **more: Any) -> dict[str, Any]:
     state["session"]["planned_stop"] = stop | more
     state["signals"]["speed"]["value"]["speed_mps"] = 0.0
     state["signals"]["acceleration"]["value"]["acceleration_mps2"] = 0.0
-    state["alarms"] = [alarm("GPS drift", "GPS drift", text="6.3 m of 2.0 m", sound="none", planned_stop=True)]
+    state["alarms"] = [alarm("GPS drift", "GPS drift", text="6.3 m, limit 2.0 m", sound="none", planned_stop=True)]
     return state
 
 
@@ -447,7 +447,7 @@ async def signals(server: Canned, page: Page) -> None:
 @scene("alarm-log")
 async def alarm_log(server: Canned, page: Page) -> None:
     state = live()
-    state["alarms"] = [alarm("GPS drift", "GPS drift", state="ACKED", text="6.3 m of 2.0 m")]
+    state["alarms"] = [alarm("GPS drift", "GPS drift", state="ACKED", text="6.3 m, limit 2.0 m")]
     server.state = state
     rows = (
         ("14:07:38", "cleared", "critical", "Speed above limit", "back under 10.5 m/s for 2 s", None),
@@ -715,8 +715,9 @@ async def unknown_check(server: Canned, page: Page) -> None:
     server.checks["GPS drift"] = check(
         "GPS drift", "GPS drift", verdict="unknown", text="The car moves", for_s=32.0,
         checked_when="Checked at standstill with a fix, once three positions have come since the car stopped.",
-        checks=[{"id": "GPS drift", "label": "GPS drift", "verdict": "unknown", "text": "The car moves"},
-                {"id": "gps_jump", "label": "GPS jump", "verdict": "ok", "text": "OK"}],
+        checks=[{"id": "GPS drift", "label": "GPS drift", "verdict": "unknown", "text": "The car moves",
+                 "priority": "warning"},
+                {"id": "gps_jump", "label": "GPS jump", "verdict": "ok", "text": "OK", "priority": "warning"}],
     )  # fmt: skip
     await page.wait_for_selector("[data-f=tiles] li")
     await page.tap("[data-f=tiles] li:nth-child(5) button")
@@ -820,7 +821,7 @@ async def map_stale(server: Canned, page: Page) -> None:
     server.state["signals"]["heading"] |= {"freshness": "stale", "age_s": 3.35}
     server.state["phone"] |= {
         "used": False, "why": "hidden",
-        "why_text": "The page on the phone is in the background, where it gets no position",
+        "why_text": "No position while the page is in the background on the phone",
         "age_s": 12.4,
     }  # fmt: skip
     server.state["checks"][5] |= {"verdict": "unknown", "brief": "not checked: hidden"}

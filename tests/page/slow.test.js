@@ -27,8 +27,8 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
     const { kind, title, why } = slideOf(seen(now, more));
     return `${kind}: ${title} ${why}`;
   };
-  assert.equal(label(slow('not_available', { why: 'No link to the car.' })), 'off: Slow-down off No link to the car');
-  assert.equal(label(slow('not_available', { why: 'The steering of this kind of car is not known, and a command would turn its wheels.' })), 'off: Slow-down off press for the reason');
+  assert.equal(label(slow('not_available', { why: 'No link to the car.' })), 'off: Not available No link to the car');
+  assert.equal(label(slow('not_available', { why: 'The steering of this kind of car is not known, and a command would turn its wheels.' })), 'off: Not available press for the reason');
   assert.equal(label(slow('not_armed')), 'off: Slow-down not armed press to arm');
   assert.equal(label(slow('not_armed'), { isViewer: true }), 'off: Slow-down not armed not for viewers');
   assert.equal(label(slow('armed'), { car: 'Ocelot', vehicle: 'Ocelot' }), 'armed: Slide to slow Ocelot');
@@ -46,7 +46,7 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
   assert.equal(label(ordered({ confirmed: false })), 'go: Use the physical stop');
   assert.equal(label(ordered({ sending: false })), 'go: Not sending to the car now');
   assert.equal(label(ordered({}, 'holding')), 'go: Holding at 0.0 m/s');
-  assert.equal(label(slow('something new', { why: null })), 'off: Slow-down off not available');
+  assert.equal(label(slow('something new', { why: null })), 'off: Not available not available');
 });
 
 test('one term of its state, never a comfortable one', () => {
@@ -81,6 +81,10 @@ test('the strip: what is checked while armed, the order above warnings, a critic
   assert.equal(strip({ decelerate: ordered(), alarms: [alarm({ state: 'ACKED' })] }).text, 'Speed above limit');
   assert.equal(strip({ decelerate: ordered(), session: { paused: true } }).kind, 'invert');
   assert.deepEqual([strip({ decelerate: ordered({ confirmed: false }) }).text, strip({ decelerate: ordered({ confirmed: false }) }).kind], [NOT_CONFIRMED, 'crit']);
+  const says = (/** @type {any} */ one) => [true, false].map((active) => strip({ decelerate: ordered({ confirmed: false }), alarms: [alarm({ active, ...one })] }).isUnconfirmed);
+  assert.deepEqual(says({ id: 'slow_down_unconfirmed', title: 'The car does not slow' }), [true, undefined], 'by the id of the alarm');
+  assert.equal(says({ id: 'speed_limit', title: 'NOT CONFIRMED' })[0], undefined, 'not by its text');
+  assert.equal(strip({ decelerate: ordered({ confirmed: false }), alarms: [warning] }).isUnconfirmed, true);
   assert.equal(stripWords(ordered({ confirmed: null }), 0)?.text, 'Slow-down ordered');
   assert.equal(stripWords(ordered({}, 'holding'), 0)?.end, '0.0 m/s ordered');
   assert.deepEqual([stripWords(ordered({ confirmed: null }, 'holding'), 0)?.text, stripWords(ordered({ confirmed: null, stands: 'before' }, 'holding'), 0)?.text], ['Slow-down ordered', 'The car stands']);

@@ -145,8 +145,8 @@ test('a refusal names no cut, and the later message names the direction', async 
     const { kind, reason, cut } = found.at(-1);
     return laterWords(kind, became === 'done' ? 'done' : 'never', reason, cut).text;
   };
-  assert.equal(lost('done'), '“Release” was carried out. Only its answer was lost: the link was cut in the direction back, between server and agent.');
-  assert.equal(lost('never'), '“Release” was lost on its way. It is not carried out any more. The link was cut in the direction to the car, between server and agent.');
+  assert.equal(lost('done'), '“Release the car” was carried out. Only its answer was lost: the link was cut in the direction back, between server and agent.');
+  assert.equal(lost('never'), '“Release the car” was lost on its way. It is not carried out any more. The link was cut in the direction to the car, between server and agent.');
 });
 
 test('an answer that is merely late is shown as late, and names the part that it names itself', async (t) => {

@@ -194,7 +194,7 @@ async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(p
     rows = phone.page.locator("[data-f=alarms] li")
     await expect(rows).to_have_count(4)
     await expect(rows.nth(0)).to_contain_text("Connection lost")
-    await expect(rows.nth(0)).to_contain_text("returned unacknowledged")
+    await expect(rows.nth(0)).to_contain_text("ended, unacknowledged")
     await expect(rows.nth(2)).to_contain_text("acknowledged by Ann")
     await expect(rows.nth(3)).to_contain_text("cause: Most signals are slow")
     await rows.nth(1).locator("[data-do=acknowledge]").tap()
@@ -261,6 +261,11 @@ async def test_the_empty_list_of_a_paused_car_does_not_say_that_there_are_no_ala
     await expect(none).to_have_text("No alarms.")
     returned.state["session"] |= {"paused": True, "paused_for_s": 42.1}
     await expect(none).to_have_text("Monitoring is paused: no alarm can be raised.")
+    note = phone.page.locator("[data-f=alarms-note]")
+    await expect(note).to_have_text("Paused: the alarms of the car are suppressed until Resume.")
+    returned.state["suppressed"] = []
+    await expect(none).to_be_visible()
+    await expect(note).to_be_empty()  # that it is paused is read once
 
 
 @pytest.mark.gate

@@ -31,8 +31,9 @@ def checked(canned: Canned) -> Canned:
     canned.checks["GPS drift"] = check(
         "GPS drift", "GPS drift", verdict="unknown", text="The car moves", for_s=32.0,
         checked_when="Checked at standstill with a fix.",
-        checks=[{"id": "GPS drift", "label": "GPS drift", "verdict": "unknown", "text": "The car moves"},
-                {"id": "gps_jump", "label": "GPS jump", "verdict": "ok", "text": "OK"}],
+        checks=[{"id": "GPS drift", "label": "GPS drift", "verdict": "unknown", "text": "The car moves",
+                 "priority": "warning"},
+                {"id": "gps_jump", "label": "GPS jump", "verdict": "ok", "text": "OK", "priority": "warning"}],
     )  # fmt: skip
     canned.checks |= {"gps_jump": check("gps_jump", "GPS jump"), "GPS fix": check("GPS fix", "GPS fix")}
     canned.state["checks"][4]["checks"].append("gps_jump")
@@ -57,7 +58,7 @@ async def test_one_tap_on_its_mark_says_why_it_is_not_checked_and_what_it_needs(
     assert box
     await phone.page.touchscreen.tap(box["x"] + 3, box["y"] + 10)
     await expect(phone.f("check-tag")).to_have_text("NOT CHECKED")
-    await expect(phone.f("check-sentence")).to_have_text("Not checked: The car moves.")
+    await expect(phone.f("check-sentence")).to_have_text("Not checked: the car moves.")
     await expect(phone.f("check-needs")).to_have_text("Checked at standstill with a fix.")
     await expect(phone.f("check-figures")).to_contain_text("Not checked for32.0s")
     await expect(phone.f("check-place")).to_have_text("5 of 14")
@@ -68,6 +69,27 @@ async def test_one_tap_on_its_mark_says_why_it_is_not_checked_and_what_it_needs(
     await phone.f("close").tap()
     await expect(phone.page.locator(".check-view")).to_have_count(0)
     await expect(phone.page.locator(".gauge .speed")).to_be_visible()
+
+
+@pytest.mark.world(n=18)
+async def test_each_check_of_a_tile_has_the_icon_of_its_own_priority(phone: Phone, checked: Canned) -> None:
+    """A critical one is no triangle."""
+    rows = [("GPS drift", "GPS drift", "fault", "critical"), ("gps_jump", "GPS jump", "fault", "warning"),
+            ("standing", "Standing", "ok", "warning")]  # fmt: skip
+    checked.checks["GPS drift"]["checks"] = [
+        {"id": id, "label": label, "verdict": verdict, "text": "", "priority": priority}
+        for id, label, verdict, priority in rows
+    ]
+    await phone.open(checked.address)
+    await phone.live()
+    await phone.page.locator("[data-f=marks] > span").nth(5).scroll_into_view_if_needed()
+    box = await phone.page.locator("[data-f=marks] > span").nth(5).bounding_box()
+    assert box
+    await phone.page.touchscreen.tap(box["x"] + 3, box["y"] + 10)
+    icons = phone.page.locator(".others button .i use")
+    await expect(icons).to_have_count(3)
+    shown = [(await icons.nth(at).get_attribute("href") or "").rpartition("#")[2] for at in range(3)]
+    assert shown == ["i-crit", "i-warn", "i-ok"]
 
 
 @pytest.mark.gate
@@ -92,7 +114,10 @@ async def test_an_alarm_opens_with_its_numbers_its_history_and_a_threshold_to_ch
     await expect(phone.f("check-history")).to_contain_text("highest 11.9 m/s, acknowledged by Desk 1 after 1.1 s")
     await story.locator("[data-do=acknowledge]").tap()
     await expect(phone.page.locator(".check-thresholds")).to_contain_text("ends below 10.5 m/s after 2 s")
+    title = phone.page.locator(".check-thresholds > .row b")
+    await expect(title).to_have_text("Speed limit")
     await phone.f("check-change").tap()
+    await expect(title).to_have_text("Thresholds")  # the row beneath has its own name
     number = phone.page.locator("#set-speed_limit-max_mps")
     await expect(number).to_be_focused()
     await number.fill("13")

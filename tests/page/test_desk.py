@@ -65,7 +65,7 @@ async def test_a_critical_alarm_in_its_pane_is_read_from_afar_and_its_keys_stand
     assert found["isWhole"], found
     assert found["isClear"], found
     assert found["isInOrder"], found
-    assert found["rows"] >= (45 if width == 1180 else 64), "a row of the list"
+    assert found["rows"] >= (128 if width == 1180 else 64), "a row of the list, two on a tablet on its side"
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)
@@ -110,7 +110,8 @@ async def test_keys_of_alarms_stand_within_the_margin_of_their_pane(
         const range = document.createRange();
         range.selectNodeContents(key);
         const [text, edge] = [range, key].map((one) => one.getBoundingClientRect());
-        return text.width && (text.left < edge.left + 4 || text.right > edge.right - 4);
+        return text.width && (text.left < edge.left + 4 || text.right > edge.right - 4
+          || (innerWidth >= 1200 && (text.top < edge.top + 3 || text.bottom > edge.bottom - 3)));
       });
       return {
         over: Math.max(...keys.map(right)) - (foot.right - parseFloat(style.paddingRight)),
@@ -267,3 +268,56 @@ async def test_a_fresh_mark_on_a_tablet_covers_the_last_row_alone(phone: Phone, 
     }""")
     assert found[0] >= -3
     assert found[1] <= 1
+
+
+@pytest.mark.parametrize(("width", "height", "least"), [(1920, 1080, 0), (2560, 1440, 3)])
+async def test_above_a_fresh_mark_on_the_widest_screens_the_rows_of_signals_are_whole(
+    phone: Phone, canned: Canned, width: int, height: int, least: int
+) -> None:
+    """Those that it does not cover: the stale ones are the first."""
+    await ready(phone, canned, "mark-fresh", width, height)
+    await expect(phone.page.locator(".fresh")).to_be_visible()
+    await phone.page.wait_for_function(
+        """(least) => {
+          const end = document.querySelector('.fresh').getBoundingClientRect().top;
+          const rows = [...document.querySelectorAll('[data-pane=signals] :is(.ph, li)')];
+          const seen = rows.filter((one) => one.checkVisibility({ visibilityProperty: true }));
+          const tops = seen.filter((one) => one.getBoundingClientRect().top < end);
+          return seen.length > least - 1 && seen.length === tops.length
+            && seen.every((one) => one.getBoundingClientRect().bottom <= end + 0.5);
+        }""",
+        arg=least,
+    )
+
+
+async def test_the_widest_screens_list_three_people_and_say_how_many_of_more(phone: Phone, canned: Canned) -> None:
+    await ready(phone, canned, "home-people", 1920, 1080)
+    await expect(phone.page.locator("[data-f=pane-people] > li")).to_have_count(3)
+    await expect(phone.page.locator("[data-f=head-people]")).to_have_text("3 pages, alarms audible on 2")
+    assert canned.state
+    pages = canned.state["reach"]["pages"]
+    canned.state["reach"]["pages"] = [*pages, pages[0] | {"page": "d", "name": "Desk 9"}]
+    await expect(phone.page.locator("[data-f=head-people]")).to_have_text("4 pages, alarms audible on 2, 3 shown")
+
+
+async def test_a_desk_lists_all_signals(phone: Phone, canned: Canned) -> None:
+    await ready(phone, canned, "signals", 1440, 900)
+    rows = phone.page.locator(".sig:not(.h)")
+    await expect(rows.last).to_be_visible()
+    last, view = await rows.last.bounding_box(), await phone.page.locator("#monitor > .view").bounding_box()
+    assert last
+    assert view
+    assert last["y"] + last["height"] <= view["y"] + view["height"]
+
+
+@pytest.mark.parametrize(("width", "height"), [(820, 1180), (1440, 900)])
+async def test_the_drawer_of_the_settings_has_a_title_and_is_closed(
+    phone: Phone, canned: Canned, width: int, height: int
+) -> None:
+    page = phone.page
+    await ready(phone, canned, "settings", width, height)
+    drawer = page.locator("#panel-settings")
+    await expect(drawer.get_by_role("heading", name="Settings", exact=True)).to_be_visible()
+    await drawer.get_by_role("button", name="Close settings").click()
+    await expect(drawer).to_be_hidden()
+    await expect(page.locator("[data-tab=home]")).to_have_attribute("aria-selected", "true")

@@ -281,6 +281,7 @@ async def test_the_ways_to_it_and_back(phone: Phone, canned: Canned) -> None:
     await phone.f("who").evaluate("chip => chip.click()")
     await phone.page.locator("[data-f=cars-fleet]").click()
     await phone.page.wait_for_url("**/fleet")
+    await expect(phone.page.locator("[data-f=way-car] use")).to_have_attribute("href", "#i-home")
     await phone.page.locator("[data-f=way-car]").click()
     await phone.page.wait_for_url(f"{canned.address}/#*")
     canned.access = "paired"

@@ -6,6 +6,7 @@ import itertools
 import re
 from typing import Any
 
+import pytest
 from playwright.async_api import expect
 
 from tests.page import canned_fleet as fleet
@@ -100,6 +101,10 @@ async def test_in_signals_an_old_age_has_its_word_and_covers_nothing(phone: Phon
     await phone.page.evaluate("dispatchEvent(new CustomEvent('catgraph-open', { detail: { screen: 'signals' } }))")
     row = phone.page.locator(".sigs .sig", has_text="Diagnostics")
     await expect(row.locator("[data-age=stale]")).to_have_text(re.compile(r"^STALE \d+\.\d$"))
+    first = "() => document.elementFromPoint(99, document.querySelector('.sigs').getBoundingClientRect().top + 9)"
+    assert await phone.page.evaluate(f"({first})().closest('.sig').textContent.startsWith('Diagnostics')")
+    sizes = await row.locator(".n").evaluate_all("(all) => all.map((one) => getComputedStyle(one).fontSize)")
+    assert set(sizes) == {"18px"}, "the age is as large as the other values"
     sizes = [
         await phone.page.locator(one).first.evaluate("(one) => parseFloat(getComputedStyle(one).fontSize)")
         for one in (".sigs [data-age=stale]", ".sigs .sig small")
@@ -108,17 +113,20 @@ async def test_in_signals_an_old_age_has_its_word_and_covers_nothing(phone: Phon
     await expect(row.locator("> :nth-child(3)")).to_be_empty()
 
 
-async def test_above_the_sheet_of_a_lost_connection_a_phone_shows_what_was_last_known(
-    phone: Phone, canned: Canned
+@pytest.mark.parametrize("width", [412, 820])
+async def test_what_was_last_known_is_read_once_over_a_lost_connection(
+    phone: Phone, canned: Canned, width: int
 ) -> None:
-    await phone.page.set_viewport_size({"width": 412, "height": 915})
+    """On a phone in the sheet, whose sentence is there at every height; on a tablet on the plate too."""
+    await phone.page.set_viewport_size({"width": width, "height": 915})
     await phone.open(f"{canned.address}/#home")
     await phone.live()
     await link_lost(canned, phone.page)
     await expect(phone.page.locator("#sheet-lost")).to_have_attribute("open", "")
     then = phone.f("veil-then")
-    await expect(then).to_be_visible()
+    await expect(phone.page.locator("#sheet-lost")).to_contain_text("4.2 m/s, object at 12.4 m")
     await expect(then).to_contain_text("4.2 m/s, object at 12.4 m")
+    await expect(then).to_be_visible(visible=width == 820)
     last, sheet = [await one.bounding_box() for one in (phone.f("veil-rec"), phone.page.locator("#sheet-lost"))]
     assert last is not None
     assert sheet is not None

@@ -181,6 +181,14 @@ OVER_TRENDS = """() => {
 }"""
 
 
+#: Keeps how many notices there are at the moment when the window has become a floor.
+COUNTED = """() => {
+  matchMedia('(width >= 62.5em) and (height >= 37.5em)').addEventListener('change', () => {
+    window.counted = document.querySelectorAll('.snacks > .snack:not([hidden])').length;
+  });
+}"""
+
+
 @pytest.mark.gate
 async def test_on_a_low_wall_the_notices_lie_under_the_trends(phone: Phone, canned: Canned) -> None:
     several(canned)
@@ -190,6 +198,17 @@ async def test_on_a_low_wall_the_notices_lie_under_the_trends(phone: Phone, cann
         await page.set_viewport_size({"width": width, "height": height})
         await page.evaluate(DRAWN)
         assert await page.evaluate(OVER_TRENDS) == [0, 3], (width, height)
+
+
+async def test_a_window_made_larger_has_a_warning_once(phone: Phone, canned: Canned) -> None:
+    several(canned)
+    page = await opened(phone, canned)
+    await noticed(page, canned)
+    await expect(page.locator(".snacks > [data-f=warning]")).not_to_have_attribute("hidden", "")
+    await page.evaluate(COUNTED)
+    await page.set_viewport_size({"width": 1800, "height": 860})
+    await page.wait_for_function("() => 'counted' in window")
+    assert await page.evaluate("counted") == 3
 
 
 #: A slow-down as it stands beside a warning.
@@ -498,7 +517,8 @@ SHEETS = {
     "sheet-this-phone": "#sheet-menu [data-f=this-phone]",
     "sheet-duty": "#sheet-menu [data-f=duty]",
 }
-#: Of the head of the open sheet: what it shows, and how far it lies from the strip and the rail [px].
+#: Of the head of the open sheet: what it shows, and whether the sheet covers the strip, the rail or the bar.
+#: On an upright phone the strip right above the head names the worst alarm; anywhere else the head does.
 HEAD = """() => {
   const box = (selector) => document.querySelector(selector).getBoundingClientRect();
   const sheet = document.querySelector('.view > dialog[open]');
@@ -506,11 +526,14 @@ HEAD = """() => {
   const head = sheet.querySelector('.sheet-head');
   const [strip, rail, speed] = ['strip', 'rail'].map((one) => box(`#monitor > .${one}`)).concat(box('.gauge .speed'));
   const covers = (a, b) => a.left < b.right - 1 && a.right > b.left + 1 && a.top < b.bottom - 1 && a.bottom > b.top + 1;
+  const isUpright = innerWidth < 700 && innerHeight > 520;
+  const named = isUpright ? document.querySelector('#monitor > .strip') : head;
   return {
     strip: covers(at, strip), rail: covers(at, rail), bar: covers(at, box('#monitor > .top')),
     isModal: sheet.matches(':modal'),
     isCarShown: head.checkVisibility()
-      ? [/4\\.2\\s*m\\/s/, /\\d s/, /Phone position missing/].every((one) => one.test(head.innerText))
+      ? [/4\\.2\\s*m\\/s/, /\\d s/].every((one) => one.test(head.innerText))
+        && /Phone position missing/.test(named.innerText)
       : speed.height > 12 && !covers(at, speed),
     isSeen: at.top >= 0 && at.bottom <= innerHeight && at.height > 60,
   };

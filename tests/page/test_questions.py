@@ -43,10 +43,10 @@ async def test_two_lasers_are_answered_in_two_taps(phone: Phone, canned: Canned)
     ask(canned, two_lasers())
     await home(phone, canned)
     card = phone.page.locator(CARD)
-    await expect(card).to_contain_text("Two lasers: which looks ahead?")
+    await expect(card).to_contain_text("Two lasers: which one faces forward?")
     await phone.f("question-open").tap()
     sheet = phone.page.locator("#sheet-question[open]")
-    await expect(sheet.locator("h2")).to_have_text("Two lasers: which looks ahead?")
+    await expect(sheet.locator("h2")).to_have_text("Two lasers: which one faces forward?")
     option = sheet.locator(f'[data-value="{FRONT}"]')
     await expect(option).to_contain_text("frame front_laser")
     await option.tap()
@@ -113,7 +113,7 @@ async def test_who_is_not_in_control_reads_the_question_and_cannot_answer(phone:
     canned.state["control"] = {"holder": "Pixel 8", "page": "another", "fence": 1}
     await home(phone, canned)
     await expect(phone.f("question-others")).to_have_text(
-        "Two lasers: which looks ahead? The operator in control answers."
+        "Two lasers: which one faces forward? The operator in control answers."
     )
     await expect(phone.page.locator(CARD)).to_be_hidden()
     canned.state["control"] = {"holder": "You"}
@@ -155,7 +155,7 @@ async def test_what_is_not_chosen_says_so_on_home_scan_and_signals(phone: Phone,
     await expect(phone.page.locator(".gauge .note")).to_have_text("not chosen")
     await expect(phone.page.locator(".near [data-f=none]")).to_have_text("not chosen")
     await phone.show("scan")
-    await expect(phone.f("none-words", "#panel-scan")).to_have_text("not chosen")
+    await expect(phone.f("none-words", "#panel-scan")).to_have_text("laser not chosen")
     await phone.f("none-words", "#panel-scan").tap()  # what stands behind it
     row = phone.page.locator('.sigs .sig[aria-expanded="true"]')
     await expect(row).to_contain_text("Laser")

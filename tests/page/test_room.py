@@ -26,6 +26,11 @@ ROOM = {
         "() => ['.strip', '.sheet-head .worst'].filter((one) => document.querySelector(one).checkVisibility()).length"
         " === 1",
     ),
+    "an alarm is named once above a sheet": (
+        "left", 412, 915,
+        "() => ['.strip', '.sheet-head .worst'].filter((one) => document.querySelector(one).checkVisibility()).length"
+        " === 1",
+    ),
     "two actions of a recording are in sight, beside what it is": (
         "files-menu", 740, 360,
         f"() => {{ {RECT} return at('[data-f=file-actions] li:nth-child(2)').bottom <= at('#monitor > .rail').top"

@@ -13,6 +13,20 @@ from tests.page.screenshots import COMPLETE, show
 from tests.page.test_on_its_side import DRAWN, SEEN
 
 SIZES = [(740, 360), (640, 360), (844, 390), (480, 320)]
+#: What of the nearest object is not whole between the lines under the strip and the open dialog.
+NEAREST = """() => {
+  const bounds = (name) => document.querySelector(name).getBoundingClientRect();
+  const [top, bottom] = [bounds('#monitor > .view').top, bounds('dialog[open]').top];
+  const near = document.querySelector('#panel-home [data-part=nearest]');
+  const parts = ['distance', 'gap', 'stops', 'age'].map((name) => near.querySelector(`[data-f=${name}]`));
+  return parts.filter((one) => {
+    const box = one.getBoundingClientRect();
+    const isCut = !one.matches('button') && one.scrollWidth > one.clientWidth + 1;
+    const isShown = one.checkVisibility({ visibilityProperty: true });
+    const isOut = box.top < top - 1 || box.bottom > bottom || box.right > innerWidth;
+    return isCut || isOut || !isShown || near.offsetHeight < 38;
+  }).map((one) => one.dataset.f);
+}"""
 #: What the open dialog covers in part.
 CUT = """() => {
   const sheet = document.querySelector('dialog[open]').getBoundingClientRect();
@@ -75,6 +89,14 @@ EDGES = """() => {
   const [pair, slide] = ['.pair', '.slide'].map((name) => document.querySelector(`#monitor > .rail > ${name}`));
   return [pair.getBoundingClientRect().left, innerWidth - slide.getBoundingClientRect().right];
 }"""
+#: How far under the lower edge of the notice the pedals begin [px].
+UNDER = """() => document.querySelector('#panel-home [data-part=pedals]').getBoundingClientRect().top
+  - document.querySelector('.snack:not([hidden])').getBoundingClientRect().bottom"""
+#: Where the keys of the rail begin and end, and where its slide begins.
+RAIL = """() => {
+  const [pair, slide] = ['.pair', '.slide'].map((name) => document.querySelector(`#monitor > .rail > ${name}`));
+  return [pair.getBoundingClientRect().left, pair.getBoundingClientRect().right, slide.getBoundingClientRect().left];
+}"""
 #: What of the bar and of the first two items of a fleet is cut.
 SHORT = """() => {
   const lines = (one) => {
@@ -127,6 +149,28 @@ async def test_no_key_at_the_foot_touches_the_frame(phone: Phone, canned: Canned
     for size in SIZES:
         await opened(phone, canned, scene, size)
         assert await phone.page.evaluate(GAP) >= 3.9, size
+
+
+@pytest.mark.parametrize("scene", ["home-fault", "slow-down-in-dialog", "planned-stop-critical"])
+async def test_the_nearest_object_is_above_a_critical_alarm(phone: Phone, canned: Canned, scene: str) -> None:
+    found: dict[str, Any] = {}
+    for size in ((740, 360), (915, 412), (667, 375), (640, 360)):
+        if scene == "planned-stop-critical" and size[0] < 700:
+            continue  # the line of the planned stop has its room
+        await opened(phone, canned, scene, size)
+        await phone.page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
+        await phone.page.evaluate(DRAWN)
+        missing, gap = await phone.page.evaluate(NEAREST), await phone.page.evaluate(GAP)
+        if missing or gap < 3.9:
+            found[str(size)] = missing, gap
+    assert found == {}
+
+
+async def test_what_a_critical_alarm_would_cut_of_the_nearest_object_is_not_shown(phone: Phone, canned: Canned) -> None:
+    await opened(phone, canned, "planned-stop-critical", (700, 320))
+    await phone.page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
+    await phone.page.evaluate(DRAWN)
+    assert await phone.page.evaluate("document.querySelector('#panel-home [data-part=nearest]').offsetHeight") == 0
 
 
 async def test_nothing_is_left_of_the_divider_above_a_critical_alarm(phone: Phone, canned: Canned) -> None:
@@ -224,6 +268,46 @@ async def test_no_number_of_a_plot_is_printed_over_another(phone: Phone, canned:
         await page.wait_for_timeout(600)
         assert await page.evaluate("() => Math.max(...[...window.written.values()].map((one) => one.length))") > 0
         assert await page.evaluate(PRINTED) == [], (width, height)
+
+
+async def test_a_notice_leaves_no_part_of_the_pedals(phone: Phone, canned: Canned) -> None:
+    for size in ((740, 360), (915, 412), (700, 320)):
+        for scene in ("home-warning", "planned-stop-returned"):
+            await opened(phone, canned, scene, size)
+            await phone.page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
+            await phone.page.evaluate(DRAWN)
+            assert await phone.page.evaluate(UNDER) >= 1, (scene, size)
+
+
+async def test_a_page_has_no_hole_where_the_mark_key_is_on_others(phone: Phone, canned: Canned) -> None:
+    for size in ((740, 360), (640, 360)):
+        await opened(phone, canned, "map", size)
+        _, _, slide = await phone.page.evaluate(RAIL)
+        for scene in ("check-unknown", "files", "settings"):
+            await opened(phone, canned, scene, size)
+            await phone.page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
+            await expect(phone.page.locator("#monitor > .ledge")).to_be_hidden()
+            left, right, here = await phone.page.evaluate(RAIL)
+            assert (left, right, here) == (16, slide - 12, slide), (scene, size)
+
+
+async def test_no_rule_stands_just_above_that_of_the_rail(phone: Phone, canned: Canned) -> None:
+    await opened(phone, canned, "check-unknown", (740, 360))
+    await expect(phone.page.locator(".check-body > .three")).to_be_visible()
+    await phone.page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
+    above = await phone.page.evaluate(
+        "() => document.querySelector('#monitor > .rail').getBoundingClientRect().top"
+        " - document.querySelector('.check-body > .three').getBoundingClientRect().bottom"
+    )
+    assert above < 0 or above > 24
+
+
+async def test_the_field_that_is_changed_is_in_sight(phone: Phone, canned: Canned) -> None:
+    await opened(phone, canned, "check-change", (740, 360))
+    await expect(phone.page.locator(".check-rows input:focus")).to_be_visible()
+    await phone.page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
+    seen = await phone.page.evaluate(SEEN, ".check-rows input:focus")
+    assert seen["whole"] == 1
 
 
 async def test_the_rail_of_a_page_begins_at_the_margin(phone: Phone, canned: Canned) -> None:

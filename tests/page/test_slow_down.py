@@ -302,7 +302,7 @@ async def test_the_car_is_released_only_once_that_is_confirmed(thumb: Thumb, car
     car.state["decelerate"] = slowed(number=4)  # another order: the request is not about it
     await expect(sheet).to_be_hidden()
     await thumb.phone.f("release").tap()
-    await sheet.get_by_role("button", name="Release the car").tap()
+    await sheet.get_by_role("button", name="Release now").tap()
     assert (await until_received(thumb, car, "release"))["number"] == 4
     car.state["decelerate"] = slow("armed")
     await expect(thumb.phone.f("stop")).to_be_visible()
@@ -365,6 +365,21 @@ async def test_an_order_that_the_car_does_not_follow_is_on_every_tab(thumb: Thum
 
 
 @pytest.mark.gate
+async def test_beside_a_title_that_says_not_confirmed_the_state_is_ordered(thumb: Thumb, car: Canned) -> None:
+    car.state["decelerate"] = slowed(False)
+    title = "The car does not slow"  # told by its id, whatever its title
+    car.state["alarms"] = [
+        alarm("slow_down_unconfirmed", title, priority="critical", place="dialog", sound="high", text="4.2 m/s")
+    ]
+    state = thumb.phone.f("legend-car", "#sheet-alarm")
+    await expect(state).to_have_text("slow-down: ordered")
+    await expect(state).to_have_attribute("data-state", "ordered")
+    await expect(thumb.phone.f("legend-car")).to_have_text("slow-down: not confirmed")
+    car.state["alarms"][0] |= {"id": "speed_limit", "title": "NOT CONFIRMED"}
+    await expect(state).to_have_text("slow-down: not confirmed")
+
+
+@pytest.mark.gate
 async def test_a_viewer_sees_all_of_it_and_orders_nothing(browser: Browser, car: Canned) -> None:
     car.role = "viewer"
     context = await browser.new_context(**PHONE)
@@ -394,6 +409,7 @@ async def test_when_the_server_falls_silent_nothing_is_armed_any_more(thumb: Thu
     await expect(thumb.slide()).to_contain_text("State unknown")
     await expect(thumb.slide()).to_contain_text("no answer")
     await expect(thumb.phone.f("legend-car")).to_have_text("slow-down: not known")
+    await expect(thumb.phone.f("legend-left")).to_have_text("no answer")  # Stop and Pause reach nobody
     car.silent = False
     await expect(thumb.slide()).to_have_attribute("data-kind", "armed")
 

@@ -195,3 +195,67 @@ async def test_filter_and_search_of_the_alarm_log_are_of_one_height(phone: Phone
         assert kinds is not None
         assert field is not None
         assert (kinds["y"], kinds["height"]) == (field["y"], field["height"])
+
+
+@pytest.mark.parametrize("scene", ["files", "connect-saved"])
+async def test_the_recordings_of_a_tablet_are_whole_rows_of_one_height(
+    phone: Phone, canned: Canned, scene: str
+) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 820, "height": 1180})
+    await show(canned, page, scene)
+    await expect(page.locator(".file-dock [data-f=file-actions] > li").last).to_be_visible()
+    found = await page.evaluate("""() => {
+      const box = (one) => one.getBoundingClientRect();
+      const all = (names) => [...document.querySelectorAll(names)].filter((one) => one.checkVisibility());
+      const heights = (names) => [...new Set(all(names).map((one) => Math.round(box(one).height)))];
+      const edge = box(document.querySelector('.file-dock')).top;
+      const cut = all('.files .file, .files-foot > .key').map(box).filter((one) => one.top < edge && one.bottom > edge);
+      return {
+        cut: cut.length,
+        rows: heights('.files .list .file'),
+        keys: heights('.file-dock [data-f=file-actions] > li'),
+        none: getComputedStyle(document.querySelector('.files .list .thumb.none'), '::before').content,
+      };
+    }""")
+    assert found["cut"] == 0
+    assert len(found["rows"]) == 1
+    assert len(found["keys"]) == 1
+    assert "–" in found["none"], "a track that is not known is a dash"
+
+
+async def test_the_list_of_cars_of_a_tablet_has_its_key_in_sight(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 820, "height": 1180})
+    await show(canned, page, "cars")
+    await page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
+    await expect(page.locator(".ledge > .mark-key")).to_be_visible()
+    found = await page.evaluate("""() => {
+      const sheet = document.querySelector('#sheet-cars').getBoundingClientRect();
+      const key = document.querySelector('#sheet-cars [data-f=cars-control]');
+      const [icon, text] = [key.querySelector('.i'), key.lastElementChild].map((one) => {
+        const range = document.createRange();
+        range.selectNodeContents(one);
+        return (one.matches('.i') ? one : range).getBoundingClientRect();
+      });
+      return [sheet.bottom - key.getBoundingClientRect().bottom, text.left - icon.right];
+    }""")
+    assert found[0] >= 0, "whole"
+    assert found[1] <= 16, "the icon stands beside its text"
+
+
+@pytest.mark.parametrize(("width", "height"), [(820, 1180), (1440, 900)])
+async def test_addresses_used_before_drop_down_from_their_field(
+    phone: Phone, canned: Canned, width: int, height: int
+) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": width, "height": height})
+    await show(canned, page, "connect-recent")
+    await page.wait_for_function("() => document.querySelector(\"link[href*='drawers']\")?.sheet")
+    await page.wait_for_function(RISEN)
+    field, sheet = [await page.locator(one).bounding_box() for one in (".field:has(#address)", "#sheet-history")]
+    assert field
+    assert sheet
+    assert abs(sheet["y"] - field["y"] - field["height"]) <= 4
+    assert abs(sheet["x"] - field["x"]) <= 1
+    assert abs(sheet["width"] - field["width"]) <= 1

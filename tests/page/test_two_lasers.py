@@ -26,7 +26,9 @@ def pallet_ahead() -> Path:
 
 async def choose_front(page: Page) -> None:
     """Two presses."""
-    await expect(page.locator(".questions .card")).to_contain_text("Two lasers: which looks ahead?", timeout=OPENS_MS)
+    await expect(page.locator(".questions .card")).to_contain_text(
+        "Two lasers: which one faces forward?", timeout=OPENS_MS
+    )
     await expect(page.locator(".questions .card")).not_to_have_attribute("data-moved", "")
     await page.locator("[data-f=question-open]").click()
     option = page.locator(f'#sheet-question [data-value="{FRONT}"]')

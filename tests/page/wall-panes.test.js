@@ -9,12 +9,12 @@ import { Lines, peopleLines, signalLines } from '../../static/js/shell/wall-pane
 const signal = (/** @type {string} */ label, /** @type {string} */ freshness, more = {}) => ({ label, freshness, rate_hz: 20, age_s: 0.04, ...more });
 const person = (/** @type {string} */ page, /** @type {string} */ name, more = {}) => ({ page, name, can: true, why_text: null, heard_s: 0.1, ...more });
 
-test('signals that are not fresh are listed first; those nobody publishes are not', () => {
+test('signals that are stale or absent are listed first, then ageing ones; those nobody publishes are not', () => {
   const lines = signalLines(/** @type {any} */ ({
-    speed: signal('Speed', 'fresh'), fuel: signal('Fuel', 'not_published'), scan: signal('Laser', 'stale', { rate_hz: 0, age_s: 7.35 }),
+    speed: signal('Speed', 'fresh'), odometry: signal('Odometry', 'ageing', { age_s: 0.34 }), fuel: signal('Fuel', 'not_published'), scan: signal('Laser', 'stale', { rate_hz: 0, age_s: 7.35 }),
     command: signal('Command', 'never', { rate_hz: null, age_s: null }), heading: signal('Heading', 'not_measured', { age_s: null }),
   }), 0);
-  assert.deepEqual(lines.map(({ cells }) => cells), [['Laser', '0.0 Hz', 'STALE 7.3 s'], ['Command', 'no message yet', '–'], ['Heading', 'not measured', '–'], ['Speed', '20.0 Hz', '0.04 s']]);
+  assert.deepEqual(lines.map(({ cells }) => cells), [['Laser', '0.0 Hz', 'STALE 7.3 s'], ['Command', 'no message yet', '–'], ['Heading', 'not measured', '–'], ['Odometry', '20.0 Hz', '0.34 s'], ['Speed', '20.0 Hz', '0.04 s']]);
 });
 
 test('between two frames ages go on, and what is past its horizon is stale', () => {
@@ -28,7 +28,7 @@ test('the heads state nothing of a phone that is not compared, nor of alarms whe
   assert.deepEqual(heads({}), ['Distance apart 10.4 of 14.0 m', 'none active']);
   assert.deepEqual(heads({ phone: { used: false, apart_m: 10.4, explained_m: 14 } }, false), ['', 'not checked']);
   assert.deepEqual(heads({ phone: { used: true, apart_m: 10.4, explained_m: 14, compared_age_s: 60 } })[0], '', 'an old comparison');
-  assert.deepEqual(heads({ phone: null, session: { paused: true } }), ['', 'paused']);
+  assert.deepEqual(heads({ phone: null, session: { paused: true } }), ['', '']);
 });
 
 test('who is in control stands first, then who hears no alarm and why, then this page', () => {

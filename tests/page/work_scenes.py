@@ -7,7 +7,7 @@ from typing import Any
 
 from playwright.async_api import Page, expect
 
-from tests.page.canned import Canned, alarm, check, live
+from tests.page.canned import Canned, alarm, check, live, slowed
 
 Json = dict[str, Any]
 MODE: Json = {"mode": "autonomous", "why": None, "source": "/mode", "way_m": 1240.0, "open": []}
@@ -163,9 +163,16 @@ async def left(server: Canned, page: Page) -> None:
     gone: Json = {"state": "ACKED", "acknowledged_by": "A. K. (Desk in the control room)", "place": "list"}
     gone["off_duty_ms"] = now_ms() - 3_600_000
     server.state["alarms"] = [
-        alarm("drift", "GPS drift at standstill", text="6.3 m from where it stopped", raised_ms=now_ms() - 4e6, **gone),
-        alarm("fuel", "Fuel low", text="8 %, 10 % are needed", raised_ms=now_ms() - 5e6, **gone),
-        alarm("slow", "Laser slower than expected", text="61 of 75 Hz", raised_ms=now_ms() - 6e6, **gone),
+        alarm(
+            "drift",
+            "GPS drift at standstill",
+            text="6.3 m from where it stopped",
+            raised_ms=now_ms() - 4e6,
+            for_s=4000.0,
+            **gone,
+        ),
+        alarm("fuel", "Fuel low", text="8 %, 10 % are needed", raised_ms=now_ms() - 5e6, for_s=5000.0, **gone),
+        alarm("slow", "Laser slower than expected", text="61 of 75 Hz", raised_ms=now_ms() - 6e6, for_s=6000.0, **gone),
     ]
     await again(server, page)
     await expect(page.locator("#sheet-left li")).to_have_count(3)
@@ -186,7 +193,8 @@ async def handover(server: Canned, page: Page) -> None:
         ("departure", "Departure check signed", "by A. K., 10 of 10", None),
     )
     lines = [
-        {"key": f"l{n}", "kind": kind, "title": title, "text": text, "priority": priority, "until_ms": None,
+        {"key": "driving:autonomous:" if kind == "driving" else f"l{n}", "kind": kind, "title": title, "text": text,
+         "priority": priority, "until_ms": None,
          "since_ms": now_ms() - 90_000 if priority else None, "read": n == 0,
          "off_duty_ms": now_ms() - 60_000 if n == 1 else None}
         for n, (kind, title, text, priority) in enumerate(rows)
@@ -217,7 +225,7 @@ async def files_search(server: Canned, page: Page) -> None:
 
 async def car_complies(server: Canned, page: Page) -> None:
     """The tile of the slow-down while the car does not slow, and its checks."""
-    server.state = driving()
+    server.state = driving() | {"decelerate": slowed(False)}
     tile = next(one for one in server.state["checks"] if one["id"] == "Command")
     tile |= {"id": "slow_down_unconfirmed", "label": "Slow-down", "verdict": "fault", "brief": "FAULT 4.2 m/s"}
     tile["checks"] = ["slow_down_unconfirmed"]
@@ -228,7 +236,8 @@ async def car_complies(server: Canned, page: Page) -> None:
     server.checks["slow_down_unconfirmed"] = check(
         "slow_down_unconfirmed", "Slow-down", verdict="fault", text=text, for_s=2.3, priority="critical",
         checked_when="Checked while the car is being slowed.", title="Slow-down NOT CONFIRMED",
-        checks=[{"id": id, "label": label, "verdict": verdict, "text": text} for id, label, verdict, text in rows],
+        checks=[{"id": id, "label": label, "verdict": verdict, "text": text,
+                 "priority": "critical"} for id, label, verdict, text in rows],
     )  # fmt: skip
     await again(server, page)
     await page.locator(".checks li button:visible", has_text="Slow-down").tap()

@@ -23,7 +23,7 @@ def test_without_tf_no_laser_is_taken_and_the_operator_is_prompted(name: str) ->
     report = judged(drive(name))
     assert "scan" not in report.run.sources
     (question,) = report.run.questions
-    assert (question["signal"], question["words"]) == ("scan", "Two lasers: which looks ahead?")
+    assert (question["signal"], question["words"]) == ("scan", "Two lasers: which one faces forward?")
     assert [one["value"] for one in question["options"]] == [FRONT, BACK]
     assert "obstacle" not in raised(report)
     (why,) = {one.why for one in report.run.unchecked if one.check_id == "obstacle"}

@@ -24,7 +24,7 @@ MOST_OPTIONS = 12
 ORDER = ("scan", "speed", "position", "odometry")  # the most urgent first
 _NUMBERS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine")
 _KINDS = {
-    "scan": ("lasers", "which looks ahead?"),
+    "scan": ("lasers", "which one faces forward?"),
     "speed": ("sources of speed", "which is the car's?"),
     "odometry": ("odometries", "which is the car's?"),
     "position": ("GPS receivers", "which is the car's?"),
@@ -188,10 +188,10 @@ def what_is_known(one: Candidate, signal: str, evidence: Evidence) -> str:
     if signal == "scan":
         ahead = known.looks_ahead
         if ahead is not None:
-            facts.append("looks ahead by TF" if ahead else "looks elsewhere by TF")
+            facts.append("faces forward by TF" if ahead else "faces another direction by TF")
         elif direction_by_name(f"{one.topic} {known.frame or ''}"):
             facts.append(
-                "its name suggests ahead"
+                "its name suggests forward"
                 if direction_by_name(f"{one.topic} {known.frame or ''}") < 0
                 else "its name suggests another direction"
             )

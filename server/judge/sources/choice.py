@@ -238,10 +238,10 @@ class _Chooser:
         evidence = self._evidence
         ahead = [one for one in found if evidence.of(one.topic).looks_ahead]
         if len(ahead) == 1:
-            return ahead[0].source("scan", why="looks ahead by TF")
+            return ahead[0].source("scan", why="faces forward by TF")
         first = named_first(ahead or found) or min(ahead or found, key=lambda one: (len(one.topic), one.topic))
         if all(one is first or evidence.agree(first.topic, one.topic) for one in ahead or found):
-            return first.source("scan", why="looks ahead by TF" if ahead else "one laser, of which others are copies")
+            return first.source("scan", why="faces forward by TF" if ahead else "one laser, of which others are copies")
         order = sorted(found, key=lambda one: one not in ahead)
         used = next((one for one in found if one.topic == self._in_use.get("scan")), None)
         if used is not None and all(evidence.of(one.topic).looks_ahead is None for one in found):

@@ -1,7 +1,7 @@
 // Which alarm shows where: one rule a place, none an alarm. Pure functions.
 
 import { titleOf } from './alarm-title.js';
-import { stripWords } from '../slowdown/slow-layout.js';
+import { UNCONFIRMED, stripWords } from '../slowdown/slow-layout.js';
 import { fixed, timeOfDay } from '../core/format.js';
 import { RANK } from '../core/priority.js';
 
@@ -73,8 +73,8 @@ export function soundOf(frame, { isServerLost, isLossAcknowledged }) {
   return LOUD.find((sound) => asking.includes(sound)) ?? null;
 }
 
-/** @typedef {{kind: 'crit' | 'warn' | 'invert' | 'order' | '', icon: string, text: string, end: string, opens: 'alarms' | 'signals', hasReturned?: boolean, isKnown?: boolean}} Strip
- * hasReturned: nothing urgent stands any more, and nobody has acknowledged it; isKnown: it stands, and was acknowledged */
+/** @typedef {{kind: 'crit' | 'warn' | 'invert' | 'order' | '', icon: string, text: string, end: string, opens: 'alarms' | 'signals', hasReturned?: boolean, isKnown?: boolean, isUnconfirmed?: boolean}} Strip
+ * hasReturned: nothing urgent stands any more, and nobody has acknowledged it; isKnown: it stands, and was acknowledged; isUnconfirmed: it says that the car does not slow */
 
 /**
  * The one line under the tabs.
@@ -108,6 +108,7 @@ export function stripOf(frame, { isSilent, chain, paused_s, stale, unchecked }) 
     return {
       kind: worst.priority === 'critical' ? 'crit' : 'warn', icon: worst.priority === 'critical' ? 'crit' : 'warn',
       text: titleOf(worst), end: among, hasReturned: !worst.active, isKnown: worst.active && !isAsking(worst), opens: 'alarms',
+      ...(worst.active && worst.id === UNCONFIRMED && { isUnconfirmed: true }),
     };
   }
   if (chain.cut === 2) {

@@ -87,7 +87,7 @@ function suppressedRow({ id, title, priority, by, raised_ms }) {
 export function stateWords(alarm) {
   const by = (/** @type {string | null | undefined} */ who) => (who ? ` by ${who}` : '');
   if (alarm.state === 'SHELVED') return `shelved until ${timeOfDay(alarm.shelved_until_ms)}${by(alarm.shelved_by)}`;
-  if (alarm.state === 'RTN_UNACKED') return 'returned unacknowledged';
+  if (alarm.state === 'RTN_UNACKED') return 'ended, unacknowledged';
   return alarm.state === 'ACKED' ? ownerWords(alarm) : 'unacknowledged';
 }
 

@@ -97,7 +97,7 @@ class AlarmList {
     write(speed, ink, isKnown ? speedWords(speed_mps)[0] ?? '–' : '–', unit, isKnown ? speedUnit() : '');
     setSentence(count, countWords(rows));
     setSentence(load, loadWords(frame?.alarm_load));
-    setText(note, rows.length || frame?.session.paused ? whyNoKeys(store) : '');
+    setText(note, rows.length ? whyNoKeys(store) : ''); // an empty list says it
     show(none, rows.length === 0);
     setText(none, noneWords({
       isSilent: store.isSilent, isReplay: store.replaying, isPaused: frame?.session.paused === true,

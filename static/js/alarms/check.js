@@ -7,12 +7,12 @@ import { CheckFeed } from './check-feed.js';
 import { TAGS, episodeWords, figuresOf, placeOf, thresholdWords, totalWords } from './check-layout.js';
 import { hasAged, whyUnchecked } from './checks.js';
 import { openShelve } from './shelve.js';
-import { dialogWords } from './standing.js';
+import { dialogWords, lowered } from './standing.js';
 import { html, icon, listen, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
 import { fixed, timeOfDay } from '../core/format.js';
 import { write } from '../core/ink.js';
 import { openScreen } from '../core/open-screen.js';
-import { ICONS } from '../core/priority.js';
+import { ICONS, priorityOf } from '../core/priority.js';
 import { speedUnit, speedWords } from '../core/units.js';
 import { showInTrends } from '../home/drive-choice.js';
 import { colours } from '../home/spark.js';
@@ -21,7 +21,6 @@ import { settingsOf } from '../settings/settings-model.js';
 import { SettingsRow } from '../settings/settings-row.js';
 
 const LABELS = { silence: 'Silence', acknowledge: 'Acknowledge', shelve: 'Shelve', unshelve: 'Unshelve', take_alarm: 'Take over' };
-const MARKS = { ok: 'ok', fault: 'warn', unknown: 'unknown' };
 
 /**
  * @param {HTMLElement} root
@@ -98,7 +97,7 @@ class CheckView {
     const priority = answer?.priority ?? alarm?.priority ?? 'warning';
     setAttribute(parts.view, 'data-verdict', verdict);
     setAttribute(parts.view, 'data-priority', priority);
-    setIcon(parts.mark, verdict === 'fault' ? ICONS[priority] : MARKS[verdict]);
+    setIcon(parts.mark, verdict === 'fault' ? ICONS[priority] : verdict);
     const speed_mps = store.signal('speed')?.value?.speed_mps;
     write(parts.speed, store.ink('speed').ink, typeof speed_mps === 'number' ? speedWords(speed_mps)[0] ?? '–' : '–', parts.unit, typeof speed_mps === 'number' ? speedUnit() : '');
     setSentence(parts.sentence, sentenceOf(verdict, why, isKnown, alarm?.verdict === 'fault' ? alarm.text : answer?.text, feed.problem));
@@ -191,7 +190,7 @@ class CheckView {
       this.#rows = names.flatMap((name) => (model.body?.schema[name] ? [new SettingsRow(model, name, model.body.schema[name])] : []));
       parts.rows.replaceChildren(...this.#rows.map(({ element }) => element));
     }
-    setText(parts.thresholdTitle, model.body.schema[names[0] ?? '']?.title ?? '');
+    setText(parts.thresholdTitle, this.#isChanging ? 'Thresholds' : model.body.schema[names[0] ?? '']?.title ?? ''); // each row has its own name
     setSentence(parts.thresholdWords, feed.answer ? thresholdWords(feed.answer) : '');
     show(parts.change, !store.isViewer && !store.replaying);
     setAttribute(parts.change, 'aria-expanded', String(this.#isChanging));
@@ -203,7 +202,10 @@ class CheckView {
   change() {
     this.#isChanging = !this.#isChanging;
     this.#drawThresholds();
-    if (this.#isChanging) this.parts.rows.querySelector('input')?.focus();
+    if (!this.#isChanging) return;
+    this.parts.rows.querySelector('input')?.focus();
+    const section = this.parts.rows.closest('.check-thresholds');
+    if (section?.parentElement?.scrollTop) section.scrollIntoView({ block: 'start' }); // no piece of the chart above it
   }
 
   #drawHistory() {
@@ -231,8 +233,8 @@ class CheckView {
     if (key === this.#siblings || checks.length < 2) return;
     this.#siblings = key;
     setText(parts.siblingsTitle, `${feed.answer?.tile}: ${checks.length} checks`);
-    parts.others.replaceChildren(...checks.map(({ id, label, verdict }) => {
-      const row = html('button', { type: 'button', 'aria-current': id === feed.id ? 'true' : null }, icon(MARKS[verdict], verdict === 'unknown' ? 's dashed' : 's'),
+    parts.others.replaceChildren(...checks.map(({ id, label, verdict, priority }) => {
+      const row = html('button', { type: 'button', 'aria-current': id === feed.id ? 'true' : null }, icon(verdict === 'fault' ? (priority ? ICONS[priorityOf(priority)] : 'warn') : verdict, verdict === 'unknown' ? 's dashed' : 's'),
         html('span', {}, label), html('span', { class: 'm' }, TAGS[verdict]));
       row.addEventListener('click', () => openScreen('check', id));
       return html('li', {}, row);
@@ -274,8 +276,8 @@ function sentenceOf(verdict, why, isKnown, text, problem) {
   if (problem) return problem;
   if (text === undefined) return '';
   const full = /[.!?]$/.test(text) ? text : `${text}.`;
-  if (!isKnown) return `Not checked: ${why}. It was: ${full}`;
-  return verdict === 'unknown' ? `Not checked: ${full}` : full;
+  if (!isKnown) return `Not checked: ${why}. It was: ${lowered(full, [])}`;
+  return verdict === 'unknown' ? `Not checked: ${lowered(full, [])}` : full;
 }
 
 /** Builds the parts of the view in `root`. @param {HTMLElement} root */

@@ -7,21 +7,24 @@ import { ageWords, fixed, sinceTime, timeOfDay } from '../core/format.js';
  * @param {import('../core/protocol-types.js').StandingAlarm} alarm
  */
 export function standingWords(alarm) {
-  return [alarm.active ? snackWords(alarm) : alarm.trip_text || alarm.text, responseOf(alarm), markWords(alarm)].filter(Boolean).join(' · ');
+  return joinWords(alarm.active ? snackWords(alarm) : alarm.trip_text || alarm.text, responseOf(alarm), markWords(alarm));
 }
 
 /** The mark of an alarm in a planned stop; empty: there is none. @param {Pick<import('../core/protocol-types.js').StandingAlarm, 'planned_stop'>} alarm */
 export const markWords = ({ planned_stop }) => (planned_stop ? 'planned stop' : '');
+
+/** Sentences in one line, of which the last alone keeps its full stop. @param {string[]} parts */
+export const joinWords = (...parts) => parts.filter(Boolean).join(' · ').replaceAll('. · ', ' · ');
 
 /**
  * What the snackbar tells: what is wrong now; of what is over, what it was.
  * @param {import('../core/protocol-types.js').StandingAlarm} alarm
  */
 export function snackWords(alarm) {
-  const was = alarm.trip_text ? ` It was: ${alarm.trip_text}` : '';
-  if (!alarm.active) return `Returned to normal.${was}`;
+  const was = alarm.trip_text && alarm.trip_text !== alarm.title ? ` It was: ${alarm.trip_text}` : ''; // its title stands above
+  if (!alarm.active) return `Returned to normal.${was || ` ${worstWords(alarm)}`.trimEnd()}`;
   if (alarm.verdict === 'ok') return `Returning to normal: ${alarm.text || 'OK'}.${was}`; // it clears once that has lasted
-  return alarm.verdict === 'unknown' ? `Not checked now: ${alarm.text || 'unknown'}.${was}` : alarm.text || alarm.trip_text || alarm.title;
+  return alarm.verdict === 'unknown' ? `Not checked now: ${lowered(bare(alarm.text || 'unknown'), alarm.causes ?? [])}.${was}` : alarm.text || alarm.trip_text || alarm.title;
 }
 
 /**
@@ -36,7 +39,7 @@ export function dialogWords(alarm) {
   const mark = alarm.planned_stop ? 'The car is in a planned stop.' : '';
   if (!alarm.active) return ['It has returned to normal.', began, worst, mark].filter(Boolean).join(' ');
   const isBlind = alarm.verdict === 'unknown';
-  const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.verdict === 'ok' ? `Returning to normal: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
+  const cause = isBlind ? `Not checked now: ${lowered(bare(alarm.text), alarm.causes ?? [])}.` : alarm.verdict === 'ok' ? `Returning to normal: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
   return [cause, `Active for ${ageWords(alarm.for_s)}.`, began, worst, mark, alarm.advice].filter(Boolean).join(' ');
 }
 
@@ -51,7 +54,7 @@ function worstWords({ active, verdict, measured, worst }) {
  * A sentence within another one: its first letter is small, unless it begins with a name or an abbreviation.
  * @param {string} sentence @param {string[]} names what may be a name in it
  */
-function lowered(sentence, names) {
+export function lowered(sentence, names) {
   const isName = names.some((name) => sentence.startsWith(name)) || !/^[A-Z][a-z]*[ :,]/.test(sentence);
   return isName ? sentence : sentence.charAt(0).toLowerCase() + sentence.slice(1);
 }
@@ -76,7 +79,7 @@ function responseOf(alarm) {
   const by = (/** @type {string | null | undefined} */ who) => (who ? ` by ${who}` : '');
   if (alarm.state === 'SHELVED') return `shelved${by(alarm.shelved_by)} until ${timeOfDay(alarm.shelved_until_ms)}`;
   if (alarm.state === 'ACKED') return ownerWords(alarm);
-  return alarm.state === 'RTN_UNACKED' ? 'returned unacknowledged' : 'unacknowledged';
+  return alarm.state === 'RTN_UNACKED' ? 'ended, unacknowledged' : 'unacknowledged';
 }
 
 /**

@@ -42,7 +42,7 @@ export function controlWords({ label, is }, car, isViewer) {
  * @param {ReachNow | null | undefined} reach
  */
 export function reachOf(reach) {
-  if (!reach) return { text: 'Not known where alarms are audible', why: '', isBad: false };
+  if (!reach) return { text: 'Alarms audible: not known', why: '', isBad: false };
   if (reach.can === 0) return { text: `Nobody can hear alarms (${reach.of === 0 ? 'no operator' : counted(reach.of, 'operator', 'operators')})`, why: reach.why, isBad: true };
   return { text: `Alarms audible on ${reach.can} of ${counted(reach.of, 'operator page')}`, why: reach.why, isBad: false };
 }

@@ -9,10 +9,10 @@ import { sinceTime, timeOfDay } from '../core/format.js';
  */
 
 /** The second line of a line. @param {HandoverLine} line */
-export function lineWords({ text, since_ms, until_ms, off_duty_ms }) {
+export function lineWords({ kind, text, since_ms, until_ms, off_duty_ms }) {
   const plain = text.replace(/\.$/, '');
   const line = off_duty_ms ? `${plain}, off duty since ${sinceTime(off_duty_ms)}` : plain; // who has acknowledged it ends the text
-  const since = since_ms === null ? '' : `${off_duty_ms ? 'active ' : ''}since ${timeOfDay(since_ms)}`;
+  const since = since_ms === null ? '' : `${kind === 'alarm' ? 'began' : 'since'} ${timeOfDay(since_ms)}`;
   const until = until_ms === null ? '' : `back at ${timeOfDay(until_ms)}`;
   return [line, since || until].filter(Boolean).join(' · ');
 }
@@ -44,5 +44,5 @@ export function endWords({ left, name, lines }, part) {
 export function markOf({ kind, priority, title }) {
   if (kind === 'alarm') return priority === 'critical' ? 'crit' : priority === 'warning' ? 'warn' : title === 'No alarm is active' ? 'ok' : 'info';
   if (kind === 'departure') return title === 'Departure check signed' ? 'ok' : 'info';
-  return /** @type {const} */ ({ shelved: 'bell-off', limit: 'settings', rides: 'operator', driving: 'car', slow_down: 'slow', paused: 'pause', planned_stop: 'clock' })[kind];
+  return /** @type {const} */ ({ shelved: 'bell-off', limit: 'settings', rides: 'operator', driving: 'unknown', slow_down: 'slow', paused: 'pause', planned_stop: 'clock' })[kind];
 }

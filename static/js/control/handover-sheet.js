@@ -3,7 +3,8 @@
 import { partOf } from './duty-layout.js';
 import { endWords, lineWords, markOf } from './handover-layout.js';
 import { styled } from '../core/style-sheet.js';
-import { html, icon, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
+import { html, icon, setAttribute, setIcon, setText, setSentence, show, svg } from '../core/dom.js';
+import { shapeOf } from '../drive/mode-text.js';
 import { Meant } from '../core/meant.js';
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
 
@@ -147,6 +148,8 @@ export class LineRow {
   constructor(line, read, isTaker, does = 'Read') {
     this.line = line;
     this.does = does;
+    this.shape = shapeOf(line);
+    if (this.shape) this.mark.replaceChildren(svg('path', { d: this.shape })); // that of the ledge
     setAttribute(this.tick, 'data-line', line.key);
     setAttribute(this.tick, 'aria-disabled', isTaker ? null : 'true');
     if (isTaker) this.tick.addEventListener('click', (event) => read(this.line, event));
@@ -156,7 +159,7 @@ export class LineRow {
   draw(line, isNext) {
     const face = line.read ? 'read' : isNext ? 'next' : 'open';
     this.line = line;
-    setIcon(this.mark, markOf(line));
+    if (!this.shape) setIcon(this.mark, markOf(line));
     setAttribute(this.element, 'data-kind', line.priority ?? line.kind);
     setSentence(this.title, line.title);
     setSentence(this.text, lineWords(line));

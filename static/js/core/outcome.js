@@ -13,10 +13,10 @@ const MAYBE = 'It may have been carried out.';
 
 /** What the key is called, where it is not called as the command. @type {Partial<Record<Ordered, string>>} */
 const NAMES = {
-  connect: 'Connect', retry: 'Retry', disconnect: 'End monitoring', pause: 'Pause', resume: 'Resume', record: 'Record',
+  connect: 'Connect', retry: 'Retry', disconnect: 'Stop monitoring', pause: 'Pause', resume: 'Resume', record: 'Record',
   acknowledge: 'Acknowledge', silence: 'Silence', shelve: 'Shelve', unshelve: 'Unshelve', set: 'Change settings', import: 'Import settings',
-  ride: 'Choose the phone in the car', control: 'Change control', arm: 'Arm', disarm: 'Disarm', slow_down: 'Slow down', release: 'Release', veto: 'Veto',
-  take_item: 'Take it', release_item: 'Release', offer_item: 'Hand over', answer_item: 'Answer', withdraw_item: 'Withdraw',
+  ride: 'Choose the phone in the car', control: 'Change control', arm: 'Arm', disarm: 'Disarm', slow_down: 'Slow down', release: 'Release the car', veto: 'Veto',
+  take_item: 'Take it', release_item: 'Unassign', offer_item: 'Hand over', answer_item: 'Answer', withdraw_item: 'Withdraw',
   offer_control: 'Hand over', read_back: 'Confirm', take_alarm: 'Take over', end_planned_stop: 'End stop', accept_control: 'Take control', end_offer: 'End the hand-over',
 };
 

@@ -8,6 +8,8 @@ export const DRAW_EVERY_MS = 200;
 const MOVE_EVERY_MS = 95;
 /** What is drawn in turn takes no longer of one picture, but for the last of it: each picture has its own costs of style, layout and layers [ms]. */
 const TURNS_MS = 4;
+/** Where pictures come so seldom that turns wait for longer, the next one has them all: an old value would stand at full opacity beside one that is marked stale [ms]. */
+const WAITS_MS = 200;
 /** A page that has just begun draws without a frame only after so long: that would take the time of the first values, which mostly come before [ms]. */
 const AWAITS_MS = 400;
 /** While frames come so close after each other they set the pace of drawing, after that a timer does [ms]. */
@@ -28,6 +30,7 @@ export class Painter {
   /** What waits for one of the next pictures. @type {Set<() => void>} */
   #turns = new Set();
   #isTurning = false; // a picture for them is requested
+  #waits_ms = 0; // since when some of them have waited
   #emitter;
 
   /** @param {import('./emitter.js').Emitter<import('./store.js').Topic>} emitter gets `move`, `draw` and `drawn` */
@@ -43,18 +46,23 @@ export class Painter {
   /** Draw with one of the next pictures, after those that wait: all together they may take longer than one picture. @param {() => void} draw */
   inTurn(draw) {
     this.#turns.add(draw);
-    if (!this.#isTurning) this.#turn();
+    if (this.#isTurning) return;
+    this.#waits_ms = performance.now();
+    this.#turn();
   }
 
   #turn() {
     this.#isTurning = true;
     this.picture(() => {
-      const ends_ms = performance.now() + TURNS_MS;
+      const begins_ms = performance.now();
+      let late = begins_ms - this.#waits_ms > WAITS_MS ? this.#turns.size : 0;
+      if (late) this.#waits_ms = begins_ms;
       try {
         for (const draw of this.#turns) {
           this.#turns.delete(draw);
           draw();
-          if (performance.now() >= ends_ms) break;
+          late -= 1;
+          if (late <= 0 && performance.now() >= begins_ms + TURNS_MS) break;
         }
       } finally {
         this.#isTurning = this.#turns.size > 0;

@@ -1707,7 +1707,7 @@ export interface Quantity {
 export interface Question {
   signal: string;
   kind: "source" | "unit";
-  /** *Two lasers: which looks ahead?* */
+  /** *Two lasers: which one faces forward?* */
   words: string;
   /** the most probable first, at most 12 */
   options: Array<Option>;
@@ -2665,6 +2665,8 @@ export interface TileCheck {
   label: string;
   verdict: Verdict;
   text: string;
+  /** of its alarm; absent from agents before 2026-12 */
+  priority?: Priority;
 }
 
 /** The time line of a recording. */

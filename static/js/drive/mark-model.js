@@ -126,11 +126,12 @@ export function headWords(mark) {
 
 /** The details of a row: the text, what came with it, what was cut or corrected. @param {Mark} mark @returns {string[]} */
 export function moreWords(mark) {
-  const { words, voice, photo, ahead_ms, clock, shift_s } = mark;
+  const { category, words, voice, photo, ahead_ms, clock, shift_s } = mark;
   const parts = [];
   if (words) parts.push(words);
-  if (voice) parts.push(voice.note || `voice ${fixed(voice.length_s)} s`);
-  if (photo) parts.push(photo.note || `photo ${fixed(photo.bytes / 1e6)} MB`);
+  // No noun stands twice: the head may be it.
+  if (voice) parts.push(voice.note || `${category || words ? 'voice ' : ''}${fixed(voice.length_s)} s`);
+  if (photo) parts.push(photo.note || `${category || voice || words ? 'photo ' : ''}${fixed(photo.bytes / 1e6)} MB`);
   if (shift_s) parts.push(`moved by ${signed(shift_s)} s`);
   if (clock === 'unknown') parts.push('by the clock of this device, which was not compared with the server’s');
   else if (Math.abs(ahead_ms) >= SHOWN_MS) parts.push(`clock of this device ${signed(ahead_ms / 1000, 2)} s, corrected`);

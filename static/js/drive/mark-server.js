@@ -20,6 +20,12 @@ export function isForNow(status) {
   return status === 429 || (status >= 500 && status !== 507);
 }
 
+/** Why it was not stored; the bare words of HTTP say nothing. @param {number} status @param {unknown} detail */
+export function reasonOf(status, detail) {
+  if (typeof detail === 'string' && detail !== 'Not Found') return detail;
+  return status === 404 ? 'This server cannot store it (404).' : `The server refused it (${status}).`;
+}
+
 /** @param {Store} store @returns {import('./mark-delivery.js').Server} */
 export function serverOf(store) {
   const delivered = (/** @type {import('../core/requests.js').Answer} */ { ok, reason, outcome }) => ({ ok, isLost: !ok && outcome !== undefined && outcome !== 'refused', reason: reason ?? '' });
@@ -35,7 +41,7 @@ export function serverOf(store) {
         });
         if (answer.ok) return { ok: true, isLost: false, reason: '' };
         const body = await answer.json().catch(() => null);
-        return { ok: false, isLost: isForNow(answer.status), reason: typeof body?.detail === 'string' ? body.detail : `The server refused it (${answer.status}).` };
+        return { ok: false, isLost: isForNow(answer.status), reason: reasonOf(answer.status, body?.detail) };
       } catch {
         return { ok: false, isLost: true, reason: '' };
       }

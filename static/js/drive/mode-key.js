@@ -1,15 +1,11 @@
 // The left of the ledge: who drives. Where an intervention waits for its description it is a key that opens the form.
 
 import { html, icon, listen, setAttribute, setText, show, svg } from '../core/dom.js';
-import { modeWords } from './mode-text.js';
+import { SHAPES, modeWords } from './mode-text.js';
 
 /** @typedef {import('../core/store.js').Store} Store */
 /** @typedef {(sentence: string, title?: string) => void} Say */
 
-const SHAPES = {
-  autonomous: 'M7 7h10v10H7z M10.5 10.5h3v3h-3z M9.5 7V3.5 M14.5 7V3.5 M9.5 20.5V17 M14.5 20.5V17 M7 9.5H3.5 M7 14.5H3.5 M20.5 9.5H17 M20.5 14.5H17',
-  manual: 'M12 3a9 9 0 1 0 0 18 9 9 0 1 0 0-18z M12 10a2 2 0 1 0 0 4 2 2 0 1 0 0-4z M3.5 10.5C8 9.5 9 10 10.2 11.2 M20.5 10.5C16 9.5 15 10 13.8 11.2 M12 14v6.5',
-};
 const GONE = 'This part of the page could not be loaded from the server. The intervention is stored; it can be described later.';
 
 /**

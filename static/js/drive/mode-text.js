@@ -12,6 +12,11 @@ import { distanceWords, duration, fixed } from '../core/format.js';
 const WHY = { no_source: 'no mode topic', silent: 'mode topic is silent', flickers: 'the mode flickers', unclear: 'the car does not say' };
 /** @type {Record<ModeState['mode'], string>} */
 const TITLES = { autonomous: 'Autonomous', manual: 'Manual', unknown: 'Mode not known' };
+/** The icons of the modes that are known, as paths. */
+export const SHAPES = {
+  autonomous: 'M7 7h10v10H7z M10.5 10.5h3v3h-3z M9.5 7V3.5 M14.5 7V3.5 M9.5 20.5V17 M14.5 20.5V17 M7 9.5H3.5 M7 14.5H3.5 M20.5 9.5H17 M20.5 14.5H17',
+  manual: 'M12 3a9 9 0 1 0 0 18 9 9 0 1 0 0-18z M12 10a2 2 0 1 0 0 4 2 2 0 1 0 0-4z M3.5 10.5C8 9.5 9 10 10.2 11.2 M20.5 10.5C16 9.5 15 10 13.8 11.2 M12 14v6.5',
+};
 /** Of a newer server there may be others. @type {Partial<Record<string, {title: string, ask: string}>>} */
 export const KINDS = {
   to_manual: { title: 'Take-over', ask: 'Describe take-over' },
@@ -26,6 +31,11 @@ export const CATEGORIES = [
 ];
 /** @type {readonly (readonly [Intervention['initiated_by'], string])[]} */
 export const STARTERS = [['driver', 'Driver'], ['operator', 'Operator'], ['system', 'Car']];
+
+/** The icon of a hand-over's line, where the ledge has one for its mode. @param {{kind: string, key: string}} line "driving:manual:" */
+export function shapeOf({ kind, key }) {
+  return kind === 'driving' ? Object.entries(SHAPES).find(([mode]) => key.startsWith(`driving:${mode}:`))?.[1] ?? '' : '';
+}
 
 /**
  * @param {ModeState | null | undefined} mode null: nothing is known of the car

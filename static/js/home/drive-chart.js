@@ -209,9 +209,9 @@ class DriveChart {
     const tag = [];
     if (cursor_s !== null && cursor_s >= from_s && cursor_s <= to_s) {
       const x = left + ((cursor_s - from_s) / (to_s - from_s)) * width;
-      at = tagAt(x, placed.map((mark) => mark.x), { left, right: left + width, width: TAG_PX, mark: MARK_PX });
-      const isOver = placed.some((mark) => isUnder(mark.x, at));
-      tag.push(svg('rect', { class: 'tag-box', x: at.toFixed(1), y: 1, width: TAG_PX, height: isOver ? 20 : 26 }), svg('text', { class: 'n tag-text', x: (at + TAG_PX / 2).toFixed(1), y: isOver ? 17 : 20 }, timeOfDay(this.#clock(cursor_s))));
+      const middles = (/** @type {typeof placed} */ some) => some.map((mark) => mark.x);
+      at = tagAt(x, middles(placed), { left, right: left + width, width: TAG_PX, mark: MARK_PX }, middles(placed.filter(({ priority }) => priority === 'critical')));
+      tag.push(...tagPicture(x, at, placed.some((mark) => isUnder(mark.x, at)), timeOfDay(this.#clock(cursor_s))));
     }
     head.replaceChildren(...tag, ...placed.map((mark) => pictureOf(mark, timeOfDay(this.#clock(mark.at_s)), at)));
   }
@@ -300,6 +300,15 @@ class DriveChart {
 
 /** Whether a mark has no place beside the tag: it is then a bar beneath it, so that it covers no digit. @param {number} x its middle @param {number} at where the tag begins */
 const isUnder = (x, at) => Math.abs(x - at - TAG_PX / 2) < (MARK_PX + TAG_PX - 1) / 2;
+
+/** The time at the cursor; where it stands beside it, with a line that leads to it. @param {number} x of the cursor @param {number} at @param {boolean} isOver a mark is beneath it @param {string} clock */
+function tagPicture(x, at, isOver, clock) {
+  const beside = Math.max(at - x, x - at - TAG_PX);
+  return [
+    svg('rect', { class: 'tag-box', x: at.toFixed(1), y: 1, width: TAG_PX, height: isOver ? 20 : 26 }), svg('text', { class: 'n tag-text', x: (at + TAG_PX / 2).toFixed(1), y: isOver ? 17 : 20 }, clock),
+    ...(beside > 0 ? [svg('rect', { class: 'tag-box', x: (Math.min(x, at + TAG_PX) - 1).toFixed(1), y: 25, width: (beside + 2).toFixed(1), height: 3 })] : []),
+  ];
+}
 
 /** An alarm's mark in the head of the chart. @param {ReturnType<typeof placedMarks>[number]} mark @param {string} clock @param {number} at where the tag begins */
 function pictureOf({ x, priority, title, count }, clock, at) {

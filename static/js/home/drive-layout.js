@@ -160,14 +160,16 @@ export function placedMarks(marks, [from_s, to_s], width) {
 const BESIDE_PX = 24;
 
 /**
- * Where the tag of the cursor begins: above the cursor, or the nearest place beside it where it covers fewer marks of alarms.
+ * Where the tag of the cursor begins: above the cursor, or the nearest place beside it where it covers fewer marks of alarms, a critical one last.
  * @param {number} x of the cursor
  * @param {number[]} marks their middles
  * @param {{left: number, right: number, width: number, mark: number}} sizes the ends of the chart, widths of tag and mark
+ * @param {number[]} [critical] those of the marks that are critical
  */
-export function tagAt(x, marks, { left, right, width, mark }) {
+export function tagAt(x, marks, { left, right, width, mark }, critical = []) {
   const inside = (/** @type {number} */ at) => Math.max(left, Math.min(right - width, at));
-  const covers = (/** @type {number} */ at) => marks.filter((one) => one + mark / 2 > at && one - mark / 2 < at + width).length;
+  const under = (/** @type {number[]} */ some, /** @type {number} */ at) => some.filter((one) => one + mark / 2 > at && one - mark / 2 < at + width).length;
+  const covers = (/** @type {number} */ at) => under(critical, at) * (marks.length + 1) + under(marks, at);
   const far = (/** @type {number} */ at) => Math.abs(at + width / 2 - x);
   const places = [x - width / 2, ...[x, ...marks].flatMap((one) => [one + mark / 2, one - mark / 2 - width])].map(inside);
   return places.filter((at) => Math.max(at - x, x - at - width) <= BESIDE_PX).reduce((best, at) => (covers(at) - covers(best) || far(at) - far(best)) < 0 ? at : best);

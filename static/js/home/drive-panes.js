@@ -126,10 +126,14 @@ class Pane {
   #build() {
     const { palette } = this.panes;
     const axis = axisOf(palette);
+    /** Without its clock [px]. @param {{height: number}} plot */
+    const heightOf = ({ height }) => height - (this.isLast ? AXIS_PX : 0);
+    /** @param {{height: number}} plot */
+    const margin = (plot) => marginOf(heightOf(plot));
     const begin_s = () => (this.panes.sceneOf().answer?.start_ms ?? 0) / 1000;
     return new uPlot({
       ...plotSize(this.host),
-      padding: [marginOf, 12, this.isLast ? 0 : marginOf, 0],
+      padding: [margin, 12, this.isLast ? 0 : margin, 0],
       ...BARE,
       scales: {
         x: { time: true, range: () => /** @type {[number, number]} */ (this.panes.sceneOf().view.map((at_s) => begin_s() + at_s)) },
@@ -137,7 +141,7 @@ class Pane {
       },
       axes: [
         { ...axis, size: this.isLast ? AXIS_PX : 0, space: 64, incrs: INCRS_S, values: (plot, splits, _axis, _space, apart_s) => splits.map((at_s) => (this.isLast ? wholeLabel(clockWords(at_s, apart_s), plot.valToPos(at_s, 'x'), plot.width - VALUES_PX) : '')) },
-        { ...axis, size: VALUES_PX, space: 22, grid: { show: false }, splits: (plot, _axis, low, high, apart) => roomFor(valueTicks(low, high, apart, plot.height < LOW_PX), plot.height - (this.isLast ? AXIS_PX : 0)), values: (_, splits) => splits.map((value) => fixed(value, splits.some((one) => Math.abs(one % 1) > 1e-6 && Math.abs(one) < 100) ? 1 : 0)) },
+        { ...axis, size: VALUES_PX, space: 22, grid: { show: false }, splits: (plot, _axis, low, high, apart) => roomFor(valueTicks(low, high, apart, plot.height < LOW_PX), heightOf(plot)), values: (_, splits) => splits.map((value) => fixed(value, splits.some((one) => Math.abs(one % 1) > 1e-6 && Math.abs(one) < 100) ? 1 : 0)) },
       ],
       series: [{}, ...[0, 1].map(() => ({ stroke: palette.ink, width: 2, spanGaps: false, points: { show: false } }))],
       bands: [{ series: [2, 1], fill: palette.ink }],

@@ -60,12 +60,15 @@ export class PaneStack {
   }
 }
 
-/** Above and below what is drawn; a flat plot gives less away [px]. @type {(plot: {height: number}) => number} */
-export const marginOf = ({ height }) => (height < FLAT_PX ? 7 : 9);
+/** Is there room for one tick only? @param {number} height of the plot, without its clock [px] */
+const isFlat = (height) => height < FLAT_PX;
+
+/** Above and below what is drawn; a flat plot gives less away [px]. @param {number} height of the plot, without its clock [px] */
+export const marginOf = (height) => (isFlat(height) ? 7 : 9);
 
 /** Of its ticks those that have room. @param {number[]} ticks @param {number} height of the plot, without its clock [px] */
 export function roomFor(ticks, height) {
-  return height < FLAT_PX ? ticks.slice(-1) : ticks;
+  return isFlat(height) ? ticks.slice(-1) : ticks;
 }
 
 /** The room for a plot [px]. @param {HTMLElement} host */

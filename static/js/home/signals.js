@@ -159,6 +159,7 @@ function row(more, draw) {
   element.addEventListener('click', () => {
     open(found, !more.isOpen);
     draw();
+    element.scrollIntoView({ block: 'nearest' }); // a stale one leaves the top of the list as it opens
   });
   return found;
 }

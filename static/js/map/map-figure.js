@@ -76,10 +76,11 @@ export class Figure {
     this.carName = svg('text', { class: 'name' });
     this.phoneName = svg('text', { class: 'name' });
     this.apart = svg('text', { class: 'beside' });
+    this.scaleGround = path('scg');
     this.bar = path('sc');
     this.barText = svg('text');
     this.others = new OtherPhones();
-    this.picture = svg('svg', { class: 'mapv', role: 'img' }, this.lines, this.tail, this.others.root, this.around, this.ellipse, this.way, this.carMark, this.phoneMark,
+    this.picture = svg('svg', { class: 'mapv', role: 'img' }, this.lines, this.tail, this.scaleGround, this.others.root, this.around, this.ellipse, this.way, this.carMark, this.phoneMark,
       this.carName, this.phoneName, this.apart, this.bar, this.barText);
     under.append(this.grid);
     over.append(this.picture);
@@ -239,6 +240,8 @@ export class Figure {
     const [number, unit] = length_m >= 1000 ? [String(length_m / 1000), 'km'] : [String(length_m), 'm'];
     this.#scaleEnd_px = left + length_m / view.mpp;
     setAttribute(this.bar, 'd', `M${left} ${y}v8h${round(length_m / view.mpp)}v-8`);
+    const wide = Math.max(68, round(length_m / view.mpp) + 12); // at least as its text
+    setAttribute(this.scaleGround, 'd', `M${left - 6} ${y - 28}h${wide}v44h${-wide}z`);
     write(this.barText, `${number} ${unit}`);
     place(this.barText, left + 2, y - 5);
     return { ...band, width: this.#scaleEnd_px - left };

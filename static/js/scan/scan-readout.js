@@ -35,7 +35,7 @@ export class ScanReadout {
     show(at('late'), isNow && ink === 'ageing');
     if (isNow && ink === 'ageing') setText(at('late'), `${age(age_s, 2)} s`);
     const missing = isThere ? `STALE ${age(age_s)} s` : isAbsent(ink) ? ABSENT[ink] : ink === 'stale' ? 'no scan' : 'waiting for a scan';
-    if (!isNow) setText(at('none-words'), missing);
+    if (!isNow) setText(at('none-words'), ink === 'not_chosen' ? `laser ${missing}` : missing); // a pane of its own has no name
     this.#drawNearest(isNow ? scan : null, isNow ? ink : 'fresh');
     setSentence(at('beams'), isThere && scan ? [beamWords(scan), store.signal('scan')?.value?.mounting].filter(Boolean).join(' · ') : '');
     // The marked return takes the place of the count of beams: the keys below must not move.

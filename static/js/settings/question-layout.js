@@ -60,7 +60,8 @@ export function answerOf({ signal, kind }, value) {
  * @param {string} label of its signal
  */
 export function meanwhileWords({ kind }, label) {
-  return kind === 'source' ? `${label} is not used until one is chosen.` : `${label} is not used until its unit is known.`;
+  const name = /^[A-Z][a-z]/.test(label) ? label.charAt(0).toLowerCase() + label.slice(1) : label; // GPS remains GPS
+  return `The ${name} is not used until ${kind === 'source' ? 'one is chosen' : 'its unit is known'}.`;
 }
 
 /**

@@ -63,6 +63,7 @@ class SettingsTab {
       listen(this.parts.search, 'input', () => this.#filter()),
       listen(this.parts.undo, 'click', () => void this.#undo()),
       listen(this.parts.phone, 'click', openPreferences),
+      listen(this.parts.close, 'click', () => { location.hash = '#home'; }),
       listen(window, 'catgraph-units', draw),
       listen(window, 'catgraph-settings', () => this.#searchWanted()),
       store.on('log', (events) => this.#announce(events)),
@@ -80,11 +81,13 @@ class SettingsTab {
     const all = html('fieldset', { class: 'all' }, groups, none, this.topics.element, this.file.element);
     const phone = html('button', { type: 'button', class: 'key wide' }, icon('phone'), 'Preferences of this device');
     const keys = html('div', { class: 'keys' }, phone);
+    const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close settings' }, icon('close'));
     this.panel.replaceChildren(
+      html('div', { class: 'settings-head' }, html('h2', {}, 'Settings'), close),
       html('div', { class: 'find' }, html('div', { class: 'field' }, icon('find'), search), undo), state,
       all, this.mail.element, this.people.element, this.departure.element, this.devices.element, keys,
     );
-    return { search, undo, state, groups, none, all, phone, keys };
+    return { search, undo, state, groups, none, all, phone, keys, close };
   }
 
   stop() {

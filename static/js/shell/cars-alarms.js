@@ -121,8 +121,8 @@ export class CarsAlarms {
     this.#shown = row;
     const short = this.cars.shortOf(row.name); // whole in the list of cars
     const { title, text } = row.worst;
-    setSentence(this.title, text || title);
-    setSentence(this.text, `${short}: ${title}, for ${ageWords(this.#for_s(row))}. In control: ${row.operator}.`);
+    setSentence(this.title, `${short}: ${text || title}`);
+    setSentence(this.text, `${text ? `${title}, for` : 'For'} ${ageWords(this.#for_s(row))}. In control: ${row.operator}.`);
     setText(this.open, `Open ${short}`);
     if (!card.isConnected) warning.after(card); // where there is room for one, this car's comes first
   }

@@ -124,7 +124,7 @@ function itemOf(name, summary, seen) {
   const text = isCut ? lastWords(summary.speed.value_mps, summary.link.car_age_s ?? summary.link.bridge_age_s, seen) : worst?.text ?? '';
   return {
     key: name, cars: [name], name, icon: isCut ? 'link-off' : worst ? ICONS[worst.priority] : 'info', kind: worst ? KIND[worst.priority] : 'warn',
-    isFilled: Boolean(worst?.active && isAsking), title: worst ? titleOf(worst) : 'Needs a person', detail: [`${text}${more}`.replace(/^, /, ''), unownedWords(summary)].filter(Boolean).join('; '),
+    isFilled: Boolean(worst?.active && isAsking), title: `${worst ? titleOf(worst) : 'Needs a person'}${isCut ? ', car may move' : ''}`, detail: [`${text}${more}`.replace(/^, /, ''), unownedWords(summary)].filter(Boolean).join('; '),
     since_s: Math.max(0, (seen.now_ms - since_ms) / 1000),
     who: whoOf(summary, seen.page), next: nextOf(summary, seen.now_ms), timer, keys: keysOf(summary, seen),
     order: [...stepOf(summary, seen), -(worst ? RANK[worst.priority] : 0), raised_s],
@@ -290,7 +290,7 @@ function groupOf(of, all, isUnfolded) {
   const show = key('show', isLostCars, isUnfolded ? `Hide ${all.length}` : `Show ${all.length}`);
   const keys = isLostCars ? (loudest(all) === 'none' ? [] : [key('hush', false, 'Silence all')]) : isMine ? [key('release', false, 'Unassign all')] : free ? [key('take', true, 'Take all'), ...(free === all.length ? [key('hand')] : [])] : [key('over', false, 'Take over all')];
   return {
-    ...first, key: of, cars: names, name: counted(all.length, 'car'), title: isLostCars ? 'No data: cars may be moving' : first.title,
+    ...first, key: of, cars: names, name: counted(all.length, 'car'), title: isLostCars ? 'No data: cars may be moving' : first.title.replace(/, car may move$/, ', cars may move'),
     detail: rangeOf(names), since_s: Math.max(...all.map(({ since_s }) => since_s ?? 0)), who: { text: who, is: free ? 'nobody' : first.who.is },
     keys: [...keys, show], isUnassigned: free > 0, sound: loudest(all), isFilled: all.some(({ isFilled }) => isFilled),
   };

@@ -28,7 +28,7 @@ export function lostWords({ lost, heard_ms, cars, unserved }) {
   const since = heard_ms === null ? '' : ` Last data at ${timeOfDay(heard_ms)}.`;
   const what = `Nothing here is known now. ${cars ? `Cars may still be moving, and alarms of ${counted(cars, 'car')} do not arrive here.` : ''}`.trim();
   if (lost === 'server') return [`The server stopped answering.${since} This page dials again.`, what];
-  return [`${unserved || 'The server answers, but no data of any car arrives: the broker or the way to the cars is lost.'}${since}`, what];
+  return [`${unserved || 'The server answers, but no data arrives from any car: the broker or the way to the cars is lost.'}${since}`, what];
 }
 
 export class LostPanel {

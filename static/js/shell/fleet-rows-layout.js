@@ -39,16 +39,17 @@ const STANDS_MPS = 0.1;
 export const MANY = 20;
 export const MOST_ROWS = 16;
 
-/** @type {import('../core/link.js').ChainView} */
-const NO_CHAIN = { state: 'Lost', age_s: null, cut: 0, since_ms: null, nodes: [], sentence: '', detail: '' };
+/** Nothing is known beyond the server; `cut` 0: nor of it. @param {0 | 1} [cut] @returns {import('../core/link.js').ChainView} */
+const noChain = (cut = 1) => ({ state: 'Lost', age_s: null, cut, since_ms: null, nodes: [], sentence: '', detail: '' });
 
 /**
  * @param {Seen} seen
  * @param {string[]} needing the cars in the queue, in its order: their rows come first
- * @param {boolean} isSilent nothing is known of any car
+ * @param {import('./fleet-lost.js').Lost} silent what is lost, where nothing is known of any car
  * @returns {Row[]}
  */
-export function carRows(seen, needing, isSilent) {
+export function carRows(seen, needing, silent) {
+  const isSilent = silent !== null;
   const places = new Map(needing.map((name, i) => [name, i]));
   const listed = [...(seen.cars?.cars ?? [])].sort((a, b) => natural(a.name, b.name));
   const cars = seen.cars ? { ...seen.cars, cars: listed } : null;
@@ -71,7 +72,7 @@ export function carRows(seen, needing, isSilent) {
       key: row.name, name: row.name, cars: [row.name],
       icon: isSilent || isNew ? 'unknown' : row.worst && isCut ? 'link-off' : row.icon,
       kind: isSilent || isNew ? '' : row.kind, isAsking: !isSilent && !isNew && row.kind !== '' && row.needs, isLost: lost && !isOff, text: owner || stop ? [text, owner, stop].filter((part) => part && part !== '–').join(' · ') : text,
-      chain: lost ? NO_CHAIN : row.chain ?? NO_CHAIN, speed: { ink: value_mps === null ? 'never' : ink, value_mps },
+      chain: (lost ? null : row.chain) ?? noChain(silent === 'server' ? 0 : 1), speed: { ink: value_mps === null ? 'never' : ink, value_mps },
       mode: modeOf(lost ? 'stale' : ink, row.speed.value_mps),
       operator: lost ? `${was ?? 'No one'}?` : row.operator,
       recording: lost ? 'not known' : row.recording, isRecording: !lost && /^\d/.test(row.recording),
@@ -112,10 +113,10 @@ export function foldedRows(rows, folded, unfolded) {
     const all = rows.filter(({ key }) => folded.get(key) === item);
     const holders = new Set(all.map(({ operator }) => operator).filter((name) => name !== 'No one')).size;
     shown.push({
-      ...row, key: item.key, name: item.name, cars: item.cars, text: `${item.title.replace(/: cars.*/, '')}: ${item.detail}`,
+      ...row, key: item.key, name: item.name, cars: item.cars, text: `${item.title.replace(/[:,] cars.*/, '')}: ${item.detail}`,
       speed: { ink: 'fresh', value_mps: null }, energy: { ink: 'fresh', text: '–' }, mode: one(all.map(({ mode }) => mode)) ?? 'unknown',
       operator: one(all.map(({ operator }) => operator)) ?? counted(holders, 'person', 'people'), isRecording: all.every(({ isRecording }) => isRecording),
-      recording: '', isStopped: false, chain: one(all.map(({ chain }) => chain.cut)) === undefined ? NO_CHAIN : row.chain,
+      recording: '', isStopped: false, chain: one(all.map(({ chain }) => chain.cut)) === undefined ? noChain() : row.chain,
     });
     if (unfolded.has(item.key)) shown.push(...all);
   }
@@ -139,8 +140,11 @@ export function lineOf(items, shown, flood, rows) {
   const [first] = shown;
   if (first) {
     const free = items.filter(({ isUnassigned }) => isUnassigned).length;
-    const end = flood ? `flood: ${flood}` : shown.length > 1 ? `1 of ${shown.length}` : '';
-    const more = free ? `${end ? '· ' : ''}${free} unassigned` : '';
+    const whole = flood === first.cars.length ? 'flood' : `flood: ${flood}`; // its number stands in front
+    const among = flood ? whole : shown.length > 1 ? `1 of ${shown.length}` : '';
+    const unassigned = free ? `${free} unassigned` : '';
+    const isLong = / may (move|be moving)$/.test(first.title); // on a phone this is read whole; the queue's head has the numbers
+    const [end, more] = isLong ? ['', [among, unassigned].filter(Boolean).join(' · ')] : [among, among && unassigned ? `· ${unassigned}` : unassigned];
     return { kind: first.kind, icon: first.icon, text: `${first.name}: ${first.title}`, end, more, isFilled: first.isFilled };
   }
   if (!rows.length) return { kind: '', icon: 'unknown', text: 'No car is listed yet', end: '', more: '', isFilled: false };

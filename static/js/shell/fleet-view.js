@@ -119,7 +119,7 @@ export class FleetView {
     const { lost } = view;
     this.items = each.filter(({ isOff }) => !isOff);
     const { items, folded, flood } = grouped(this.items, acts.unfolded);
-    const rows = carRows(seen, this.items.filter(({ key, name }) => key === name).map(({ name }) => name), lost !== null);
+    const rows = carRows(seen, this.items.filter(({ key, name }) => key === name).map(({ name }) => name), lost);
     const shown = items.filter((item) => item.cars.length > 1 || !folded.has(item.key)).length;
     this.#drawState(rows.length, lost, each.length > 0);
     this.#drawBar(view, rows.length);

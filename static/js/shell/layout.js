@@ -17,8 +17,11 @@ export function isFloor() {
   return floorQuery().matches;
 }
 
-/** Are map and scan beside the instruments at every tab that is no page of its own? As `wall.css` has it. */
-export const isWall = () => matchMedia('(width >= 112.5em) and (height >= 53.75em)').matches;
+/** @type {MediaQueryList | null} */
+let wall = null;
+
+/** Are map and scan beside the instruments at every tab that is no page of its own? As `wall.css` has it; to read innerWidth would make the browser do its style and layout at once. */
+export const isWall = () => (wall ??= matchMedia('(width >= 112.5em) and (height >= 53.75em)')).matches;
 
 /** Is the list of alarms in sight, with its keys? Nothing need then ask for it in another place. */
 export function areAlarmsInSight() {

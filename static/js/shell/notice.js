@@ -7,19 +7,20 @@ const STAYS_MS = 8000;
 const OFFERS_MS = 15_000; // what can be pressed must be found and reached first
 
 /**
- * Tells the style sheets what notices stand on, how much room they need, and what is left of the view.
+ * Tells the style sheets what notices stand on, how much room they need, and what is left of the view, also above an alarm's dialog.
  * @param {HTMLElement} root where notices stand
  */
 function makeRoom(root) {
   const view = need(document, '#monitor > .view');
+  const alarm = need(document, '#sheet-alarm');
   const { style } = document.documentElement;
   const place = () => {
     const tops = [...document.querySelectorAll('#monitor > :is(.ledge, .rail, .scrub)')].map((one) => one.getBoundingClientRect()).filter(({ height }) => height).map(({ top }) => top);
-    const sizes = { dock: Math.ceil(innerHeight - Math.min(innerHeight, ...tops)), snack: root.offsetHeight, view: view.offsetHeight };
+    const sizes = { dock: Math.ceil(innerHeight - Math.min(innerHeight, ...tops)), snack: root.offsetHeight, view: view.offsetHeight, room: alarm.getBoundingClientRect().top - view.getBoundingClientRect().top };
     for (const [name, size] of Object.entries(sizes)) style.setProperty(`--${name}`, `${size}px`); // read before: what is written in between would cost a style of the whole page each
   };
   const seen = new ResizeObserver(place);
-  for (const one of [root, view, ...document.querySelectorAll('#monitor > :is(.ledge, .rail)')]) seen.observe(one);
+  for (const one of [root, view, alarm, ...document.querySelectorAll('#monitor > :is(.ledge, .rail)')]) seen.observe(one);
 }
 
 /** @typedef {{label: string, act: () => void, onClosed?: () => void}} Way what a notice offers, as one key; `onClosed`: it was closed by hand */

@@ -6,7 +6,7 @@ import { eventWords, gapLine } from '../alarms/log-layout.js';
 import { fixed, timeOfDay } from '../core/format.js';
 import { alarmInHead } from './dialogs.js';
 import { COMPARED_LIVES_S } from '../map/map-text.js';
-import { areAlarmsInSight } from './layout.js';
+import { areAlarmsInSight, isWall } from './layout.js';
 import { scale } from '../core/scale.js';
 import { styled } from '../core/style-sheet.js';
 import { veilOf } from './veil.js';
@@ -31,7 +31,7 @@ export function headsOf({ phone, signals, alarms, suppressed, replay, session },
   return {
     map: apart_m === null ? '' : `Distance apart ${fixed(apart_m)}${explained_m === null ? '' : ` of ${fixed(explained_m)}`} m`,
     scan: beams && signals.scan?.freshness !== 'stale' ? `${beams.usable} of ${beams.beams} beams` : signals.scan?.freshness === 'stale' ? 'stale' : '',
-    alarms: replay ? 'as recorded' : rows.length ? countWords(rows) : session.paused ? 'paused' : isChecked ? 'none active' : 'not checked',
+    alarms: replay ? 'as recorded' : rows.length ? countWords(rows) : session.paused ? '' : isChecked ? 'none active' : 'not checked',
   };
 }
 
@@ -50,10 +50,8 @@ export function mount(monitor, store) {
 }
 
 class Panes {
-  /** The sheet of the widest screens. @type {Promise<void> | undefined} */
+  /** The sheet of the widest screens. @type {Promise<unknown> | undefined} */
   dress;
-  /** As in wall.css; to read innerWidth would make the browser do its style and layout at once. */
-  wall = matchMedia('(width >= 112.5em)');
 
   /** @param {HTMLElement} monitor @param {Store} store */
   constructor(monitor, store) {
@@ -77,7 +75,7 @@ class Panes {
     const isInSight = frame !== null && areAlarmsInSight();
     void this.list.want(isInSight);
     if (!isInSight) return;
-    if (this.wall.matches) this.dress ??= styled('wall');
+    if (isWall()) this.dress ??= styled('wall');
     const heads = headsOf(frame, store.chain.state === 'Live', store.lag_s);
     const covered = veilOf(this.store);
     for (const { name, element } of this.heads) setSentence(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // a covered pane has no text
@@ -86,8 +84,8 @@ class Panes {
     const shown = this.signals.list.children.length;
     setSentence(field(this.monitor, 'head-signals'), more ? `Signals, ${shown} of ${shown + more}` : 'Signals');
     const { head, lines } = peopleLines(store.isSilent ? null : frame.replay ? frame.live?.reach : frame.reach, store.control, store.page);
-    setSentence(field(this.monitor, 'head-people'), (frame.replay ? 'live: ' : '') + head);
-    this.people.draw(() => lines);
+    const left = this.people.draw(() => lines);
+    setSentence(field(this.monitor, 'head-people'), `${frame.replay ? 'live: ' : ''}${head}${left ? `, ${lines.length - left} shown` : ''}`);
   }
 
   stop() {

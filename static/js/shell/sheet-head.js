@@ -4,6 +4,7 @@ import { stripOf } from '../alarms/alarm-layout.js';
 import { html, icon, need, setAttribute, setIcon, setText, setSentence } from '../core/dom.js';
 import { age } from '../core/format.js';
 import { mountHeadSpeed } from './head-speed.js';
+import { isFloor } from './layout.js';
 import { styled } from '../core/style-sheet.js';
 
 /**
@@ -42,6 +43,7 @@ export function mount(monitor, store) {
     draw();
   }
 
+  const free = showGauge(monitor);
   const seen = new MutationObserver(place);
   seen.observe(monitor, { attributeFilter: ['data-sheet'] });
   seen.observe(need(monitor, '.view'), { childList: true });
@@ -49,7 +51,29 @@ export function mount(monitor, store) {
   const off = store.on('draw', draw);
   return () => {
     seen.disconnect();
+    free();
     off();
     head.remove();
   };
+}
+
+/**
+ * Over a sheet of a phone stands the gauge: Home is scrolled to it, and back unless it was scrolled meanwhile.
+ * @param {HTMLElement} monitor
+ */
+function showGauge(monitor) {
+  const home = need(monitor, '[data-panel="home"]');
+  let left_px = 0;
+  const opened = new MutationObserver(() => {
+    const isOpen = 'sheet' in monitor.dataset;
+    if (isOpen && home.scrollTop > 0 && !isFloor()) {
+      left_px = home.scrollTop;
+      home.scrollTop = 0;
+    } else if (!isOpen) {
+      if (left_px && home.scrollTop === 0) home.scrollTop = left_px;
+      left_px = 0;
+    }
+  });
+  opened.observe(monitor, { attributeFilter: ['data-sheet'] });
+  return () => opened.disconnect();
 }

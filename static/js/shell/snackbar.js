@@ -2,11 +2,11 @@
 
 import { layOut } from '../alarms/alarm-layout.js';
 import { titleOf } from '../alarms/alarm-title.js';
-import { html, icon, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
-import { areAlarmsInSight } from './layout.js';
+import { html, icon, listen, setAttribute, setIcon, setText, setSentence, show } from '../core/dom.js';
+import { areAlarmsInSight, floorQuery } from './layout.js';
 import { Meant } from '../core/meant.js';
 import { openShelve } from '../alarms/shelve.js';
-import { markWords, snackWords } from '../alarms/standing.js';
+import { joinWords, markWords, snackWords } from '../alarms/standing.js';
 
 /**
  * @param {HTMLElement} root
@@ -47,11 +47,12 @@ export function mount(root, store, say) {
     setIcon(mark, shown.priority === 'advisory' ? 'info' : 'warn');
     setAttribute(bar, 'data-ended', !shown.active);
     setSentence(title, `${titleOf(shown)}${waiting.length > 1 ? ` (${waiting.length} alarms)` : ''}`);
-    setSentence(text, [snackWords(shown), markWords(shown)].filter(Boolean).join(' · '));
+    setSentence(text, joinWords(snackWords(shown), markWords(shown)));
     show(shelve, shown.active && shown.priority !== 'critical' && shown.actions.includes('shelve'));
     setText(acknowledge, 'Acknowledge');
   }
 
   draw();
-  return store.on('draw', draw);
+  const stops = [store.on('draw', draw), listen(floorQuery(), 'change', draw)]; // a window made larger has the list: not both until the next state
+  return () => stops.forEach((stop) => stop());
 }

@@ -3,7 +3,6 @@
 import { stripOf } from '../alarms/alarm-layout.js';
 import { hasAged, whyUnchecked } from '../alarms/checks.js';
 import { field, need, setAttribute, setIcon, setSentence } from '../core/dom.js';
-import { UNCONFIRMED } from '../slowdown/slow-layout.js';
 
 /**
  * @param {HTMLElement} root
@@ -27,7 +26,7 @@ export function mount(root, store) {
     setAttribute(strip, 'data-returned', seen.hasReturned);
     setAttribute(strip, 'data-known', seen.isKnown);
     setAttribute(strip, 'data-opens', seen.opens);
-    setAttribute(strip, 'data-unconfirmed', seen.text.includes(UNCONFIRMED));
+    setAttribute(strip, 'data-unconfirmed', seen.isUnconfirmed);
     setIcon(mark, seen.icon);
     setSentence(text, seen.text);
     setSentence(end, seen.end);

@@ -9,7 +9,7 @@ import { unseenOf, unseenWords } from '../core/unseen.js';
 import { ageWords, fixed, timeOfDay } from '../core/format.js';
 
 /** What is known of the recorder under the veil: what it did then, or what is safe for good. @type {Record<string, string>} */
-const RECORDED = { recording: 'it was recording', held: 'saved', saving: 'it was being saved', stopped: 'it had stopped' };
+const RECORDED = { recording: 'was on', held: 'saved', saving: 'was being saved', stopped: 'had stopped' };
 
 /**
  * The last values; empty where there are none.
@@ -74,7 +74,8 @@ export function mount(root, store) {
       sentence.replaceChildren(html('b', {}, ...textNodes(bold)), ' ', ...textNodes(plain));
       written = `${bold}|${plain}`;
     }
-    setSentence(then, was ? [was, unseenWords(unseenOf(store))].filter(Boolean).join(', ') : 'nothing');
+    setSentence(then, [was, unseenWords(unseenOf(store))].join(', '));
+    for (const part of [/** @type {HTMLElement} */ (then.previousElementSibling), then]) show(part, was !== '');
     const recording = RECORDED[store.frame?.recording.state ?? 'off'] ?? '';
     setText(rec, recording);
     for (const part of [recName, rec]) show(part, recording !== '');
@@ -87,7 +88,7 @@ export function mount(root, store) {
 
 /** The title; what never sent a message is not called stale. @param {import('../core/link.js').ChainView} view @param {number | null} [car_s] age of the car's newest message */
 export function titleOf({ state, age_s }, car_s) {
-  if (state === 'Silent' && car_s === null) return 'Nothing received yet';
+  if (state === 'Silent' && car_s === null) return 'No values yet'; // the strip says that nothing was received
   if (age_s === null) return 'Stale';
   return state === 'Waking' ? state : `Stale ${ageWords(age_s)}`;
 }

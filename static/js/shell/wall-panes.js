@@ -17,15 +17,15 @@ import { scale } from '../core/scale.js';
 const LINE_PX = 26;
 
 /**
- * Rate and age of each signal that is published: what is not fresh first, for the pane may not have room for all.
+ * Rate and age of each signal that is published: what is stale or absent first, then what is ageing, for the pane may not have room for all.
  * @param {State['signals']} signals
  * @param {number} lag_s how old the frame is by now
  * @returns {Line[]}
  */
 export function signalLines(signals, lag_s) {
   const published = Object.entries(signals).filter(([, signal]) => signal.freshness !== 'not_published').map(([name, signal]) => ({ name, signal, ...freshnessStyle(signal, lag_s) }));
-  const isFresh = (/** @type {string} */ ink) => Number(ink === 'fresh');
-  return published.sort((a, b) => isFresh(a.ink) - isFresh(b.ink)).map(({ name, signal: { label, rate_hz }, ink, age_s }) => ({
+  const rank = (/** @type {string} */ ink) => ['ageing', 'fresh'].indexOf(ink);
+  return published.sort((a, b) => rank(a.ink) - rank(b.ink)).map(({ name, signal: { label, rate_hz }, ink, age_s }) => ({
     key: name, ink, of: name,
     cells: [label, isAbsent(ink) ? ABSENT[ink] : `${rate_hz === null || rate_hz === undefined ? NOTHING : fixed(rate_hz)} Hz`, age_s === null ? NOTHING : `${ink === 'stale' ? 'STALE ' : ''}${age(age_s, 2)} s`],
   }));

@@ -1,4 +1,6 @@
-// Parts under the strip that most drives never show: each is fetched with the first state that has something for it.
+// What a page does not need from the start: each part is fetched with the first state that has something for it.
+
+import { styled } from '../core/style-sheet.js';
 
 /** After a failure it is fetched again with a later frame [ms]. */
 const AGAIN_MS = 1000;
@@ -10,6 +12,8 @@ const AGAIN_MS = 1000;
  * @type {[(frame: import('../core/protocol-types.js').State) => boolean, () => Promise<Part>][]}
  */
 const PARTS = [
+  // The style sheets of alarms and orders, which other pages fetch some seconds later.
+  [({ alarms: [alarm], decelerate, link }) => Boolean(alarm ?? decelerate.order ?? decelerate.countdown ?? link.cut), () => Promise.all([styled('drawers'), styled('drive')]).then((come) => (come.includes(false) ? Promise.reject() : { mount() {} }))],
   [({ questions }) => Boolean(questions?.length), () => import('../settings/questions.js')],
   [({ session }) => Boolean(session.planned_stop), () => import('../alarms/planned-stop.js')],
 ];

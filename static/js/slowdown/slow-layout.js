@@ -19,10 +19,10 @@ import { age, fixed, timeOfDay } from '../core/format.js';
  * @property {string} [car] the same in at most 8 characters
  */
 
+/** The alarm whose title says that the car does not slow. */
+export const UNCONFIRMED = 'slow_down_unconfirmed';
 /** The unmistakable sentence, the same wherever it stands. */
-/** In the title of the alarm too. */
-export const UNCONFIRMED = 'NOT CONFIRMED';
-export const NOT_CONFIRMED = `${UNCONFIRMED} – use the physical stop`;
+export const NOT_CONFIRMED = 'NOT CONFIRMED – use the physical stop';
 const AID = 'An aid, not an emergency stop: Wi-Fi and the bridge are in its path. The safety driver stops the car.';
 /** A guard that sends nothing for so long cannot be relied on [s]; it reports at least twice a second. */
 const GUARD_HEARD_S = 2;
@@ -92,7 +92,8 @@ export function slideOf(seen, isInAlarm = false) {
   }
   if (now.state === 'not_armed') return isInAlarm && !isViewer ? off('Acknowledge first', 'then arm it') : off('Slow-down not armed', isViewer ? 'not for viewers' : 'press to arm');
   const why = bare(now.why ?? 'not available');
-  return off('Slow-down off', why.length > BRIEF ? 'press for the reason' : why);
+  const slide = off('Not available', why.length > BRIEF ? 'press for the reason' : why); // the bracket above says of what
+  return { ...slide, label: `Slow-down n${slide.label.slice(1)}` };
 }
 
 /** @param {string} state @param {SlowOrder} order @returns {[string, string]} */
@@ -110,14 +111,14 @@ function goWords(state, order) {
  * @param {Decelerate | null | undefined} now
  * @param {number} standing alarms that stand too
  * @param {string} [found] faults or stale values, where no alarm stands
- * @returns {{kind: 'order' | 'crit', text: string, end: string} | null}
+ * @returns {{kind: 'order' | 'crit', text: string, end: string, isUnconfirmed?: boolean} | null}
  */
 export function stripWords(now, standing, found = '') {
   const order = orderOf(now);
   if (!now) return null;
   if (!order && holdOf(now)) return { kind: 'order', text: `The guard ${now.guard?.state === 'slowing' ? 'slows' : 'holds'} the car`, end: 'by itself' };
   if (!order) return null;
-  if (order.confirmed === false) return { kind: 'crit', text: NOT_CONFIRMED, end: '' };
+  if (order.confirmed === false) return { kind: 'crit', text: NOT_CONFIRMED, end: '', isUnconfirmed: true };
   const rate = `−${fixed(order.deceleration_mps2)} m/s²`;
   const also = standing ? ` · ${standing} ${standing === 1 ? 'alarm' : 'alarms'}` : found && ` · ${found}`;
   if (!order.sending) return { kind: 'order', text: 'Not sending to the car', end: also.slice(3) };

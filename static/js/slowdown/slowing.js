@@ -5,7 +5,7 @@ import { field, listen, need, setAttribute, setText, setSentence, show } from '.
 import { Countdown } from './countdown.js';
 import { OrderSteps } from './order-steps.js';
 import { ReleaseKey } from './release-key.js';
-import { guardWords, holdOf, orderOf, seenOf, stateWord } from './slow-layout.js';
+import { UNCONFIRMED, guardWords, holdOf, orderOf, seenOf, stateWord } from './slow-layout.js';
 import { SlowSlides } from './slow-slides.js';
 
 /**
@@ -31,14 +31,15 @@ export function mount(root, store, control, say, shortOf) {
     const { now } = seen;
     for (const name of names) setText(name, seen.car ?? '');
     slides.draw(seen);
-    const title = stateWord(seen);
-    const state = title.toLowerCase();
+    const state = stateWord(seen).toLowerCase();
     for (const legend of legends) {
-      setText(field(legend, 'legend-state'), legend.closest('dialog')?.querySelector('h2')?.textContent?.includes(title) ? 'ordered' : state); // the title has NOT CONFIRMED
-      setAttribute(legend, 'data-state', state);
+      const dialog = legend.closest('dialog')?.dataset;
+      const isTitled = state === 'not confirmed' && dialog?.['alarm']?.split(' ')[0] === UNCONFIRMED && !('ended' in dialog);
+      setText(field(legend, 'legend-state'), isTitled ? 'ordered' : state);
+      setAttribute(legend, 'data-state', isTitled ? 'ordered' : state);
     }
     const hold = seen.isReplay ? null : holdOf(now);
-    setText(field(root, 'legend-left'), hold ? 'slow-down' : 'monitoring');
+    setText(field(root, 'legend-left'), hold ? 'slow-down' : seen.isSilent ? 'no answer' : 'monitoring');
     show(field(root, 'stop'), !hold);
     show(field(root, 'pause'), !hold || store.frame?.session.paused === true); // Resume is always available
     release.draw(seen, hold);

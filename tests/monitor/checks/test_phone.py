@@ -187,7 +187,7 @@ WHYS: dict[Why, tuple[str, str, str]] = {
     "unavailable": ("No position found by the phone", "not checked: no fix", "FAULT: no fix"),
     "timeout": ("No GPS fix on the phone for 10 s", "not checked: no fix", "FAULT: no fix"),
     "hidden": (
-        "The page on the phone is in the background, where it gets no position",
+        "No position while the page is in the background on the phone",
         "not checked: hidden",
         "FAULT: background",
     ),

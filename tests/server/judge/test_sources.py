@@ -76,9 +76,9 @@ def test_two_lasers_are_asked_for_whatever_their_names_say(evidence: Evidence) -
     assert "scan" not in choice.sources
     assert choice.undecided["scan"] == "two lasers, none chosen"
     (question,) = choice.questions
-    assert question["words"] == "Two lasers: which looks ahead?"
+    assert question["words"] == "Two lasers: which one faces forward?"
     assert [one["value"] for one in question["options"]] == ["/front/scan", "/rear/scan"]
-    assert "its name suggests ahead" in question["options"][0]["why"]
+    assert "its name suggests forward" in question["options"][0]["why"]
     assert [one.topic for one in choice.watched["scan"]] == ["/front/scan", "/rear/scan"]
     assert not any(one.carries for one in choice.watched["scan"])
 
@@ -86,7 +86,7 @@ def test_two_lasers_are_asked_for_whatever_their_names_say(evidence: Evidence) -
 def test_tf_decides_which_laser_looks_ahead() -> None:
     evidence = frames({"one": False, "two": True}, front="one", rear="two")
     source = choose(LASERS, evidence=evidence).sources["scan"]
-    assert (source.topic, source.why) == ("/rear/scan", "looks ahead by TF")
+    assert (source.topic, source.why) == ("/rear/scan", "faces forward by TF")
 
 
 @pytest.mark.parametrize("ahead", [{}, {"one": None}, {"one": False, "two": False}, {"one": True, "two": True}])
@@ -314,7 +314,7 @@ def test_500_candidates_are_bounded_and_named_with_their_count() -> None:
     choice = choose(topics)
     assert [len(one["options"]) for one in choice.questions] == [12, 12]
     assert [one["options_count"] for one in choice.questions] == [500, 500]
-    assert choice.questions[0]["words"] == "500 lasers: which looks ahead?"
+    assert choice.questions[0]["words"] == "500 lasers: which one faces forward?"
     assert max(map(len, choice.watched.values())) <= 4
     assert len(to_compare(topics, {})) <= 64
 

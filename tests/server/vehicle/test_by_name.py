@@ -44,7 +44,7 @@ async def test_two_lasers_do_not_mix_and_are_a_question() -> None:
     topics = {"/odom": ODOM, "/scan": SCAN, "/front/scan": SCAN}
     async with car(topics, Without(publish)) as (_, base), viewer(base) as one, http_client() as http:
         state = await one.state(lambda s: bool(s["questions"]))
-        assert [one["words"] for one in state["questions"]] == ["Two lasers: which looks ahead?"]
+        assert [one["words"] for one in state["questions"]] == ["Two lasers: which one faces forward?"]
         assert {option["value"] for option in state["questions"][0]["options"]} == {"/scan", "/front/scan"}
         assert (state["signals"]["scan"]["topic"], state["signals"]["scan"]["value"]) == (None, None)
         assert (await http.get(f"{base}/api/checks/obstacle")).json()["verdict"] == "unknown"

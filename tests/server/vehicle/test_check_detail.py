@@ -63,6 +63,15 @@ def test_all_checks_of_a_tile_are_named() -> None:
     assert names == ["gps_drift", "gps_jump"]
 
 
+def test_each_check_of_a_tile_has_the_priority_of_its_own_alarm() -> None:
+    """A tile may hold a warning beside a critical alarm: the list of its checks marks each by its own."""
+    found = answer("diagnostics_warn", 4.0)["checks"]
+    assert {one["id"]: one["priority"] for one in found} == {
+        "diagnostics_warn": "advisory",
+        "diagnostics_error": "warning",
+    }
+
+
 async def test_over_http(bridge: RosBridge, server: str) -> None:
     async with viewer(server) as one, driving(bridge, speed=lambda n: 4.0), http_client() as http:
         await one.state(lambda s: any(tile["id"] == "speed" and tile["verdict"] == "ok" for tile in s["checks"]), 15)

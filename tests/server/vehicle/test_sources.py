@@ -82,7 +82,7 @@ async def test_two_lasers_are_a_question_and_the_answer_makes_the_obstacle_alarm
     async with car(topics, two_lasers) as (_, base), viewer(base) as one, http_client() as http:
         state = await one.state(lambda s: bool(s["questions"]))
         (question,) = state["questions"]
-        assert question["words"] == "Two lasers: which looks ahead?"
+        assert question["words"] == "Two lasers: which one faces forward?"
         assert [option["value"] for option in question["options"]] == [FRONT, REAR]
         laser = state["signals"]["scan"]
         assert (laser["topic"], laser["value"], laser["note"]) == (None, None, "two lasers, none chosen")
@@ -120,7 +120,7 @@ async def test_the_laser_that_looks_ahead_by_the_transforms_is_taken(front_rad: 
 
     async with car(topics, publish) as (_, base), viewer(base) as one:
         state = await one.state(lambda s: s["signals"]["scan"]["freshness"] == "fresh")
-        assert (state["signals"]["scan"]["topic"], state["signals"]["scan"]["why"]) == (ahead, "looks ahead by TF")
+        assert (state["signals"]["scan"]["topic"], state["signals"]["scan"]["why"]) == (ahead, "faces forward by TF")
         assert state["questions"] == []
 
 
