@@ -207,7 +207,7 @@ test('a car of now, with its ellipse', () => {
 test('a car that is not known to be there is never shown as live, and the reason is shown', () => {
   for (const [value, ink, text] of /** @type {[any, string, RegExp][]} */ ([
     [FIX, 'stale', /^The car’s position is 3\.4 s old: the car may be elsewhere\.$/],
-    [null, 'never', /^$/],
+    [null, 'never', /^No position received/],
     [null, 'no_value', /^The car’s messages hold no usable position\.$/],
     [null, 'not_published', /^The car publishes no position/],
     [{ ...FIX, status: -1 }, 'fresh', /^The car’s receiver has no fix/],

@@ -276,7 +276,7 @@ async def test_before_any_position_nothing_is_drawn_and_that_is_said(phone: Phon
             await phone.live()
             it = Map(phone)
             await expect(it.f("none-words")).to_have_text("no position yet")
-            await expect(it.f("car-message")).to_have_text("")  # map and value say it
+            await expect(it.f("car-message")).to_have_text("No position received from the car yet.")
             await expect(it.f("car-lat")).to_have_text("no message yet")
             for mark in (".car-mark", ".phone-mark", ".dl", ".acc", ".phacc"):
                 await expect(it.svg(mark)).to_be_hidden()

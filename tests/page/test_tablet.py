@@ -60,6 +60,26 @@ async def test_no_label_of_a_small_gauge_is_below_12_px(phone: Phone, canned: Ca
             assert await page.evaluate(SMALL) == [], (scene, width)
 
 
+#: Whether the first letters of an element can be seen: nothing lies over them.
+SEEN = """(one) => {
+  const { left, top, height } = one.getBoundingClientRect();
+  return height > 10 && one.contains(document.elementFromPoint(left + 4, top + height / 2));
+}"""
+
+
+@pytest.mark.parametrize(("width", "height"), [(820, 1180), (1180, 820), (1440, 900)])
+async def test_a_map_with_a_track_and_no_position_says_so(
+    phone: Phone, canned: Canned, width: int, height: int
+) -> None:
+    await phone.page.set_viewport_size({"width": width, "height": height})
+    await show(canned, phone.page, "map-none")
+    message = phone.page.locator("[data-panel=map] [data-f=car-message]")
+    await expect(message).to_have_text("No position received from the car yet.")
+    await expect(phone.page.locator("link[href*=map-drawn]")).to_be_attached()
+    await phone.drawn()
+    assert await message.evaluate(SEEN)
+
+
 async def test_a_question_on_a_tablet_leaves_the_speed_its_size(phone: Phone, canned: Canned) -> None:
     page = phone.page
     await page.set_viewport_size({"width": 820, "height": 1180})

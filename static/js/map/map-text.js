@@ -72,6 +72,7 @@ export function carOf(frame, freshnessStyle) {
 function carMessage(ink, age_s, isLost) {
   if (ink === 'not_published') return 'The car publishes no position.';
   if (ink === 'no_value' || ink === 'not_measured') return 'The car’s messages hold no usable position.';
+  if (ink === 'never') return 'No position received from the car yet.'; // a track of before has the map placed, and no words over it
   if (ink === 'stale') return `The car’s position is ${age(age_s)} s old: the car may be elsewhere.`;
   if (isLost) return 'The car’s receiver has no fix: the car’s position is unknown.';
   return '';
